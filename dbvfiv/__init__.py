@@ -23,7 +23,7 @@ _PUBLIC = {
     "CaseError": "errors",
     "SolveError": "errors",
     "Observer": "observer",
-    "ClosureResult": "studies.closure.result",
+    "ClosureResult": "studies.closure.study",
     "CycleResult": "studies.cycle.result",
     "LevelsResult": "studies.levels.study",
     "MapResult": "studies.map.result",
@@ -31,7 +31,7 @@ _PUBLIC = {
     "OnsetResult": "studies.onset.result",
     "SensitivityResult": "studies.sensitivity.result",
     "State": "studies.state",
-    "SteadyResult": "studies.steady.result",
+    "SteadyResult": "studies.steady.study",
     "SweepResult": "studies.sweep.result",
     "TransientResult": "studies.transient.result",
 }

@@ -16,7 +16,7 @@ from .fit.damping import DampingReport, describe_damping
 from .model import ValveModel
 from .observer import Observer, Progress, is_watched
 from .studies.case import Case, load_case
-from .studies.closure.result import ClosureResult
+from .studies.closure.study import ClosureResult
 from .studies.cycle.result import CycleResult
 from .studies.map.result import MapResult
 from .studies.modes.result import ModesResult
@@ -24,7 +24,7 @@ from .studies.onset.result import OnsetResult
 from .studies.sensitivity.result import SensitivityResult
 from .studies.session import Session, named_changes
 from .studies.state import State, sensitivity_keys
-from .studies.steady.result import SteadyResult
+from .studies.steady.study import SteadyResult
 from .studies.sweep.result import SweepResult
 from .studies.transient.result import TransientResult
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 from collections.abc import Callable
 from enum import StrEnum
-from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -182,6 +181,7 @@ def compare(
     """
     from ..studies.comparing import save_figure
     from ..studies.session import load_result
+    from ..studies.study import find_study
 
     results = [load_result(file) for file in files]
     kind = results[0].kind
@@ -196,36 +196,13 @@ def compare(
                 f"{str(file)!r} holds a result of kind {result.kind!r} and {str(files[0])!r} one of kind "
                 f"{kind!r}; runs of one kind can be compared."
             )
-    study = import_module(f"..studies.{kind}.comparison", __package__)
-    if kind == "transient":
-        for result in results:
-            result.require_steps()
-        labels, extra = study.labels(results), {}
-        lines = _transient_table(labels, results)
-    else:
-        found = study.compare(results)
-        labels, extra = found.labels, {"comparison": found.summary(), "remark": found.remark}
-        lines = found.lines()
-    draw = study.compare if kind == "transient" else study.draw
-    path = save_figure(lambda: draw(results), output)
+    found = find_study(kind).compare(results)
+    path = save_figure(found.draw, output)
     if as_json:
-        runs = [{"file": str(f), "label": n} | r.summary() for f, n, r in zip(files, labels, results)]
-        print_json({"runs": runs, **extra, "figure": str(path)})
+        runs = [{"file": str(f), "label": n} | r.summary() for f, n, r in zip(files, found.labels, results)]
+        print_json({"runs": runs, **found.document(), "figure": str(path)})
         return
-    print("\n".join([*lines, f"Wrote {path}."]))
-
-
-def _transient_table(labels: list[str], results: list[Any]) -> list[str]:
-    width = max(len(name) for name in labels) + 2
-    lines = [f"{'':<{width}}{'last kg/s':>11}{'lip mm':>9}{'amplitude mm':>14}{'Hz':>8}  verdict"]
-    for name, result in zip(labels, results):
-        lip, h = result.verdict["lip_displacement"], result.history
-        frequency = "-" if lip["frequency"] is None else f"{lip['frequency']:.3f}"
-        lines.append(
-            f"{name:<{width}}{h['mass_flow'][-1]:>11.5g}{1e3 * h['lip_displacement'][-1]:>9.4g}"
-            f"{1e3 * lip['amplitude']:>14.4g}{frequency:>8}  {result.verdict['verdict']}"
-        )
-    return lines
+    print("\n".join([*found.lines(), f"Wrote {path}."]))
 
 
 class Format(StrEnum):

@@ -11,13 +11,13 @@ from ..case.parameters import PARAMETERS, Mu
 from ..errors import CaseError, SolveError
 from ..observer import Observer
 from ..studies.case import Case
-from ..studies.closure.result import ClosureResult
+from ..studies.closure.study import ClosureResult
 from ..studies.cycle.result import CycleResult
 from ..studies.map.result import MapResult
 from ..studies.modes.result import ModesResult
 from ..studies.onset.result import OnsetResult
 from ..studies.session import Session, kept_run
-from ..studies.steady.result import SteadyResult
+from ..studies.steady.study import SteadyResult
 
 #: What runs for a report, in this order, and of which study it is.
 RUNS = {

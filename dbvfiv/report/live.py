@@ -15,7 +15,7 @@ from ..drawing.views import ValveSkin
 if TYPE_CHECKING:
     from ..studies.map.result import MapResult
     from ..studies.state import State
-    from ..studies.steady.result import SteadyResult
+    from ..studies.steady.study import SteadyResult
 
 _LAYOUT = {
     "template": "plotly_white",

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 from typing import Any, ClassVar, Literal
@@ -106,6 +105,10 @@ class StudyResult:
         """Plain SI numbers for JSON."""
         raise NotImplementedError
 
+    def ending(self) -> dict[str, Any]:
+        """Part of the JSON document on how the run ended."""
+        return {"failures": [*self.failures], "warnings": [*self.warnings], "interrupted": not self.complete}
+
     def lines(self) -> list[str]:
         """The numbers as a table for people."""
         raise NotImplementedError
@@ -197,17 +200,3 @@ class StudyResult:
     def export(self, path: str | Path, quarter: bool = False, deformed: bool = False, **choices: Any) -> Path:
         """Write a VTKHDF file for ParaView; see `dbvfiv.record.vtkhdf`."""
         return export_result(self, path, quarter, deformed, **choices)
-
-
-@dataclass(frozen=True)
-class StateSteps(Sequence):
-    """Steps for ParaView, made one at a time from states."""
-
-    states: Sequence[Any]
-    step: Callable[[Any], Step]
-
-    def __len__(self) -> int:
-        return len(self.states)
-
-    def __getitem__(self, number: int) -> Step:
-        return self.step(self.states[number])

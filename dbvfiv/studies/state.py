@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
 from pathlib import Path
@@ -13,13 +13,18 @@ import numpy as np
 from eigen import CoupledPencil
 
 from ..case.parameters import Mu
+from ..errors import SolveError
 from ..exchange.files import state_name, write_shapes
 from ..model import ValveModel
 from ..model.dynamics import linearise
+from ..model.equilibria import LoadPath, SteadyOptions
 from ..model.state import SteadyState
+from ..record.mesh import WholeValve
 from ..record.record import GrowingRecord
-from ..record.states import LAYERS, read_states, summarise
+from ..record.states import read_layers, read_states, restart_row, restore_path, state_row, summarise
+from ..record.vtkhdf import Step, layer_field_names, motion
 from ..shell.recovery import LayerFields
+from .case import Case
 from .result import StudyResult
 from .session import Session, named_changes
 from .study import find_study
@@ -58,9 +63,7 @@ class State(SteadyState):
     @cached_property
     def layers(self) -> LayerFields:
         """Strains and stresses of the layers."""
-        record = self.results.record
-        found = {c.name.split("/")[1]: record.value(self.table, c.name, self.index) for c in LAYERS}
-        return LayerFields(record.mesh.layer_names, **found)
+        return read_layers(self.results.record, self.table, self.index)
 
     @property
     def model(self) -> ValveModel:
@@ -167,6 +170,95 @@ def states_of(result: StudyResult, table: str) -> tuple[State, ...]:
     """The states that a table of a result holds."""
     found = enumerate(read_states(result.record, table))
     return tuple(State(**vars(state), results=result, table=table, index=i) for i, state in found)
+
+
+def reach_states(
+    model: ValveModel,
+    case: Case,
+    record: GrowingRecord,
+    table: str,
+    pressures: Iterable[float],
+    states: list[SteadyState],
+    tell: Callable[[SteadyState], None] | None = None,
+) -> list[str]:
+    """Walk a load path over pressures, Pa, and keep each state in a table of a record; one that is not reached is a
+    failure, and the walk goes on from the last state.
+
+    Parameters
+    ----------
+    model : ValveModel
+    case : Case
+        With the options of the walk.
+    record, table : GrowingRecord, str
+        States that it holds are not found again; the walk goes on from the last one.
+    pressures : iterable of float, Pa
+    states : list of SteadyState
+        Takes the states, those that the record holds first.
+    tell : callable, optional
+        Is given each state that was found.
+
+    Returns
+    -------
+    list of str
+        Sentences on the pressures that were not reached.
+    """
+    path = LoadPath(model, SteadyOptions.of(case), observer=record)
+    states.extend(read_states(record, table))
+    if states:
+        restore_path(path, record, table, len(states) - 1, states[-1])
+    known, failures = {state.pressure for state in states}, []
+    for pressure in pressures:
+        if pressure in known:
+            continue
+        record.progress(f"steady state at {pressure:.6g} Pa")
+        try:
+            state = path.go_to(pressure)
+        except SolveError as error:
+            failures.append(str(error))
+            record.fail(str(error))
+            continue
+        record.append(table, state_row(model, state) | restart_row(path))
+        states.append(state)
+        if tell is not None:
+            tell(state)
+    return failures
+
+
+@dataclass(frozen=True)
+class StateSteps(Sequence):
+    """Steps for ParaView, made one at a time from states."""
+
+    states: Sequence[Any]
+    step: Callable[[Any], Step]
+
+    def __len__(self) -> int:
+        return len(self.states)
+
+    def __getitem__(self, number: int) -> Step:
+        return self.step(self.states[number])
+
+
+def pressure_steps(
+    states: Iterable[Any], valve: WholeValve, rows: Sequence[str] = (), nodes: Sequence[str] = ()
+) -> StateSteps:
+    """Steps for ParaView of states in the order of their pressures, Pa, which are the "time": motion, layers, numbers
+    ``station_NAME`` of `rows` on elements, and numbers of `nodes` at points.
+    """
+    ordered = sorted({state.pressure: state for state in states}.values(), key=lambda state: state.pressure)
+
+    def step(state: Any) -> Step:
+        mesh = state.results.mesh
+        at, cells = mesh.element_rows(), {"thickness": mesh.thickness}
+        for name in rows:
+            values = getattr(state, f"station_{name}")
+            cells[name] = 0.5 * (values[at] + values[at + 1])
+        layers = {"von_mises": state.layers.von_mises, "largest_stretch": state.layers.stretch[:, :, 1]}
+        for quantity, values in layers.items():
+            cells |= dict(zip(layer_field_names(mesh, quantity), values.T))
+        points = motion(mesh, valve, state.nodal) | {name: getattr(state, name)[valve.node] for name in nodes}
+        return Step(state.pressure, points, {name: valve.cells(values) for name, values in cells.items()})
+
+    return StateSteps(ordered, step)
 
 
 def gather_states(origin: StudyResult, states: Sequence[State]) -> Any:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
@@ -40,6 +40,8 @@ class Study:
     live : callable, optional
         From the case to what writes an item that was found as a line of a table, as soon as it is; the first line has
         the head of the table above it. Without it everything is printed at the end.
+    compare : callable, optional
+        From results to what tells them apart: ``labels``, ``lines()``, ``document()`` and the figure, ``draw()``.
     """
 
     kind: str
@@ -49,6 +51,7 @@ class Study:
     resumable: bool = True
     rows_to_keep: Callable[[Record, Case], Mapping[str, int]] | None = None
     live: Callable[[Case], Callable[[Any], str]] | None = None
+    compare: Callable[[Sequence[Any]], Any] | None = None
 
 
 def print_rows(columns: Iterable[Column]) -> Callable[[Any], str]:

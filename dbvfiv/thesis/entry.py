@@ -12,9 +12,9 @@ from typing import Any
 from ..observer import Observer
 from ..report.content import Part, Picture, Table
 from ..studies.case import thesis_case
-from ..studies.closure.result import ClosureResult
+from ..studies.closure.study import ClosureResult
 from ..studies.session import Session, kept_run
-from ..studies.steady.result import SteadyResult
+from ..studies.steady.study import SteadyResult
 from ..studies.transient.result import TransientResult
 
 _HEAD = ("", "ours", "thesis", "difference")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from ..report.content import picture, pictures_of
-from ..studies.transient import comparison
+from ..studies.transient import figures
 from .entry import Entry, Number, Outcome, Workshop
 
 _LIGHT = {"damping.alpha": 0, "damping.beta": 0.003}
@@ -35,7 +35,7 @@ def steps(workshop: Workshop) -> Outcome:
     return Outcome(
         (told,),
         numbers,
-        (picture("thesis-7-14", "", lambda: comparison.compare(runs, [f"{size} ms" for size in sizes])),),
+        (picture("thesis-7-14", "", lambda: figures.draw_together(runs, [f"{size} ms" for size in sizes])),),
     )
 
 
@@ -62,7 +62,9 @@ def _suddenly(workshop: Workshop, pressure: float, step: str, name: str) -> Outc
         runs.append(run)
         reached = f", ended at {run.history['time'][-1]:.3g} s" if run.failures else ""
         told.append(f"{word}: {run.verdict['verdict']}{reached}.")
-    return Outcome(tuple(told), (), (picture(f"thesis-{name}", "", lambda: comparison.compare(runs, list(readings))),))
+    return Outcome(
+        tuple(told), (), (picture(f"thesis-{name}", "", lambda: figures.draw_together(runs, list(readings))),)
+    )
 
 
 def cycle_at_6(workshop: Workshop) -> Outcome:

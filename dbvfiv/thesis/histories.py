@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from ..report.content import picture
-from ..studies.transient import comparison
+from ..studies.transient import figures
 from .entry import Entry, Number, Outcome, Workshop
 
 _ALPHA_3 = {"damping.alpha": 3, "damping.beta": 0.003}
@@ -31,7 +31,7 @@ def _series(
         last = float(run.history["mass_flow"][-1])
         numbers.append(Number(f"flow at the end, {word}", last, None, "kg/s"))
         numbers.append(Number(f"off the steady flow, {word}", 100 * (last / steady - 1), None, "%"))
-    drawn = picture(f"thesis-{name}", "", lambda: comparison.compare(list(runs.values()), list(runs)))
+    drawn = picture(f"thesis-{name}", "", lambda: figures.draw_together(list(runs.values()), list(runs)))
     return Outcome(tuple(ended), tuple(numbers), (drawn,))
 
 

@@ -10,9 +10,9 @@ import numpy as np
 from ..drawing.views import deformed, layer_stress
 from ..report.content import Picture, picture, pictures_of
 from ..studies.case import Case
-from ..studies.steady import comparison, figures
+from ..studies.steady import figures
 from ..studies.steady.figures import HEAD_DISCHARGE
-from ..studies.steady.result import SteadyResult
+from ..studies.steady.study import SteadyResult
 from .entry import Entry, Number, Outcome, Workshop, spread
 
 #: Pressures with published flows, Pa, and the published loss factors of Eq. 7.2 there.
@@ -200,7 +200,7 @@ def back_pressure(workshop: Workshop) -> Outcome:
 
 def _together(results: Iterable[SteadyResult], names: Iterable[str], name: str) -> Picture:
     found, called = list(results), list(names)
-    return picture(name, "", lambda: comparison.draw(found, called))
+    return picture(name, "", lambda: figures.draw_together(found, called))
 
 
 ENTRIES = (

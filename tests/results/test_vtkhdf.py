@@ -6,7 +6,7 @@ import pytest
 import dbvfiv
 from dbvfiv.errors import CaseError
 from dbvfiv.record.mesh import WholeValve
-from dbvfiv.studies.steady.result import SteadyResult
+from dbvfiv.studies.steady.study import SteadyResult
 
 vtk = pytest.importorskip("vtk")
 from vtk.util.numpy_support import vtk_to_numpy  # noqa: E402

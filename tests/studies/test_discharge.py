@@ -12,8 +12,9 @@ from dbvfiv.case import CaseError
 from dbvfiv.case.measured import DISCHARGE, read_measured
 from dbvfiv.case.quantity import GRAVITY
 from dbvfiv.studies.case import THESIS, thesis_case
-from dbvfiv.studies.steady.comparison import draw
-from dbvfiv.studies.steady.result import against
+from dbvfiv.studies.measured import FLOW, MeasuredCurve
+from dbvfiv.studies.steady.figures import draw_together
+from dbvfiv.studies.steady.study import flow_at
 from tests.small_valves import make_valve
 
 SMALL = {"mesh.around": 6, "mesh.along": 8}
@@ -141,9 +142,14 @@ def test_measured_points_beside_computed_ones(tmp_path, command_line):
 
 def test_measured_points_at_one_pressure():
     states = results(load(), ["6 kPa"]).states
-    found = against([6e3, 7e3], [2.0, 2.0], states)
+
+    def against(pressure):
+        pressure = np.array(pressure)
+        return MeasuredCurve(FLOW, pressure, np.full(len(pressure), 2.0), flow_at(states, pressure, 0.0))
+
+    found = against([6e3, 7e3])
     assert found.computed[0] == states[0].mass_flow and np.isnan(found.computed[1])
-    assert "none within" in against([7e3], [2.0], states).sentence()
+    assert "none within" in against([7e3]).sentence()
 
 
 # -- the line's curve, and runs beside each other
@@ -192,7 +198,7 @@ def test_steady_runs_side_by_side(runs, command_line, tmp_path):
 
 def test_axes_hold_the_widest_of_several_runs(runs):
     read = [dbvfiv.load_result(path) for path in reversed(runs)]  # the pipe behind takes the least
-    axes = draw(read).axes[0]
+    axes = draw_together(read).axes[0]
     widest = max(line.get_xdata().max() for line in axes.lines)
     assert axes.get_xlim()[0] == 0 and axes.get_xlim()[1] > widest
 

@@ -12,7 +12,7 @@ from dbvfiv.cfd.flow_case import FlowCase
 from dbvfiv.errors import CaseError
 from dbvfiv.record.mesh import WholeValve
 from dbvfiv.studies.case import thesis_case
-from dbvfiv.studies.measured.sections import WallSections, distances
+from dbvfiv.studies.measured import WallSections, distances
 
 FLAT = {
     "mesh.around": 6,

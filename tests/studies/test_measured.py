@@ -15,10 +15,9 @@ from dbvfiv.case import CaseError
 from dbvfiv.case.measured import AREA, DISCHARGE, SHAPE, TAPS, read_measured
 from dbvfiv.drawing.views import faces
 from dbvfiv.studies.case import Case, thesis_case
-from dbvfiv.studies.closure import comparison as closure
-from dbvfiv.studies.measured.kept import kept_tables
-from dbvfiv.studies.measured.sections import cut, distances
-from dbvfiv.studies.steady import comparison as steady
+from dbvfiv.studies.closure import study as closure
+from dbvfiv.studies.measured import cut, distances, kept_tables
+from dbvfiv.studies.steady import study as steady
 
 SMALL = {"mesh.around": 6, "mesh.along": 8}
 OPTIONS = [f"--set={key}={value}" for key, value in SMALL.items()]
@@ -282,7 +281,7 @@ def pressed(tmp_path_factory):
 
 def test_measured_data_under_back_pressure(pressed):
     result = dbvfiv.load_result(pressed[0])
-    assert result.measured.passage.excess == pytest.approx(-3e-6, rel=1e-6)
+    assert result.measured.area.excess == pytest.approx(-3e-6, rel=1e-6)
     (section,) = result.measured.shapes.sections
     assert section.distance == pytest.approx(0.0, abs=1e-9)
     told = "\n".join(result.lines())

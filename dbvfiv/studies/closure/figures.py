@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
 from matplotlib.cm import ScalarMappable
@@ -27,7 +27,7 @@ from ...drawing.style import (
     some_of,
 )
 from ...drawing.views import COLOURS, ValveSkin, draw_skin, faces, unrolled
-from ..measured.figures import draw_curve
+from ..comparing import MEASURED, Compared, draw_curve, draw_runs, labels
 from ..result import StudyResult
 
 #: Passage, mm2, below which a valve is shut for any purpose.
@@ -44,7 +44,7 @@ def draw(result: StudyResult) -> Iterator[tuple[str, Callable[[], Figure]]]:
     if result.walk:
         yield "closure-curve", lambda: closure_curve(result)
     yield "passage", lambda: passage(result)
-    if result.measured.passage is not None:
+    if result.measured.area is not None:
         yield "measured-passage", lambda: measured_passage(result)
     if result.opened:
         yield "reversal", lambda: reversal(result)
@@ -263,7 +263,7 @@ def measured_passage(result: StudyResult) -> Figure:
     """Narrowest passage left over the back pressure, with what was measured."""
     figure = new_figure(6.4, 4.2)
     axes = figure.add_subplot()
-    draw_curve(axes, [(p.pressure, p.least_opening) for p in result.walk], result.measured.passage, 1e6, "computed")
+    draw_curve(axes, [(p.pressure, p.least_opening) for p in result.walk], result.measured.area, 1e6, "computed")
     axes.set_xlabel("Back pressure, kPa")
     axes.set_ylabel("Narrowest passage between the inner faces, mm²")
     axes.set_xlim(left=0)
@@ -368,4 +368,28 @@ def supports_compared(first: StudyResult, second: StudyResult) -> Figure:
     figure.legend(loc="outside lower center", ncols=3)
     pressures = ", ".join(f"{s.pressure / 1e3:g}" for s in first.states)
     headline(figure, f"Contact of the inner faces and the supports of Th. 3.6 (inner faces at {pressures} kPa)")
+    return figure
+
+
+def draw_together(results: Sequence[StudyResult], quantities: Sequence[Compared], quiet: Sequence[str] = ()) -> Figure:
+    """Quantities of several runs over the back pressure, and measured and computed sections."""
+
+    def panel(quantity: Compared) -> Callable:
+        def draw(axes, result: StudyResult, name: str, colour) -> None:
+            pressure = np.array([point.pressure for point in result.walk])
+            values = quantity.factor * np.array([getattr(point, quantity.column) for point in result.walk], float)
+            axes.plot(pressure / 1e3, values, color=colour, marker="." if len(pressure) == 1 else None, label=name)
+            area = result.measured.area
+            if quantity.column == "least_opening" and area is not None:
+                axes.plot(area.pressure / 1e3, quantity.factor * area.measured, color="black", **MEASURED)
+            if quantity.column == "lowest_eigenvalue" and result is results[0]:
+                axes.axhline(0.0, color=REST, lw=0.9)
+
+        return draw
+
+    panels = {f"Back pressure, kPa|{q.title}, {q.unit}": panel(q) for q in quantities}
+    title = "Back pressure (crosses: measured)"
+    figure = draw_runs(results, labels(results, quiet), panels, 3, title, (9.6, 2.6))
+    for axes in figure.axes[: len(quantities)]:
+        axes.set_xlim(left=0)  # after everything: a limit that is set holds
     return figure

@@ -4,15 +4,15 @@ fluid.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 
 from ...errors import SolveError
 from ...model import ValveModel
-from ...model.equilibria import LoadPath, SteadyOptions
 from ...model.state import LipCentre
 from ...model.supports import FaceContact
 from ...motion.control import ControlOptions, FixedSteps
@@ -23,11 +23,27 @@ from ...motion.state import consistent_state
 from ...motion.stepper import StepFailure, StepOptions, Stepper
 from ...observer import Observer
 from ...record.record import GrowingRecord
-from ...record.states import read_states, restart_row, restore_path, state_row
+from ...record.states import LIP, OPENING
+from ...record.table import Column
 from ..case import Case
-from .columns import OPENED
+from ..state import reach_states
 from .valve import InnerFace, contact_law, face_plane
 
+#: Tables of the flow before it is turned back, and of the turn in time.
+OPENED, REVERSAL = "opened", "reversal"
+#: An instant of the turn.
+SAMPLE = (
+    Column("time", "s", "Time"),
+    Column("inlet_pressure", "Pa", "Pressure of the drive"),
+    OPENING,
+    LIP,
+    Column("least_opening", "m^2", "Narrowest passage between the inner faces, whole valve"),
+    Column("mass_flow", "kg/s", "Mass flow through the lip, whole valve; negative backwards"),
+    Column("lowest_pressure", "Pa", "Lowest pressure of the fluid in the valve"),
+    Column("highest_pressure", "Pa", "Highest pressure of the fluid in the valve"),
+    Column("contact_force", "N", "Force between the two walls, whole valve"),
+    Column("penetration", "m", "Deepest penetration"),
+)
 #: States of the flow that is turned back slowly, from the open pressure down to a fiftieth of it.
 OPEN_STATES = 10
 #: Rest before the drive turns, over the time it takes to turn.
@@ -47,21 +63,9 @@ def turn_back(case: Case, record: GrowingRecord) -> None:
             record.fail(sentence)
         return
     model = ValveModel(case.replace({"drive.kind": "flow", "drive.side": "inside", "downstream.pressure": 0.0}))
-    path = LoadPath(model, SteadyOptions.of(model.case), observer=record)
-    states, failures = read_states(record, OPENED), []
-    if states:
-        restore_path(path, record, OPENED, len(states) - 1, states[-1])
-    known = {state.pressure for state in states}
-    for pressure in np.geomspace(case.closure.open_pressure, case.closure.open_pressure / 50, OPEN_STATES).tolist():
-        if pressure in known:
-            continue
-        record.progress(f"steady state at {pressure:.6g} Pa")
-        try:
-            record.append(OPENED, state_row(model, path.go_to(pressure)) | restart_row(path))
-        except SolveError as error:
-            failures.append(str(error))
-            record.fail(str(error))
-    record.note("turned back", failures=failures)
+    first = case.closure.open_pressure
+    pressures = np.geomspace(first, first / 50, OPEN_STATES).tolist()
+    record.note("turned back", failures=reach_states(model, model.case, record, OPENED, pressures, []))
 
 
 @dataclass(frozen=True)
@@ -148,7 +152,7 @@ def run_closing(
     model : ContactValve
         See `closing_valve`.
     keep : callable
-        Is given every instant, by the names of `columns.SAMPLE`, as soon as it is found.
+        Is given every instant, by the names of `SAMPLE`, as soon as it is found.
     observer : Observer, optional
 
     Returns
@@ -212,3 +216,78 @@ def _sample(model: ContactValve, motion: ClosingMotion, state, load) -> dict[str
         "contact_force": float(part.walls * contact.total),
         "penetration": contact.penetration,
     }
+
+
+@dataclass(frozen=True)
+class Closing:
+    """History of a valve whose drive turns round.
+
+    Attributes
+    ----------
+    samples : sequence of objects with the columns `SAMPLE`
+    turn : Turn
+    shut_below : float, m2
+        Passage that counts as shut.
+    halvings : int
+        Steps that had to be halved.
+    failure : str
+        Why the run ended early; empty if it did not.
+    """
+
+    samples: Sequence[SimpleNamespace]
+    turn: Turn
+    shut_below: float
+    halvings: int = 0
+    failure: str = ""
+
+    @property
+    def first_shut(self) -> float | None:
+        """Time from the start of the turn to the first shut instant, s; None if there is none."""
+        shut = [s.time for s in self.samples if s.least_opening <= self.shut_below]
+        return shut[0] - self.turn.start if shut else None
+
+    @property
+    def closing_time(self) -> float | None:
+        """Time from the start of the turn to the first instant from which on it is shut to the end of the run, s; None
+        if it ends open.
+        """
+        since = None
+        for sample in reversed(self.samples):
+            if sample.least_opening > self.shut_below:
+                break
+            since = sample.time
+        return None if since is None else max(0.0, since - self.turn.start)
+
+    def summary(self) -> dict:
+        """Plain SI numbers for JSON."""
+        first, closing = self.first_shut, self.closing_time
+        samples = self.samples
+        return {
+            "open_pressure": self.turn.pressure,
+            "reversal_time": self.turn.duration,
+            "duration": samples[-1].time if samples else 0.0,
+            "first_shut": first,
+            "closing_time": closing,
+            "closing_time_after_sign_change": None if closing is None else closing - 0.5 * self.turn.duration,
+            "stays_shut": closing is not None and not self.failure,
+            "lowest_pressure": min((s.lowest_pressure for s in samples), default=None),
+            "highest_pressure": max((s.highest_pressure for s in samples), default=None),
+            "largest_backflow": max(0.0, -min((s.mass_flow for s in samples), default=0.0)),
+            "largest_penetration": max((s.penetration for s in samples), default=0.0),
+            "steps": max(0, len(samples) - 1),
+            "halvings": self.halvings,
+            "failure": self.failure,
+        }
+
+    @property
+    def sentence(self) -> str:
+        """Sentence on when the valve shut, and on the pressures of the fluid."""
+        told, open_pressure = self.summary(), self.turn.pressure / 1e3
+        turn = f"Drive turned from {open_pressure:g} to {-open_pressure:g} kPa in {self.turn.duration:g} s:"
+        if told["closing_time"] is None:
+            return f"{turn} open at the end, {told['duration']:.4g} s."
+        return (
+            f"{turn} shut for good {told['closing_time']:.4g} s after it began to turn "
+            f"({told['closing_time_after_sign_change']:.4g} s after it changed sign), fluid pressure between "
+            f"{told['lowest_pressure'] / 1e3:.4g} and {told['highest_pressure'] / 1e3:.4g} kPa."
+        )

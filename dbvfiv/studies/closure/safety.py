@@ -1,12 +1,8 @@
-"""Verdicts on a valve under back pressure: safety factor, buckling by symmetry class, the turn of the drive, and the
-sentences on them.
-"""
+"""Verdicts on a valve under back pressure: safety factor, answer at the rated pressure, buckling by symmetry class."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
-from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -14,12 +10,9 @@ import numpy as np
 from ...model.symmetry import EQUILIBRIA, symmetry_named
 from ...record.record import Record
 from ..result import StudyResult
-from .columns import BUCKLED_CLASS, LOWEST
-from .reversal import Turn
 from .valve import HELD_LIPS
+from .walk import BUCKLED_CLASS, CROSSED, LOWEST
 
-#: Overlap of the inner faces over the penetration that is left, from which on the faces count as crossed.
-CROSSED = 10.0
 BUCKLING, SEAL, CROSSING, END = "buckling", "loss of seal", "faces crossing", "end of the path"
 MEANING = (
     "Back pressure at the first limit met as it rises (buckling within the symmetry of the model, loss of seal, inner "
@@ -258,68 +251,6 @@ def first_buckling(
     return None if pressure is None else {"pressure": pressure, "symmetry": name}
 
 
-@dataclass(frozen=True)
-class Closing:
-    """History of a valve whose drive turns round.
-
-    Attributes
-    ----------
-    samples : sequence of objects with the columns of `columns.SAMPLE`
-    turn : Turn
-    shut_below : float, m2
-        Passage that counts as shut.
-    halvings : int
-        Steps that had to be halved.
-    failure : str
-        Why the run ended early; empty if it did not.
-    """
-
-    samples: Sequence[SimpleNamespace]
-    turn: Turn
-    shut_below: float
-    halvings: int = 0
-    failure: str = ""
-
-    @property
-    def first_shut(self) -> float | None:
-        """Time from the start of the turn to the first shut instant, s; None if there is none."""
-        shut = [s.time for s in self.samples if s.least_opening <= self.shut_below]
-        return shut[0] - self.turn.start if shut else None
-
-    @property
-    def closing_time(self) -> float | None:
-        """Time from the start of the turn to the first instant from which on it is shut to the end of the run, s; None
-        if it ends open.
-        """
-        since = None
-        for sample in reversed(self.samples):
-            if sample.least_opening > self.shut_below:
-                break
-            since = sample.time
-        return None if since is None else max(0.0, since - self.turn.start)
-
-    def summary(self) -> dict:
-        """Plain SI numbers for JSON."""
-        first, closing = self.first_shut, self.closing_time
-        samples = self.samples
-        return {
-            "open_pressure": self.turn.pressure,
-            "reversal_time": self.turn.duration,
-            "duration": samples[-1].time if samples else 0.0,
-            "first_shut": first,
-            "closing_time": closing,
-            "closing_time_after_sign_change": None if closing is None else closing - 0.5 * self.turn.duration,
-            "stays_shut": closing is not None and not self.failure,
-            "lowest_pressure": min((s.lowest_pressure for s in samples), default=None),
-            "highest_pressure": max((s.highest_pressure for s in samples), default=None),
-            "largest_backflow": max(0.0, -min((s.mass_flow for s in samples), default=0.0)),
-            "largest_penetration": max((s.penetration for s in samples), default=0.0),
-            "steps": max(0, len(samples) - 1),
-            "halvings": self.halvings,
-            "failure": self.failure,
-        }
-
-
 def sentences(result: StudyResult) -> list[str]:
     """Sentences on the balances, on buckling, on the safety against it and on the turn of the drive."""
     safety = result.safety
@@ -329,7 +260,7 @@ def sentences(result: StudyResult) -> list[str]:
         *(part.sentence for part in result.classes),
         *([] if safety is None else [safety.sentence]),
         *([answer] if (answer := rated_sentence(result)) else []),
-        *([] if result.closing is None else _closing(result.closing)),
+        *([] if result.closing is None else [result.closing.sentence]),
         *result.measured.sentences(),
     ]
 
@@ -346,29 +277,12 @@ def _balances(result: StudyResult) -> list[str]:
 def _buckling(result: StudyResult) -> list[str]:
     if result.buckling:
         return [f"Buckling ({b.kind}) at {b.pressure / 1e3:.6g} kPa." for b in result.buckling[:3]]
-    followed = [point for point in result.walk if np.isfinite(point.lowest_eigenvalue)]
-    if not followed:
+    softest = result.softest
+    if softest is None:
         return []
-    softest = min(followed, key=lambda point: point.lowest_eigenvalue)
+    followed = [point for point in result.walk if np.isfinite(point.lowest_eigenvalue)]
+    share = softest.lowest_eigenvalue / followed[0].lowest_eigenvalue
     return [
-        f"No buckling within the symmetry of the model up to "
-        f"{max(p.pressure for p in followed) / 1e3:.4g} kPa; the stiffness is least at "
-        f"{softest.pressure / 1e3:.4g} kPa, "
-        f"{softest.lowest_eigenvalue / followed[0].lowest_eigenvalue:.0%} of that at the start."
-    ]
-
-
-def _closing(closing: Closing) -> list[str]:
-    told = closing.summary()
-    turn = (
-        f"Drive turned from {told['open_pressure'] / 1e3:g} to {-told['open_pressure'] / 1e3:g} kPa "
-        f"in {told['reversal_time']:g} s:"
-    )
-    if told["closing_time"] is None:
-        return [f"{turn} open at the end, {told['duration']:.4g} s."]
-    return [
-        f"{turn} shut for good {told['closing_time']:.4g} s after it began to turn "
-        f"({told['closing_time_after_sign_change']:.4g} s after it changed "
-        f"sign), fluid pressure between {told['lowest_pressure'] / 1e3:.4g} and "
-        f"{told['highest_pressure'] / 1e3:.4g} kPa."
+        f"No buckling within the symmetry of the model up to {max(p.pressure for p in followed) / 1e3:.4g} kPa; the "
+        f"stiffness is least at {softest.pressure / 1e3:.4g} kPa, {share:.0%} of that at the start."
     ]

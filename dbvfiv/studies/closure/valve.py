@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from scipy.integrate import trapezoid
@@ -221,81 +220,6 @@ class ClosureModel:
         """Passage between the inner faces of the lip at rest, whole valve, m2."""
         return self.mesh.part.copies * self.passage(self.pressed.rest()).reference
 
-    def measure(self, q: np.ndarray) -> dict[str, Any]:
-        """Measures of a state (n,) that every point of a path has, by the names of `columns.POINT`."""
-        nodal, passage = self.pressed.nodal(q), self.passage(q)
-        return {
-            "max_displacement": float(np.linalg.norm(nodal[:, :3], axis=1).max()),
-            "contact_force": self.mesh.part.walls * self.pressed.contact_state(q).total,
-            "least_opening": float(self.mesh.part.copies * passage.area.min()),
-            "sealed_length": passage.shut_length,
-            "lip_seal": passage.lip_seal,
-            "contact_front": self._contact_front(nodal),
-            "overlap": self._overlap(nodal),
-        }
-
-    def describe(self, q: np.ndarray, pressure: float) -> dict[str, Any]:
-        """Columns of a state (n,) at a pressure, Pa, that follow from it alone."""
-        pressed, mesh, part = self.pressed, self.mesh, self.mesh.part
-        nodal, contact, passage = pressed.nodal(q), pressed.contact_state(q), self.passage(q)
-        measured, shut = self.measure(q), passage.shut_length
-        contact_pressure, gap = np.zeros(len(nodal)), np.zeros(len(nodal))
-        contact_pressure[pressed.contact.nodes] = contact.pressure
-        gap[mesh.rows] = self.face.gaps(nodal)[mesh.rows]
-        layers, centre = layer_fields(pressed.shell, q), LipCentre(mesh, pressed.shell)
-        strain, stress = layer_maxima(layers)
-        return (
-            measured
-            | {
-                "pressure": float(pressure),
-                "closed": bool(passage.shut_intervals),
-                "joint_seal": shut - measured["lip_seal"],
-                "sealed_area": float(part.walls * pressed.contact.area[contact.touching].sum()),
-                "largest_contact_pressure": float(contact.pressure.max(initial=0.0)),
-                "contact_nodes": int(np.count_nonzero(contact.touching)),
-                "penetration": contact.penetration,
-                "least_opening_position": float(passage.z[np.argmin(passage.area)]),
-                "lip_opening": centre.opening(q),
-                "lip_displacement": centre.displacement(q),
-                "max_displacement_position": mesh.nodes[np.argmax(np.linalg.norm(nodal[:, :3], axis=1))],
-                "largest_strain": float(strain.max()),
-                "largest_strain_layer": layers.names[int(np.argmax(strain))],
-                "largest_stress": float(stress.max()),
-                "largest_stress_layer": layers.names[int(np.argmax(stress))],
-                "force_balance": force_imbalance(pressed, q, pressure),
-                "nodal": nodal,
-                "opening": passage.area,
-                "contact_pressure": contact_pressure,
-                "gap": gap,
-            }
-            | {f"layers/{name}": getattr(layers, name) for name in ("strain", "stress", "von_mises", "stretch")}
-        )
-
-    def _overlap(self, nodal: np.ndarray) -> float:
-        """Deepest overlap of the inner faces, m, for nodal unknowns (nn, c); rows held shut are left out."""
-        plane = self.face.plane
-        movable = np.ones(len(nodal), bool)
-        movable[self.mesh.rows[self.held].ravel()] = False
-        gap = plane.gap(nodal, self.shell.directors(nodal)[0])
-        return float(max(0.0, -gap[movable[plane.nodes]].min(initial=0.0)))
-
-    def _contact_front(self, nodal: np.ndarray) -> float:
-        """Distance from the lip, m, up to which the walls have met along the centre line, to within the initial gap.
-
-        It is linear between rows.
-        """
-        # just less than the gap that lifted rows have at rest
-        gap = np.where(self.held, 0.0, self.face.gaps(nodal)[self.mesh.centre_line])
-        gap = gap - 0.999 * self.case.valve.initial_gap
-        met, z = np.flatnonzero(gap <= 0), self.mesh.z
-        if not len(met):
-            return 0.0
-        last = int(met[-1])
-        if last + 1 == len(gap):
-            return float(z[last])
-        a, b = gap[last], gap[last + 1]
-        return float(z[last] + (z[last + 1] - z[last]) * a / (a - b))
-
     def start_warnings(self) -> Iterator[str]:
         """Warnings about where the inner face starts, and about supports that hold it."""
         plane, beyond = self.face.plane, self.nodes_beyond
@@ -317,6 +241,74 @@ class ClosureModel:
                     "closure.symmetry asks for all classes of motion, but lips that are held shut cannot move "
                     "together, so with these supports only the class of the model is watched for buckling."
                 )
+
+
+class Pressed:
+    """Equilibrium (n,) of a model at a back pressure, Pa, with the columns of a point or a state that follow from it.
+
+    Attributes
+    ----------
+    nodal : (nn, c) array
+    passage : Passage
+    touch : ContactState
+    """
+
+    def __init__(self, model: ClosureModel, q: np.ndarray, pressure: float):
+        pressed, part = model.pressed, model.mesh.part
+        self.model, self.q, self.pressure, self.nodal = model, q, float(pressure), pressed.nodal(q)
+        self.touch, self.passage = pressed.contact_state(q), model.passage(q)
+        size, area = np.linalg.norm(self.nodal[:, :3], axis=1), self.passage.area
+        self.max_displacement = float(size.max())
+        self.max_displacement_position = model.mesh.nodes[np.argmax(size)]
+        self.opening, self.least_opening = area, float(part.copies * area.min())
+        self.least_opening_position = float(self.passage.z[np.argmin(area)])
+        self.sealed_length, self.lip_seal = self.passage.shut_length, self.passage.lip_seal
+        self.joint_seal, self.closed = self.sealed_length - self.lip_seal, bool(self.passage.shut_intervals)
+        self.contact_force, self.penetration = part.walls * self.touch.total, self.touch.penetration
+
+    def describe(self) -> None:
+        """Add the columns that only states have."""
+        model, pressed, touch = self.model, self.model.pressed, self.touch
+        self.sealed_area = float(model.mesh.part.walls * pressed.contact.area[touch.touching].sum())
+        self.largest_contact_pressure = float(touch.pressure.max(initial=0.0))
+        self.contact_nodes = int(np.count_nonzero(touch.touching))
+        self.contact_pressure, self.gap = np.zeros(len(self.nodal)), np.zeros(len(self.nodal))
+        self.contact_pressure[pressed.contact.nodes] = touch.pressure
+        self.gap[model.mesh.rows] = model.face.gaps(self.nodal)[model.mesh.rows]
+        centre = LipCentre(model.mesh, model.shell)
+        self.lip_opening, self.lip_displacement = centre.opening(self.q), centre.displacement(self.q)
+        self.layers = layer_fields(model.shell, self.q)
+        for name, values in zip(("largest_strain", "largest_stress"), layer_maxima(self.layers)):
+            setattr(self, name, float(values.max()))
+            setattr(self, f"{name}_layer", self.layers.names[int(np.argmax(values))])
+        self.force_balance = force_imbalance(pressed, self.q, self.pressure)
+
+    @property
+    def overlap(self) -> float:
+        """Deepest overlap of the inner faces, m; rows held shut are left out."""
+        plane, model = self.model.face.plane, self.model
+        movable = np.ones(len(self.nodal), bool)
+        movable[model.mesh.rows[model.held].ravel()] = False
+        gap = plane.gap(self.nodal, model.shell.directors(self.nodal)[0])
+        return float(max(0.0, -gap[movable[plane.nodes]].min(initial=0.0)))
+
+    @property
+    def contact_front(self) -> float:
+        """Distance from the lip, m, up to which the walls have met along the centre line, to within the initial gap;
+        linear between rows.
+        """
+        model, z = self.model, self.model.mesh.z
+        # just less than the gap that lifted rows have at rest
+        gap = np.where(model.held, 0.0, model.face.gaps(self.nodal)[model.mesh.centre_line])
+        gap = gap - 0.999 * model.case.valve.initial_gap
+        met = np.flatnonzero(gap <= 0)
+        if not len(met):
+            return 0.0
+        last = int(met[-1])
+        if last + 1 == len(gap):
+            return float(z[last])
+        a, b = gap[last], gap[last + 1]
+        return float(z[last] + (z[last + 1] - z[last]) * a / (a - b))
 
 
 def closure_model(case: Case, supports: str | None = None) -> ClosureModel:

@@ -20,7 +20,7 @@ from ...model.equilibria import model_warnings, state_warnings
 from ...model.load_steps import LoadStepOptions, LoadSteps
 from ...model.newton import NewtonOptions, NewtonResult
 from ...model.symmetry import ALL, symmetries_of, symmetry_named
-from ...record.record import GrowingRecord
+from ...record.record import GrowingRecord, Record
 from .buckling import (
     Buckling,
     BucklingWatch,
@@ -30,28 +30,37 @@ from .buckling import (
     spectrum_of,
     stiffness_spectrum,
 )
-from .columns import (
-    BUCKLED,
-    BUCKLED_CLASS,
-    BUCKLING,
-    LOWEST,
-    MOST_EIGENVALUES,
-    PATH,
-    RESTART,
-    STATES,
-    valid_rows,
-    void_rows,
-)
 from .energy import EnergyLedger
-from .safety import CROSSED
-from .valve import CONTACT, ClosureModel
+from .valve import CONTACT, ClosureModel, Pressed
 
+#: Tables of a walk, and their prefix of one with the other supports.
+STATES, PATH, BUCKLING, COMPARED = "states", "path", "buckling", "compared_"
+#: Notes on classes of motion besides that of the path: lowest eigenvalues of one equilibrium, and a state that buckles.
+LOWEST, BUCKLED_CLASS = "class stiffness", "class buckling"
+#: Most stiffness eigenvalues that are followed; the largest value of closure.eigenvalues.
+MOST_EIGENVALUES = 100
 #: Farthest that an equilibrium may lie from its prediction, over the mean wall thickness.
 LARGEST_JUMP = 0.15
 #: Renewals of the multipliers before giving up.
 MOST_UPDATES = 40
+#: Overlap of the inner faces over the penetration that is left, from which on the faces count as crossed.
+CROSSED = 10.0
 #: Smallest load step over the target pressure, and largest load step over the first from rest, where the lips meet.
 MIN_STEP, FIRST_SHARE = 1e-5, 20
+
+
+def void_rows(record: GrowingRecord, table: str, first: int) -> None:
+    """Leave out the rows of a table from one on: they were on the way to something that was not reached, and whoever
+    goes on finds them again.
+    """
+    if record.rows(table) > first:
+        record.note("void", table=table, start=first, stop=record.rows(table))
+
+
+def valid_rows(record: Record, table: str) -> list[int]:
+    """Numbers of the rows of a table that were not left out."""
+    void = [range(note["start"], note["stop"]) for note in record.notes("void") if note["table"] == table]
+    return [row for row in range(record.rows(table)) if not any(row in rows for rows in void)]
 
 
 class ClosureWalk:
@@ -238,8 +247,9 @@ class ClosureWalk:
     # ----
 
     def _keep_point(self, pressure: float, q: np.ndarray, lowest: float, arclength: bool = False) -> None:
-        row = {"pressure": float(pressure), "lowest_eigenvalue": lowest, "arclength": arclength}
-        self.record.append(self.points, row | self.model.measure(q))
+        point = Pressed(self.model, q, pressure)
+        point.lowest_eigenvalue, point.arclength = lowest, arclength
+        self.record.append(self.points, self.record.tables[self.points].row(point))
 
     def _keep_buckling(self) -> None:
         """Keep what is new of the buckling states of all classes."""
@@ -263,31 +273,34 @@ class ClosureWalk:
         spectrum: StiffnessSpectrum,
         last: NewtonResult,
         found: dict[str, int],
-        restart: dict[str, Any] | None,
+        way: dict[str, Any] | None,
     ) -> None:
-        """Keep a state; one without `restart` data is the last before a limit."""
-        values = np.full(MOST_EIGENVALUES, np.nan)
-        values[: len(spectrum.values)] = spectrum.values.real
-        row = model.describe(q, pressure) | found
-        row |= {
-            "lowest_stiffness_eigenvalue": spectrum.lowest,
-            "lowest_symmetric_eigenvalue": float(spectrum.symmetric_values[0]),
-            "asymmetry": spectrum.asymmetry,
-            "stable": bool(spectrum.lowest > 0),
-            "stiffness_eigenvalues": values,
-            "beyond_limit": restart is not None and self.beyond_limit,
-            "energy_balance": self.energy.error,
-            "converged": True,
-            "residual": last.residual,
-            "rounding": last.rounding,
-            "reason": last.reason,
-            "before_limit": restart is None,
+        """Keep a state; one without restart data, its `way`, is the last before a limit."""
+        state, table, lowest = Pressed(model, q, pressure), self.record.tables[self.states], spectrum.lowest
+        state.describe()
+        values = spectrum.values.real
+        vars(state).update(
+            found,
+            lowest_stiffness_eigenvalue=lowest,
+            lowest_symmetric_eigenvalue=float(spectrum.symmetric_values[0]),
+            asymmetry=spectrum.asymmetry,
+            stable=bool(lowest > 0),
+            stiffness_eigenvalues=np.pad(values, (0, MOST_EIGENVALUES - len(values)), constant_values=np.nan),
+            beyond_limit=way is not None and self.beyond_limit,
+            energy_balance=self.energy.error,
+            converged=True,
+            residual=last.residual,
+            rounding=last.rounding,
+            reason=last.reason,
+            before_limit=way is None,
+        )
+        none = {
+            name: np.full(table.shapes[f"way/{name}"], np.nan) for name in ("step", "slope", "multiplier", "energy")
         }
-        shapes = self.record.tables[self.states].shapes
-        none = {c.name: np.full(shapes.get(c.name, ()), np.nan) for c in RESTART}
-        counts = {"way/path": self.record.rows(self.points), "way/buckling": self.record.rows(self.buckling)}
-        self.record.append(self.states, row | none | (restart or {}) | counts)
-        self.record.item(SimpleNamespace(**row))
+        counts = {"path": self.record.rows(self.points), "buckling": self.record.rows(self.buckling)}
+        state.way = SimpleNamespace(**(none | (way or {}) | counts))
+        self.record.append(self.states, table.row(state))
+        self.record.item(state)
 
     def _restart(self) -> dict[str, Any]:
         """Restart data of the present state."""
@@ -295,12 +308,7 @@ class ClosureWalk:
         multiplier = np.zeros(pressed.mesh.node_count)
         multiplier[pressed.contact.nodes] = pressed.multiplier
         slope = pressed.nodal(steps.slope)
-        return {
-            "way/step": steps.step,
-            "way/slope": slope,
-            "way/multiplier": multiplier,
-            "way/energy": self.energy.totals,
-        }
+        return {"step": steps.step, "slope": slope, "multiplier": multiplier, "energy": self.energy.totals}
 
     def _resume(self) -> int:
         """Stand at the last state that was asked for, if there is one, and say how many there are."""
@@ -320,8 +328,8 @@ class ClosureWalk:
         self.energy.totals = tuple(self._value("way/energy", last))
         self.beyond_limit = bool(self._value("beyond_limit", last))
         for row in valid_rows(record, self.buckling):
-            b = {c.name: record.value(self.buckling, c.name, row) for c in BUCKLED}
-            q, shape = restrict(b["nodal"]), restrict(b["shape"])
+            b = {name: record.value(self.buckling, name, row) for name in ("kind", "pressure", "eigenvalue")}
+            q, shape = (restrict(record.value(self.buckling, name, row)) for name in ("nodal", "shape"))
             self.own.found.append(Buckling(str(b["kind"]), float(b["pressure"]), q, shape, float(b["eigenvalue"])))
         self._kept[next(iter(self.watches))] = len(self.own.found)
         self._limit_met = bool(self.own.found)
@@ -348,23 +356,16 @@ class ClosureWalk:
     def _warn_of_states(self) -> None:
         """Warnings about the states that were found: material, buckling, faces that overlap."""
         restrict = self.model.shell.dofs.restrict
-        found = [
-            SimpleNamespace(
-                pressure=float(self._value("pressure", row)),
-                overlap=float(self._value("overlap", row)),
-                q=restrict(self._value("nodal", row)),
-            )
-            for row in valid_rows(self.record, self.states)
-        ]
+        rows, found = valid_rows(self.record, self.states), []
+        for row in rows:
+            pressure, overlap = (float(self._value(name, row)) for name in ("pressure", "overlap"))
+            found.append(SimpleNamespace(pressure=pressure, overlap=overlap, q=restrict(self._value("nodal", row))))
         self._warn(state_warnings(self.model, found))
         for row in valid_rows(self.record, self.buckling)[:1]:
             pressure, kind = (self.record.value(self.buckling, name, row) for name in ("pressure", "kind"))
             self._warn([f"The wall buckles at {pressure:.6g} Pa ({kind}); states at higher pressures lie beyond it."])
         worst = max(found, key=lambda state: state.overlap, default=None)
         if worst is not None and worst.overlap > CROSSED * self.model.case.closure.penetration:
-            self._warn(
-                [
-                    f"The inner faces overlap by up to {worst.overlap * 1e3:.2g} mm at {worst.pressure:.6g} Pa, "
-                    "because these supports stop the mid-surface and not the faces."
-                ]
-            )
+            deepest = f"{worst.overlap * 1e3:.2g} mm at {worst.pressure:.6g} Pa"
+            why = "because these supports stop the mid-surface and not the faces."
+            self._warn([f"The inner faces overlap by up to {deepest}, {why}"])

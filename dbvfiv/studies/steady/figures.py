@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass
-from typing import Any
+from collections.abc import Callable, Iterator, Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -26,7 +25,7 @@ from ...drawing.style import (
 )
 from ...drawing.views import closed_section, faces, mark_pieces
 from ..case import Case
-from ..measured.figures import MEASURED, draw_curve
+from ..comparing import MEASURED, draw_curve, draw_runs, labels
 from ..result import StudyResult
 
 
@@ -52,25 +51,30 @@ def ordered(result: StudyResult) -> list[Any]:
     return sorted(result.states, key=lambda state: state.pressure)
 
 
+def _over(result: StudyResult, x: str, y: str, curves: dict[str, tuple[Any, Any, dict[str, Any]]]) -> tuple[Any, Any]:
+    """Figure and axes with curves over states from low to high pressure; by their labels, the functions from a state to
+    x and y, and looks.
+    """
+    figure = new_figure()
+    axes = figure.add_subplot()
+    axes.set(xlabel=x, ylabel=y)
+    states = ordered(result)
+    for label, (at, value, look) in curves.items():
+        look = {"marker": "o", "ls": "-", "color": COMPUTED, "label": label} | look
+        axes.plot([at(s) for s in states], [value(s) for s in states], **look)
+    return figure, axes
+
+
+_SECOND = {"marker": "s", "color": ACCENT, "ms": 4.5}
+
+
 def head_discharge(result: StudyResult) -> Figure:
     """Static inlet pressure over mass flow (compare Fig. 7-4 of the thesis)."""
-    states = ordered(result)
-    figure, axes = _axes("Mass flow, kg/s", parameter_label(result.case, "pressure"))
-    axes.plot(
-        [s.mass_flow for s in states], [s.pressure / 1e3 for s in states], "o-", color=COMPUTED, label=_name(result)
-    )
+    curve = {_name(result): (lambda s: s.mass_flow, _kilopascals, {})}
+    figure, axes = _over(result, "Mass flow, kg/s", parameter_label(result.case, "pressure"), curve)
     if is_published(result.case):
-        data = HEAD_DISCHARGE
-        axes.plot(
-            data.mass_flow,
-            np.array(data.pressure) / 1e3,
-            "D",
-            color=PUBLISHED,
-            label=data.label,
-            mfc="none",
-            mew=1.6,
-            ms=7,
-        )
+        data, look = HEAD_DISCHARGE, {"color": PUBLISHED, "mfc": "none", "mew": 1.6, "ms": 7}
+        axes.plot(data.mass_flow, np.array(data.pressure) / 1e3, "D", label=data.label, **look)
     points = result.measured.discharge
     if points is not None:
         axes.plot(points.measured, points.pressure / 1e3, color="black", label="measured", **MEASURED)
@@ -84,7 +88,7 @@ def operating_point(result: StudyResult) -> Figure:
     pressures.
     """
     states = [state for state in ordered(result) if state.hydraulics is not None]
-    figure, axes = _axes("Flow, L/s", "Total head at the flange, m")
+    figure, axes = _over(result, "Flow, L/s", "Total head at the flange, m", {})
     flow = np.array([0.0] + [1e3 * s.volume_flow for s in states])
     rest = head_of(result.case.rest_pressure - result.case.level_pressure, result.case.fluid.density)
     head = np.array([rest] + [s.hydraulics.total_head for s in states])
@@ -92,22 +96,17 @@ def operating_point(result: StudyResult) -> Figure:
     chosen = some_of(states, 5)
     reach = np.linspace(0.0, 1.15 * flow.max(), 60)
     for state, colour in zip(chosen, pressure_colours([s.pressure for s in chosen])):
-        found = state.hydraulics
+        found, label = state.hydraulics, f"line, {kilopascals(state.pressure)}"
         lost = found.line_loss * (reach / (1e3 * state.volume_flow)) ** 2
-        axes.plot(
-            reach, found.supply_head - lost, "--", color=colour, lw=1.2, label=f"line, {kilopascals(state.pressure)}"
-        )
+        axes.plot(reach, found.supply_head - lost, "--", color=colour, lw=1.2, label=label)
         axes.plot(1e3 * state.volume_flow, found.total_head, "o", color=colour)
     return _finish(figure, axes, "Operating points")
 
 
 def area_discharge(result: StudyResult) -> Figure:
     """Lip area over mass flow (compare Fig. 7-5 of the thesis)."""
-    states = ordered(result)
-    figure, axes = _axes("Mass flow, kg/s", "Flow area at the lip, cm²")
-    axes.plot(
-        [s.mass_flow for s in states], [s.outlet_area * 1e4 for s in states], "o-", color=COMPUTED, label=_name(result)
-    )
+    curve = {_name(result): (lambda s: s.mass_flow, lambda s: s.outlet_area * 1e4, {})}
+    figure, axes = _over(result, "Mass flow, kg/s", "Flow area at the lip, cm²", curve)
     both = result.measured.discharged_area
     if both is not None:
         axes.plot(both[:, 0], both[:, 1] * 1e4, color="black", label="measured", **MEASURED)
@@ -116,7 +115,7 @@ def area_discharge(result: StudyResult) -> Figure:
 
 def area_pressure(result: StudyResult) -> Figure:
     """Lip area over the static inlet pressure, with what was measured."""
-    figure, axes = _axes(parameter_label(result.case, "pressure"), "Flow area at the lip, cm²")
+    figure, axes = _over(result, parameter_label(result.case, "pressure"), "Flow area at the lip, cm²", {})
     computed = [(s.pressure, s.outlet_area) for s in ordered(result)]
     draw_curve(axes, computed, result.measured.area, 1e4, _name(result))
     return _finish(figure, axes, "Lip area and pressure")
@@ -124,52 +123,36 @@ def area_pressure(result: StudyResult) -> Figure:
 
 def jet_velocity(result: StudyResult) -> Figure:
     """Jet velocity over pressure (compare Fig. 7-7 of the thesis)."""
-    states = ordered(result)
-    figure, axes = _axes(parameter_label(result.case, "pressure"), "Velocity, m/s")
-    p = np.array([s.pressure for s in states])
-    axes.plot(
-        p / 1e3, [s.outlet_velocity for s in states], "o-", color=COMPUTED, label=f"jet at the lip, {_name(result)}"
-    )
-    axes.plot(p / 1e3, [s.station_velocity[-1] for s in states], "s-", color=ACCENT, ms=4.5, label="inlet")
-    fine = np.linspace(0.0, p.max(), 200)
-    axes.plot(
-        fine / 1e3,
+    curves = {
+        f"jet at the lip, {_name(result)}": (_kilopascals, lambda s: s.outlet_velocity, {}),
+        "inlet": (_kilopascals, lambda s: s.station_velocity[-1], _SECOND),
+    }
+    figure, axes = _over(result, parameter_label(result.case, "pressure"), "Velocity, m/s", curves)
+    fine = np.linspace(0.0, max(s.pressure for s in result.states), 200)
+    ideal, label = (
         np.sqrt(2 * fine / result.case.fluid.density),
-        ":",
-        color="0.35",
-        lw=1.3,
-        label=r"$\sqrt{2\,p/\rho}$, without the velocity at the inlet",
+        r"$\sqrt{2\,p/\rho}$, without the velocity at the inlet",
     )
+    axes.plot(fine / 1e3, ideal, ":", color="0.35", lw=1.3, label=label)
     return _finish(figure, axes, "Jet velocity")
 
 
 def deflection(result: StudyResult) -> Figure:
     """Clear lip opening, between the inner faces, and largest displacement over pressure."""
-    states = ordered(result)
-    figure, axes = _axes(parameter_label(result.case, "pressure"), "Opening, displacement, mm")
-    p = [s.pressure / 1e3 for s in states]
-    axes.plot(
-        p,
-        [s.max_displacement * 1e3 for s in states],
-        "s-",
-        color=ACCENT,
-        ms=4.5,
-        label="largest displacement of the wall",
-    )
-    axes.plot(p, [s.lip_opening * 1e3 for s in states], "o-", color=COMPUTED, label="clear lip opening at its middle")
-    return _finish(figure, axes, "Opening and deflection", from_zero=all(s.lip_opening >= 0 for s in states))
+    curves = {
+        "largest displacement of the wall": (_kilopascals, lambda s: s.max_displacement * 1e3, _SECOND),
+        "clear lip opening at its middle": (_kilopascals, lambda s: s.lip_opening * 1e3, {}),
+    }
+    figure, axes = _over(result, parameter_label(result.case, "pressure"), "Opening, displacement, mm", curves)
+    return _finish(figure, axes, "Opening and deflection", from_zero=all(s.lip_opening >= 0 for s in result.states))
+
+
+def _kilopascals(state: Any) -> float:
+    return state.pressure / 1e3
 
 
 def _name(result: StudyResult) -> str:
     return f"dbvfiv, {result.header.name}"
-
-
-def _axes(x: str, y: str):
-    figure = new_figure()
-    axes = figure.add_subplot()
-    axes.set_xlabel(x)
-    axes.set_ylabel(y)
-    return figure, axes
 
 
 def _finish(figure: Figure, axes, title: str, from_zero: bool = True) -> Figure:
@@ -185,18 +168,8 @@ def _finish(figure: Figure, axes, title: str, from_zero: bool = True) -> Figure:
 _WATER = 1000.0
 
 
-@dataclass(frozen=True)
-class Published:
-    """Points of a published curve of the 12-inch valve.
-
-    Attributes
-    ----------
-    label : str
-    pressure : tuple, Pa
-    mass_flow : tuple, kg/s
-        Whole valve.
-    source : str
-    """
+class Published(NamedTuple):
+    """Points of a published curve of the 12-inch valve: pressures, Pa, and mass flows of the whole valve, kg/s."""
 
     label: str
     pressure: tuple[float, ...]
@@ -227,17 +200,15 @@ def lip_shapes(result: StudyResult) -> Figure:
     figure = new_figure(7.2, 4.6)
     axes = figure.add_subplot()
     lip, part = result.mesh.rows[0], result.mesh.part
-    axes.plot(
-        *closed_section(faces(result.mesh)[0][lip, :2], part).T * 1e3, color=REST, lw=1.2, ls="--", label="at rest"
-    )
+    rest = closed_section(faces(result.mesh)[0][lip, :2], part)
+    axes.plot(*rest.T * 1e3, color=REST, lw=1.2, ls="--", label="at rest")
     states = some_of(ordered(result))
     for state, colour in zip(states, pressure_colours([s.pressure for s in states])):
         inner, outer = faces(result.mesh, state.nodal)
         axes.plot(*closed_section(inner[lip, :2], part).T * 1e3, color=colour, label=kilopascals(state.pressure))
     axes.plot(*closed_section(outer[lip, :2], part).T * 1e3, color=colour, lw=0.9, label="its outer face")
     axes.set_aspect("equal")
-    axes.set_xlabel("x, mm")
-    axes.set_ylabel("y, mm")
+    axes.set(xlabel="x, mm", ylabel="y, mm")
     axes.set_title("Lips at the outlet, inner faces", loc="left", fontweight="bold")
     figure.legend(loc="outside lower center", ncols=5, title=pressure_name(result.case).lower())
     return figure
@@ -264,9 +235,8 @@ def centre_line(result: StudyResult) -> Figure:
                 axes.plot(place[:, 2], place[:, across], color=colour, lw=width, label=label)
         axes.tick_params(labelbottom=True)
     mark_pieces(result, upper, lower)
-    upper.set_ylabel("y, mm")
-    lower.set_ylabel("x, mm")
-    lower.set_xlabel("Distance from the lip z, mm")
+    upper.set(ylabel="y, mm")
+    lower.set(xlabel="Distance from the lip z, mm", ylabel="x, mm")
     upper.set_title(f"Inner (thick) and outer face at {part.middle}", loc="left", fontweight="bold")
     lower.set_title("Side edge, y = 0", loc="left", fontweight="bold")
     upper.legend(loc="center left", bbox_to_anchor=(1.01, 0.5), title=pressure_heading(result.case))
@@ -305,3 +275,43 @@ def passage(result: StudyResult) -> Figure:
     panels[-1].set_xlabel("Distance from the lip z, mm")
     panels[0].legend(loc="upper left", bbox_to_anchor=(1.01, 1.0), title=pressure_heading(result.case))
     return figure
+
+
+def draw_together(
+    results: Sequence[StudyResult], names: Sequence[str] | None = None, quiet: Sequence[str] = ()
+) -> Figure:
+    """Pressure over volume flow of several runs, with the measured points that they name; where there are measured
+    areas, pressures along the axis or sections, a panel of each. Without `names` they are called by what tells their
+    cases apart, keys that are `quiet` left out.
+    """
+    pressure, parts = parameter_label(results[0].case, "pressure"), [result.measured for result in results]
+    panels = {f"Flow, L/s|{pressure}": _discharge_of_run}
+    if any(part.area is not None for part in parts):
+        panels[f"{pressure}|Flow area at the lip, cm²"] = _area_of_run
+    if any(part.taps is not None for part in parts):
+        panels["Distance from the lip z, mm|Pressure, computed less measured, kPa"] = _taps_of_run
+    figure = draw_runs(results, names or labels(results, quiet), panels, 2, "Head and discharge", (10.0, 3.6))
+    figure.axes[0].set_xlim(left=0)  # after all runs: a limit that is set holds
+    figure.axes[0].set_ylim(bottom=0)
+    return figure
+
+
+def _discharge_of_run(axes, result: StudyResult, label: str, colour: Any) -> None:
+    states, points = ordered(result), result.measured.discharge
+    flow = [1e3 * s.volume_flow for s in states]
+    axes.plot(flow, [s.pressure / 1e3 for s in states], "o-", color=colour, ms=4, label=label)
+    if points is not None:
+        flow = 1e3 * points.measured / result.case.fluid.density
+        axes.plot(flow, points.pressure / 1e3, color=colour, label=f"measured, {label}", **MEASURED)
+
+
+def _area_of_run(axes, result: StudyResult, label: str, colour: Any) -> None:
+    computed = [(state.pressure, state.outlet_area) for state in ordered(result)]
+    draw_curve(axes, computed, result.measured.area, 1e4, label, (colour, colour))
+
+
+def _taps_of_run(axes, result: StudyResult, label: str, colour: Any) -> None:
+    """Plot the computed less the measured tap pressure, kPa, over the distance from the lip."""
+    taps = result.measured.taps
+    if taps is not None:
+        axes.plot(1e3 * taps.z, taps.excess / 1e3, color=colour, **MEASURED)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -24,6 +24,7 @@ from ...drawing.style import (
 from ...drawing.views import nodal_thickness, offset_line
 from ...errors import CaseError
 from ...verdict import Series, in_steps, spectrum
+from ..comparing import colours_of, labels
 from ..result import StudyResult
 
 
@@ -407,3 +408,61 @@ def _moving(line: np.ndarray) -> slice:
     swing = np.ptp(line, axis=0)
     reach = np.flatnonzero(swing > 0.15 * swing.max()) if swing.max() > 0 else np.arange(line.shape[1])
     return slice(0, max(int(reach[-1]) + 1, 2))
+
+
+#: Keys that do not change what a run finds.
+QUIET = tuple(
+    f"transient.{key}" for key in ("save_every", "restart_every", "stop_when", "duration", "start_file", "start_state")
+)
+
+
+def draw_together(results: Sequence[StudyResult], names: Sequence[str] | None = None) -> Figure:
+    """Mass flow and lip opening of several runs over time (compare Figs. 5-3 to 5-10, 7-13 and 7-14 of the thesis);
+    where all end in cycles, these in phase. Without `names` they are called by what tells their cases apart.
+    """
+    cycles = all(_swings(result) for result in results)
+    figure = new_figure(10.0 if cycles else 8.0, 5.6 + 0.22 * len(results))
+    ratios = {"width_ratios": [3, 2] if cycles else [1]}
+    panels = figure.subplots(2, 2 if cycles else 1, sharex="col", squeeze=False, gridspec_kw=ratios)
+    styles = ["-", "--", "-.", ":"]
+    for i, (result, label, colour) in enumerate(zip(results, names or labels(results, QUIET), colours_of(results))):
+        h, look = result.history, {"ls": styles[i % 4], "color": colour, "lw": 0.9 if cycles else 1.4}
+        parts = [(slice(None), h["time"])]
+        if cycles:
+            parts.append(_last_cycles(result))
+        for column, (rows, time) in enumerate(parts):
+            name = f"{label}: {result.verdict['verdict']}" if column == 0 else None
+            panels[0, column].plot(time, h["mass_flow"][rows], label=name, **look)
+            panels[1, column].plot(time, 1e3 * h["lip_opening"][rows], **look)
+            look["lw"] = 1.5
+    panels[0, 0].set_ylabel("Mass flow, kg/s")
+    panels[1, 0].set_ylabel("Clear lip opening, mm")
+    panels[1, 0].set_xlabel("Time, s")
+    times = [result.history["time"] for result in results]
+    panels[1, 0].set_xlim(min(t[0] for t in times), max(t[-1] for t in times))
+    panels[0, 0].set_title("Comparison of runs", loc="left", fontweight="bold")
+    if cycles:
+        panels[0, 1].set_title("Last two cycles, in phase", loc="left")
+        panels[1, 1].set_xlabel("Time from the lip's way up, ms")
+    figure.legend(loc="outside lower left", ncols=2 if len(results) > 3 else 1)
+    return figure
+
+
+def _swings(result: StudyResult) -> bool:
+    """True where a run ends in at least three cycles, and not in a transition."""
+    return bool(result.cycle) and result.verdict["lip_displacement"]["cycles_observed"] >= 3
+
+
+def _last_cycles(result: StudyResult, count: int = 2) -> tuple[slice, np.ndarray]:
+    """Rows of the last cycles, and times, ms, from the instant at which the lip rises through its mean."""
+    h = result.history
+    t, x = h["time"], h["lip_displacement"] - result.verdict["lip_displacement"]["mean"]
+    period = result.cycle[1] - result.cycle[0]
+    rising = np.flatnonzero((x[:-1] < 0) & (x[1:] >= 0) & (t[1:] <= t[-1] - count * period))
+    if not len(rising):
+        first = int(np.searchsorted(t, t[-1] - count * period))
+        return slice(first, None), 1e3 * (t[first:] - t[first])
+    at = rising[-1]
+    begin = t[at] - x[at] * (t[at + 1] - t[at]) / (x[at + 1] - x[at])
+    end = int(np.searchsorted(t, begin + count * period, side="right")) + 1
+    return slice(at, end), 1e3 * (t[at:end] - begin)

@@ -18,9 +18,10 @@ from ...record.mesh import MeshData, WholeValve
 from ...record.record import Record
 from ...record.vtkhdf import Step
 from ...verdict import JudgeOptions, Verdict, judge
-from ..result import StateSteps, StudyResult
+from ..result import StudyResult
 from ..stability.verdict import DIVERGES, FLUTTERS, STABLE, UNDECIDED
 from ..stability.verdict import Verdict as StabilityVerdict
+from ..state import StateSteps
 from . import figures
 from .figures import animate
 from .keeping import HISTORY, PROFILES, SCALARS, STATE_COLUMNS, STATES, added_columns

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from matplotlib.figure import Figure
 
 from ...errors import CaseError, SolveError
 from ...model import ValveModel
@@ -24,8 +26,10 @@ from ...record.mesh import MeshData
 from ...record.record import GrowingRecord, Record, StoredRecord
 from ...record.states import state_table
 from ..case import Case
+from ..comparing import labels
 from ..session import Session
 from ..study import Study
+from . import figures
 from .history import Reader
 from .keeping import RESTART, STATES, Keeper, Progress, rows_to_keep, tables_of
 from .result import REFUSAL, RunVerdict, TransientResult, assess, beyond_model
@@ -378,4 +382,46 @@ def run(session: Session, record: GrowingRecord) -> None:
         raise KeyboardInterrupt
 
 
-STUDY = Study("transient", tables_of, run, TransientResult, rows_to_keep=rows_to_keep)
+@dataclass(frozen=True)
+class Together:
+    """Several runs, their verdicts in one table, their histories in one figure."""
+
+    results: Sequence[TransientResult]
+    labels: list[str]
+
+    def lines(self) -> list[str]:
+        """Table for people: last values, amplitude, frequency and verdict of each run."""
+        width = max(len(name) for name in self.labels) + 2
+        lines = [f"{'':<{width}}{'last kg/s':>11}{'lip mm':>9}{'amplitude mm':>14}{'Hz':>8}  verdict"]
+        for name, result in zip(self.labels, self.results):
+            lip, h = result.verdict["lip_displacement"], result.history
+            frequency = "-" if lip["frequency"] is None else f"{lip['frequency']:.3f}"
+            lines.append(
+                f"{name:<{width}}{h['mass_flow'][-1]:>11.5g}{1e3 * h['lip_displacement'][-1]:>9.4g}"
+                f"{1e3 * lip['amplitude']:>14.4g}{frequency:>8}  {result.verdict['verdict']}"
+            )
+        return lines
+
+    def document(self) -> dict[str, Any]:
+        """Part of the JSON document beside the runs themselves: nothing."""
+        return {}
+
+    def draw(self) -> Figure:
+        """Figure of the runs."""
+        return figures.draw_together(self.results)
+
+
+def compare(results: Sequence[TransientResult]) -> Together:
+    """Several runs side by side.
+
+    Raises
+    ------
+    CaseError
+        If one of them has no step.
+    """
+    for result in results:
+        result.require_steps()
+    return Together(results, labels(results, figures.QUIET))
+
+
+STUDY = Study("transient", tables_of, run, TransientResult, rows_to_keep=rows_to_keep, compare=compare)

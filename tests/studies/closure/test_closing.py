@@ -10,8 +10,7 @@ import pytest
 from dbvfiv.flow import Channel
 from dbvfiv.flow.stepping import MovingFluid
 from dbvfiv.studies.case import thesis_case
-from dbvfiv.studies.closure.reversal import ContactValve, Turn, closing_valve, run_closing
-from dbvfiv.studies.closure.safety import Closing
+from dbvfiv.studies.closure.reversal import Closing, ContactValve, Turn, closing_valve, run_closing
 from tests.small_valves import FORMER
 
 COARSE = {"mesh.around": 6, "mesh.along": 10, "closure.pressures": ["10 kPa"]}
