@@ -215,8 +215,8 @@ class CycleTracer:
             cycle = self.solver.solve(motion, mu, free, conditions)
             if cycle.motion.tail <= options.tail:
                 return cycle
-            count = cycle.motion.harmonics.count + 2
-            if count > options.max_harmonics:
+            count = min(cycle.motion.harmonics_for(options.tail), options.max_harmonics)
+            if count <= cycle.motion.harmonics.count:
                 raise NotConverged(
                     f"{options.max_harmonics} harmonics are too few: the last two hold {cycle.motion.tail:.2g} of the "
                     "motion.",

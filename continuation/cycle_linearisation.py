@@ -58,6 +58,20 @@ def apply_change(motion: PeriodicMotion, mu: Mapping[str, float], free: Sequence
     return PeriodicMotion(motion.harmonics, coefficients, omega), parameters
 
 
+def units_of(motion: PeriodicMotion, mu: Mapping[str, float], free: Sequence[str], scales: np.ndarray) -> np.ndarray:
+    """Sizes that changes of coefficients and free unknowns are measured in."""
+    c = motion.coefficients
+    whole = max(float(np.abs(c[1:] / scales).max()), 1e-300)
+    return np.append(np.tile(whole * scales, len(c)), np.maximum(np.abs(free_values(motion, mu, free)), 1e-9))
+
+
+def by_parts(linear_map: Callable, x: np.ndarray) -> np.ndarray:
+    """A real linear map of an array that may be complex, whose matrices stay real."""
+    if not np.iscomplexobj(x):
+        return linear_map(x)
+    return linear_map(np.ascontiguousarray(x.real)) + 1j * linear_map(np.ascontiguousarray(x.imag))
+
+
 class CycleLinearisation:
     """Linear equations about one motion: those of the system, bordered by free unknowns and conditions.
 
@@ -189,10 +203,16 @@ class CycleLinearisation:
     @property
     def units(self) -> np.ndarray:
         """Sizes that changes of coefficients and free unknowns are measured in."""
-        free = np.maximum(np.abs(free_values(self.motion, self.mu, self.free)), 1e-9)
-        c = self.motion.coefficients
-        whole = max(float(np.abs(c[1:] / self.scale).max()), 1e-300)
-        return np.append(np.tile(whole * self.scale, len(c)), free)
+        return units_of(self.motion, self.mu, self.free, self.scale)
+
+    def lift(self, coefficients: np.ndarray) -> np.ndarray:
+        """Coefficients (S, n) of unknowns from those (S, r) on the basis."""
+        return by_parts(lambda part: part @ (self.scale[:, None] * self.basis).T, coefficients)
+
+    @property
+    def exact(self) -> bool:
+        """True where the projection is that of the operator itself."""
+        return self.operator.exact
 
 
 class LeftProjection:

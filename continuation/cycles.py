@@ -137,8 +137,7 @@ class CycleSolver:
             if not np.isfinite(unbalance).all():
                 break
             if linear is None:
-                linear, steps = CycleLinearisation(self.system, motion, mu, self.basis_for(motion), rough=True), []
-                self._smoothed = motion, linear.smoother
+                linear, steps = self._for_corrections(motion, mu), []
                 linear.prepare(free, conditions, unbalance[: motion.coefficients.size].reshape(shape))
             change, used, missed = linear.solve(-unbalance, options.linear, options.krylov)
             change = _update_correction(change, steps, linear.units)
@@ -184,6 +183,12 @@ class CycleSolver:
         c, scale = motion.coefficients, self.system.scales
         step = np.abs(change[: c.size].reshape(c.shape) / scale).max()
         return float(step / max(np.abs(c[1:] / scale).max(), 1e-300))
+
+    def _for_corrections(self, motion: PeriodicMotion, mu: Mapping[str, float]):
+        """Linearisation that need not be exact; its smoother serves motions nearby too."""
+        linear = CycleLinearisation(self.system, motion, mu, self.basis_for(motion), rough=True)
+        self._smoothed = motion, linear.smoother
+        return linear
 
     def linearise(self, motion: PeriodicMotion, mu: Mapping[str, float], perturbed: bool = False) -> CycleLinearisation:
         """Linearisation about a motion, with the basis as it is now; with that of perturbations too where these are

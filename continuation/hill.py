@@ -13,7 +13,9 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 import scipy.linalg as la
 
+from continuation.cycle_linearisation import by_parts
 from continuation.harmonics import Harmonics
+from continuation.linear import SYMMETRIC, factorise
 
 #: Shifts: distance right of the axis, and how far up the band of exponents, both over omega.
 _RIGHT, _UP = 0.1, (0.0, 0.25, 0.5)
@@ -22,6 +24,8 @@ _STEPS = 60
 #: Least radius about the real shift, over omega, in which all eigenvalues are found: with turns of those whose series
 #: is cut off within the band.
 _REACH = 0.75
+#: Exponents that are enough where those wanted lie far to the left of these.
+_ENOUGH = 5
 #: Most that the outer two harmonics may hold of a perturbation.
 _RIM = 0.05
 #: Most corrections of an eigenpair whose projection is not exact.
@@ -120,29 +124,21 @@ def _missed(linear, shifts: np.ndarray, vectors: list[np.ndarray]) -> list[tuple
     shifts = [s.real if np.isrealobj(v) else s for s, v in zip(shifts, vectors)]
     for vector, force in zip(vectors, linear.operator.apply_each(vectors, shifts)):
         scaled, whole = linear.smoother(force) / linear.scale, np.linalg.norm(vector / linear.scale)
-        outside = scaled - _by_parts(lambda part: (part @ basis) @ basis.T, scaled)
+        outside = scaled - by_parts(lambda part: (part @ basis) @ basis.T, scaled)
         missed.append((float(np.linalg.norm(outside) / whole), outside * linear.scale))
     return missed
-
-
-def _by_parts(linear_map, x: np.ndarray) -> np.ndarray:
-    """A real linear map of an array that may be complex, whose matrices stay real."""
-    if not np.iscomplexobj(x):
-        return linear_map(x)
-    return linear_map(np.ascontiguousarray(x.real)) + 1j * linear_map(np.ascontiguousarray(x.imag))
 
 
 def _of_projection(linear, count: int, autonomous: bool) -> Exponents:
     motion = linear.motion
     found = _leading(linear.reduced, count + 1)
-    found = found[: count + 1] if linear.operator.exact else _all_refined(linear, found, count + 1)
+    found = found[: count + 1] if linear.exact else _all_refined(linear, found, count + 1)
     trivial = 0.0
     if autonomous and found:
         trivial = float(abs(found.pop(int(np.argmin([abs(folded) for folded, _, _ in found])))[0]))
     found = sorted(found, key=lambda one: -one[0].real)[:count]
-    v = linear.scale[:, None] * linear.basis
     values, as_found = (np.array(part, complex) for part in ([one[0] for one in found], [one[1] for one in found]))
-    vectors = [_by_parts(lambda part: part @ v.T, x) for _, _, x in found]
+    vectors = [linear.lift(x) for _, _, x in found]
     return Exponents(values, vectors, np.zeros(len(found)), trivial, motion.omega, as_found)
 
 
@@ -206,11 +202,10 @@ def _each_once(pairs, inside, omega: float) -> list[tuple[complex, np.ndarray]]:
 
 def _cut_off(reduced, sigma: complex, x: np.ndarray) -> float:
     """Share of a perturbation's equations beyond the series, over those within at the frequency of the motion."""
-    h, rates = reduced.motion.harmonics, reduced.rates(complex(sigma))
+    h = reduced.motion.harmonics
     samples = h.evaluate(x)
-    rest = sum(term.apply(samples, rates) for term in reduced.terms)
-    beside = reduced.rates(complex(sigma + reduced.motion.omega))
-    moved = sum(term.apply(samples, beside) for term in reduced.terms) - rest
+    rest = reduced.on_samples(samples, complex(sigma))
+    moved = reduced.on_samples(samples, complex(sigma + reduced.motion.omega)) - rest
     return float(np.linalg.norm(rest - h.evaluate(h.project(rest))) / np.linalg.norm(moved))
 
 
@@ -230,13 +225,14 @@ def _leading(reduced, count: int) -> list[tuple[complex, complex, np.ndarray]]:
     omega, pairs = reduced.motion.omega, []
     if reduced.polynomial:
         shift = _RIGHT * omega
-        for pairs, radius in _nearest(_quadratic(reduced, 0.0), shift):
+        for pairs, radius, steps in _nearest(reduced.quadratic(0.0), shift):
             found = _perturbations(reduced, pairs)
-            last = found[count - 1][0].real if len(found) >= count else -np.inf
-            if radius >= max(_REACH * omega, np.hypot(shift - last, (0.5 + _EDGE) * omega)):
-                return found
+            reach = np.sqrt(max(radius**2 - ((0.5 + _EDGE) * omega) ** 2, 0.0)) if radius >= _REACH * omega else 0.0
+            complete = [one for one in found if shift - one[0].real <= reach]
+            if len(complete) >= min(count, _ENOUGH if steps >= 2 * _STEPS else count):
+                return found if len(complete) >= count else complete
     for shift in (omega * (_RIGHT + 1j * up) for up in _UP):
-        *_, (near, _) = _nearest(_quadratic(reduced, 0.0 if reduced.polynomial else shift), shift, _STEPS)
+        *_, (near, *_) = _nearest(reduced.quadratic(0.0 if reduced.polynomial else shift), shift, _STEPS)
         pairs = pairs + near
     return _perturbations(reduced, pairs)
 
@@ -245,7 +241,7 @@ def _perturbations(reduced, pairs) -> list[tuple[complex, complex, np.ndarray]]:
     """Eigenpairs that stand for perturbations of the motion, by decreasing growth: see `_each_once`."""
     h, omega = reduced.motion.harmonics, reduced.motion.omega
     inside = lambda sigma: abs(sigma.imag) <= (0.5 + _EDGE) * omega  # noqa: E731
-    shaped = ((sigma, x.reshape(h.size, -1)) for sigma, x in pairs)
+    shaped = ((sigma, reduced.shaped(x)) for sigma, x in pairs)
     kept = [(s, x) for s, x in shaped if _is_whole(h, x) and (inside(s) or _cut_off(reduced, s, x) <= _CLOSED)]
     return sorted(_each_once(sorted(kept, key=lambda pair: not inside(pair[0])), inside, omega), key=_decay)
 
@@ -254,35 +250,28 @@ def _decay(one) -> float:
     return -one[0].real
 
 
-def _quadratic(reduced, middle: complex) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """l0, l1, l2 of the projection as l0 + sigma l1 + sigma^2 l2, exact or about a shift."""
-    step = 0.25 * reduced.motion.omega
-    here, ahead, behind = (reduced.matrix(middle + d) for d in (0.0, step, -step))
-    first, second = (ahead - behind) / (2 * step), (ahead + behind - 2 * here) / (2 * step**2)
-    return here - middle * first + middle**2 * second, first - 2 * middle * second, second
-
-
 def _nearest(parts, shift: complex, most: int = 3 * _STEPS):
     """Eigenpairs near a shift of l0 + sigma l1 + sigma^2 l2, and the radius about it in which they are all, again and
     again as more are found.
     """
     l0, l1, l2 = parts
     shift = shift if np.imag(shift) else np.real(shift)
-    matrix = l0 + shift * l1 + shift**2 * l2
-    factor = la.lu_factor(matrix, overwrite_a=True, check_finite=False)
-    size = len(l0)
+    matrix = l0 + shift * l1
+    solver, size = factorise(matrix if l2 is None else matrix + shift**2 * l2, SYMMETRIC), matrix.shape[0]
 
     def invert(x):
+        if l2 is None:
+            return -solver.solve(_times(l1, x))
         y, z = x[:size], x[size:]
-        top = -la.lu_solve(factor, _times(l2, z + shift * y) + _times(l1, y), check_finite=False)
+        top = -solver.solve(_times(l2, z + shift * y) + _times(l1, y))
         return np.append(top, y + shift * top)
 
-    for pairs, next_one in _arnoldi(invert, 2 * size, matrix.dtype, most):
+    for pairs, next_one, steps in _arnoldi(invert, size if l2 is None else 2 * size, matrix.dtype, most):
         radius = 1.0 / next_one if next_one else np.inf
-        yield [(shift + 1.0 / value, vector[:size]) for value, vector in pairs], radius
+        yield [(shift + 1.0 / value, vector[:size]) for value, vector in pairs], radius, steps
 
 
-def _times(matrix: np.ndarray, x: np.ndarray) -> np.ndarray:
+def _times(matrix, x: np.ndarray) -> np.ndarray:
     """Product with a vector, without making a real matrix complex."""
     if np.iscomplexobj(matrix) or not np.iscomplexobj(x):
         return matrix @ x
@@ -313,7 +302,8 @@ def _arnoldi(apply, size: int, dtype, most: int):
             values, vectors = np.linalg.eig(h[:done, :done])
             good = (last * np.abs(vectors[-1]) <= 1e-9 * np.abs(values)) & (values != 0)
             rest = 0.0 if ended else np.abs(values[~good]).max(initial=0.0)
-            yield [(complex(values[i]), basis[:, :done] @ vectors[:, i]) for i in np.flatnonzero(good)], rest
+            shapes = basis[:, :done] @ vectors[:, good]
+            yield list(zip(values[good].astype(complex), shapes.T)), rest, done
         if ended:
             return
         basis[:, k + 1] = w / last

@@ -22,6 +22,8 @@ from continuation.options import SingularSystem
 #: A zero pivot is replaced by this fraction of the matrix norm.  Bordered solves with
 #: refinement against the true matrix remove the perturbation again.
 PIVOT_REPAIR = 1e-14
+#: Ordering of `scipy.sparse.linalg.splu` for matrices whose pattern is nearly symmetric.
+SYMMETRIC = "MMD_AT_PLUS_A"
 #: Largest number of refinement steps against the true bordered matrix.
 REFINEMENTS = 2
 
@@ -68,13 +70,13 @@ class DenseSolver:
 class SparseSolver:
     """SuperLU of a sparse matrix; a singular one is shifted by a rounding-sized multiple of 1."""
 
-    def __init__(self, matrix: sp.spmatrix):
+    def __init__(self, matrix: sp.spmatrix, ordering: str = "COLAMD"):
         self.matrix = sp.csc_matrix(matrix)
         if not np.all(np.isfinite(self.matrix.data)):
             raise SingularSystem("The matrix holds numbers that are not finite.")
         self.repaired = False
         try:
-            self._lu = spla.splu(self.matrix)
+            self._lu = spla.splu(self.matrix, permc_spec=ordering)
         except RuntimeError:
             size = np.abs(self.matrix.data).max(initial=0.0) or 1.0
             shift = sp.identity(self.matrix.shape[0], dtype=self.matrix.dtype, format="csc")
@@ -117,9 +119,9 @@ def _parity(permutation) -> int:
     return -1 if (permutation.size - count) % 2 else 1
 
 
-def factorise(matrix):
-    """A factorised solver for a dense or sparse matrix."""
-    return SparseSolver(matrix) if sp.issparse(matrix) else DenseSolver(np.asarray(matrix))
+def factorise(matrix, ordering: str = "COLAMD"):
+    """A factorised solver for a dense or sparse matrix, with an ordering of `scipy.sparse.linalg.splu`."""
+    return SparseSolver(matrix, ordering) if sp.issparse(matrix) else DenseSolver(np.asarray(matrix))
 
 
 class MatrixLinearisation:

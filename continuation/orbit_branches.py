@@ -18,7 +18,7 @@ from continuation.cycle_points import FOLD, TORUS, CycleBranchOptions, CyclePoin
 from continuation.cycles import Cycle, cycles_beside_onset
 from continuation.harmonics import Harmonics
 from continuation.options import ContinuationOptions, NotABifurcation, NotConverged, require
-from continuation.orbits import Orbit, OrbitOptions, add_exponents, orbit_solver
+from continuation.orbits import Orbit, OrbitOptions, OrbitSolver, add_exponents
 from continuation.periodic import PeriodicMotion
 from continuation.tracer import as_observers, run_observed
 
@@ -161,7 +161,7 @@ def special_orbit(system, branch: Branch, special: SpecialPoint, discretisation:
 def _orbit(system, u, mu, options):
     options = options or OrbitOptions()
     cycle = Cycle(_motion(u, system.size), mu, 0.0, 0, 0)
-    return add_exponents(orbit_solver(system, options), cycle, options)
+    return add_exponents(OrbitSolver(system, options), cycle, options)
 
 
 def _motion(u: np.ndarray, size: int) -> PeriodicMotion:
@@ -194,7 +194,7 @@ class _Follower:
             max_harmonics=self.shape.max_harmonics,
             located=options.location_tolerance,
         )
-        self.parameter, self.tracer = parameter, CycleTracer(orbit_solver(system, self.shape), parameter, kept)
+        self.parameter, self.tracer = parameter, CycleTracer(OrbitSolver(system, self.shape), parameter, kept)
         self.observers: list = []
         self._met: list[str] = []
 

@@ -14,10 +14,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from continuation.cycles import Cycle, CycleOptions, CycleSolver
+from continuation.first_order import DirectLinearisation, FirstOrderSystem
 from continuation.harmonics import Harmonics
 from continuation.hill import Exponents, floquet_exponents
 from continuation.options import NotConverged, require
-from continuation.periodic import PeriodicMotion, PeriodicOperator, Term
+from continuation.periodic import PeriodicMotion
 
 
 @dataclass(frozen=True)
@@ -52,53 +53,23 @@ class OrbitOptions:
         require(self.exponents >= 1, "At least one Floquet exponent is needed.")
 
 
-class FirstOrderSystem:
-    """``B(u, mu) u' - F(u, mu)`` of a `System`, as a `continuation.periodic.PeriodicSystem`.
+class OrbitSolver(CycleSolver):
+    """Corrector of periodic orbits of a `System`, whose linear equations are solved directly."""
 
-    Every unknown is coupled with every other, so that the basis is the whole space and no smoother is needed.
+    def __init__(self, system, options: OrbitOptions):
+        every = np.zeros((system.size, 0))
+        super().__init__(FirstOrderSystem(system), every, CycleOptions(options.tolerance, max_iterations=40))
 
-    Parameters
-    ----------
-    system : System
-        Its linearisation must offer ``to_dense``.
-    """
+    def _for_corrections(self, motion: PeriodicMotion, mu: Mapping[str, float]) -> DirectLinearisation:
+        return DirectLinearisation(self.system, motion, mu)
 
-    autonomous = True
+    def linearise(self, motion, mu, perturbed: bool = False) -> DirectLinearisation:
+        """Linearisation about a motion."""
+        return DirectLinearisation(self.system, motion, mu)
 
-    def __init__(self, system):
-        self.system, self.size, self.scales = system, system.size, np.ones(system.size)
-
-    def _samples(self, motion: PeriodicMotion) -> list[tuple[np.ndarray, np.ndarray]]:
-        return list(zip(motion.samples, motion.rates.apply(1, motion.samples)))
-
-    def residual(self, motion: PeriodicMotion, mu: Mapping[str, float]) -> np.ndarray:
-        """Residual (N, n) at the samples."""
-        system, identity = self.system, getattr(self.system, "identity_mass", False)
-        return np.array(
-            [
-                (v if identity else system.linear(u, mu).mass_matvec(v)) - system.residual(u, mu)
-                for u, v in self._samples(motion)
-            ]
-        )
-
-    def linearise(self, motion: PeriodicMotion, mu: Mapping[str, float], rough: bool = False) -> PeriodicOperator:
-        """Linearisation, ``-A + d(B u')/du`` and ``B`` at each sample."""
-        pairs = [self.system.linear(u, mu).to_dense() for u in motion.samples]
-        slopes = -np.array([jacobian for jacobian, _ in pairs])
-        if not getattr(self.system, "constant_mass", True):
-            for slope, (u, v) in zip(slopes, self._samples(motion)):
-                slope += np.stack([self.system.mass_d(u, mu, v, e) for e in np.eye(self.size)], axis=1)
-        return PeriodicOperator(motion, [Term([(0, slopes), (1, np.array([mass for _, mass in pairs]))])])
-
-    def smoother(self, operator: PeriodicOperator, mu: Mapping[str, float]) -> None:
-        """No smoother: the basis is all of the space."""
-
-
-def orbit_solver(system, options: OrbitOptions) -> CycleSolver:
-    """Corrector of periodic orbits of a `System`."""
-    return CycleSolver(
-        FirstOrderSystem(system), np.eye(system.size), CycleOptions(options.tolerance, max_iterations=40)
-    )
+    def learn(self, rows: np.ndarray) -> np.ndarray:
+        """Nothing: there is no basis to extend."""
+        return np.zeros((self.system.size, 0))
 
 
 @dataclass(frozen=True, eq=False)
@@ -218,7 +189,7 @@ def find_orbit(system, states, period: float, mu, options: OrbitOptions | None =
     series = np.fft.rfft(states, axis=0)[: min(options.harmonics, (len(states) - 1) // 2) + 1] / len(states)
     h = Harmonics(len(series) - 1)
     guess = PeriodicMotion(h, h.real(series), 2 * np.pi / period).resized(options.harmonics)
-    solver, mu = orbit_solver(system, options), {name: float(value) for name, value in dict(mu).items()}
+    solver, mu = OrbitSolver(system, options), {name: float(value) for name, value in dict(mu).items()}
     least = 1e-6 * np.linalg.norm(guess.coefficients[1:])
     while True:
         cycle = solver.solve(guess, mu)
@@ -231,7 +202,7 @@ def find_orbit(system, states, period: float, mu, options: OrbitOptions | None =
             raise NotConverged(
                 f"{count} harmonics are too few: the last two hold {cycle.motion.tail:.2g} of the orbit.", "harmonics"
             )
-        guess = cycle.motion.resized(min(count + max(count // 2, 2), options.max_harmonics))
+        guess = cycle.motion.resized(min(cycle.motion.harmonics_for(options.tail), options.max_harmonics))
 
 
 def add_exponents(solver: CycleSolver, cycle: Cycle, options: OrbitOptions) -> Orbit:

@@ -84,6 +84,12 @@ class PeriodicMotion:
         whole = np.linalg.norm(c[1:])
         return float(np.linalg.norm(c[-4:] if len(c) > 5 else c[-2:]) / whole) if whole else 0.0
 
+    def harmonics_for(self, tail: float) -> int:
+        """Harmonics with which the last two are expected to have a share, by the mean decay; at least two more."""
+        count = self.harmonics.count
+        wanted = count * np.log(tail) / np.log(min(max(self.tail, 1e-300), 0.5))
+        return int(min(max(np.ceil(wanted), count + 2), count + max(count // 2, 2)))
+
 
 @dataclass(frozen=True, eq=False)
 class Term:
@@ -229,6 +235,10 @@ class PeriodicOperator:
         """Coefficients (2 H + 1, n) of the change of the residual for those of a change exp(shift t) of the motion."""
         return self.apply_each([coefficients], [shift])[0]
 
+    def on_samples(self, samples: np.ndarray, shift: complex) -> np.ndarray:
+        """Change (N, n) of the residual for samples (N, n) of a change exp(shift t) of the motion."""
+        return sum(term.apply(samples, self.rates(shift)) for term in self.terms)
+
     def apply_each(self, vectors: Sequence[np.ndarray], shifts: Sequence[complex]) -> list[np.ndarray]:
         """`apply` to several changes, each with an exponent of its own; cheaper than one by one."""
         h, rates = self.motion.harmonics, [self.rates(s) for s in shifts]
@@ -286,6 +296,17 @@ class ReducedOperator(PeriodicOperator):
         weights = [rates.matrix(outer) @ (each @ rates.matrix(f)) for (outer, f, _), each in pairs]
         total = _by_parts(np.concatenate(weights).reshape(-1, h.size**2).T, self._all_parts)
         return total.reshape(h.size, h.size, r, r).transpose(0, 2, 1, 3).reshape(h.size * r, h.size * r)
+
+    def quadratic(self, middle: complex) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """l0, l1, l2 of the matrix as l0 + sigma l1 + sigma^2 l2, exact or about a shift."""
+        step = 0.25 * self.motion.omega
+        here, ahead, behind = (self.matrix(middle + d) for d in (0.0, step, -step))
+        first, second = (ahead - behind) / (2 * step), (ahead + behind - 2 * here) / (2 * step**2)
+        return here - middle * first + middle**2 * second, first - 2 * middle * second, second
+
+    def shaped(self, vector: np.ndarray) -> np.ndarray:
+        """Coefficients (S, r) in a vector of the matrix."""
+        return vector.reshape(self.motion.harmonics.size, -1)
 
 
 def _by_parts(left: np.ndarray, right: np.ndarray) -> np.ndarray:

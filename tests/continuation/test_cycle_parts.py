@@ -148,7 +148,7 @@ def test_eigenvalues_in_the_circle_are_all_found():
     parts = [RNG.standard_normal((size, size)) / 10 for _ in range(2)] + [np.eye(size)]
     whole = la.eigvals(np.block([[np.zeros((size, size)), np.eye(size)], [-parts[0], -parts[1]]]))
     radii = []
-    for pairs, radius in hill._nearest(parts, 0.3):
+    for pairs, radius, _ in hill._nearest(parts, 0.3):
         found = np.array([sigma for sigma, _ in pairs])
         inside = whole[np.abs(whole - 0.3) < 0.999 * radius]
         assert len(inside) and all(np.abs(found - sigma).min() < 1e-6 for sigma in inside)

@@ -20,8 +20,8 @@ from continuation import (
     orbits_from_hopf,
     resume_orbits,
 )
+from continuation.first_order import DirectLinearisation, FirstOrderSystem
 from continuation.harmonics import Harmonics
-from continuation.orbits import FirstOrderSystem
 from continuation.periodic import PeriodicMotion
 from tests.systems.normal_forms import bautin, stuart_landau, warped_stuart_landau
 from tests.systems.van_der_pol import van_der_pol
@@ -50,7 +50,10 @@ def test_linearisation_by_differences():
     change, h = rng.standard_normal((9, 2)), 1e-6
     up, down = (PeriodicMotion(motion.harmonics, motion.coefficients + s * h * change, 2.0) for s in (1, -1))
     difference = motion.harmonics.project(system.residual(up, MU) - system.residual(down, MU)) / (2 * h)
-    assert np.allclose(system.linearise(motion, MU).apply(change), difference, rtol=1e-6, atol=1e-7)
+    linear = DirectLinearisation(system, motion, MU)
+    assert np.allclose(linear.shaped(linear.quadratic(0.0)[0] @ change.T.ravel()), difference, rtol=1e-6, atol=1e-7)
+    samples = motion.harmonics.evaluate(change)
+    assert np.allclose(motion.harmonics.project(linear.on_samples(samples, 0.0)), difference, rtol=1e-6, atol=1e-7)
 
 
 def test_series_grow_for_relaxation_oscillations():
