@@ -37,6 +37,11 @@ from continuation.hill import floquet_exponents
 from continuation.options import ContinuationError, NotConverged, require
 from continuation.periodic import PeriodicMotion
 
+#: Share of the most harmonics allowed from which on a branch that needs more ends.
+NEARLY = 0.9
+#: Change of the parameter over its unit that is rounding.
+STILL = 1e-9
+
 
 class CycleTracer:
     """Follow a branch of cycles.
@@ -95,7 +100,7 @@ class CycleTracer:
         """
         point = self._accept(first, asked)
         if origin is not None:
-            length = -self._distance(point, origin)
+            length = -self._distance(point.cycle, origin)
             self._origin = [CyclePoint(origin, origin.mu[self.parameter], length, None)]
         report(point)
 
@@ -157,19 +162,70 @@ class CycleTracer:
         return float(np.sign(self.points[-1].value - self.points[-2].value))
 
     def _advance(self, step: float) -> tuple[CyclePoint | None, float, str]:
+        """Next point, the step after it, and why there is none; the rules for steps are those of equilibria."""
         options, reason = self.options, ""
         while step >= options.min_step:
             target = self._target(step)
             try:
-                cycle = self._step(step, target)
-                point = self._accept(cycle, target in options.values)
+                cycle, expected = self._step(step, target)
+                cycle, angle = self._landed(self._checked(cycle, expected))
+                point = self._accept(cycle, cycle.mu[self.parameter] in options.values)
             except ContinuationError as error:
                 reason = str(error)
+                if (
+                    getattr(error, "reason", "") == "harmonics"
+                    and self._series().count > NEARLY * options.max_harmonics
+                ):
+                    break
                 step *= 0.4
                 continue
             grown = 2.0 if cycle.iterations <= 6 else (0.7 if cycle.iterations >= 10 else 1.0)
+            grown = min(grown, 0.7 * options.max_angle / max(angle, 1e-9))
             return point, min(max(step * grown, options.min_step), options.max_step), ""
         return None, step, f"no further cycle was found: {reason}"
+
+    def _checked(self, cycle: Cycle, expected: Cycle) -> Cycle:
+        """The cycle itself, unless it lies so far from the one expected that it belongs to another part of the branch.
+
+        Raises
+        ------
+        NotConverged
+        """
+        missed, ahead = self._distance(expected, cycle), self._distance(self.points[-1].cycle, expected)
+        if missed > max(0.5, np.tan(self.options.max_angle)) * ahead:
+            raise NotConverged("The corrections went far from the prediction.", "jumped")
+        return cycle
+
+    def _landed(self, cycle: Cycle) -> tuple[Cycle, float]:
+        """The cycle, or the one on the limit that the branch crosses before it, and the angle of the branch there.
+
+        Raises
+        ------
+        NotConverged
+            The branch turns too far, or is lost at the limit.
+        """
+        last, value = self.points[-1].cycle, cycle.mu[self.parameter]
+        limit = float(np.clip(value, *self.options.limits))
+        if limit != value:
+            start = last.mu[self.parameter]
+            share = (limit - start) / (value - start)
+            h = max(cycle.motion.harmonics, last.motion.harmonics, key=lambda h: h.count)
+            ends = [h.resized(one.motion.coefficients) for one in (last, cycle)]
+            omega = (1 - share) * last.motion.omega + share * cycle.motion.omega
+            motion = PeriodicMotion(h, (1 - share) * ends[0] + share * ends[1], omega)
+            expected = replace(cycle, motion=motion, mu=cycle.mu | {self.parameter: limit})
+            cycle = self._checked(self._solved(motion, expected.mu, (), ()), expected)
+        angle = self._angle(cycle) if len(self.points) > 1 else 0.0
+        if angle > self.options.max_angle:
+            raise NotConverged("The branch turns too far.", "angle")
+        return cycle, angle
+
+    def _angle(self, cycle: Cycle) -> float:
+        """Angle, rad, between the ways to the last point and from there to a cycle."""
+        cycles = [*(p.cycle for p in self.points[-2:]), cycle]
+        sides = [self._distance(a, b) for a, b in zip(cycles, [*cycles[1:], cycles[0]])]
+        cosine = (sides[2] ** 2 - sides[0] ** 2 - sides[1] ** 2) / max(2 * sides[0] * sides[1], 1e-300)
+        return float(np.arccos(np.clip(cosine, -1.0, 1.0)))
 
     def _target(self, step: float) -> float | None:
         """The next value that is asked for, or the limit, where it lies within the step."""
@@ -201,13 +257,18 @@ class CycleTracer:
             low, high = (low, middle) if (self._value_at(middle) - target) * side >= 0 else (middle, high)
         return high
 
-    def _step(self, step: float, target: float | None) -> Cycle:
+    def _step(self, step: float, target: float | None) -> tuple[Cycle, Cycle]:
+        """The cycle a step ahead, or at a value of the parameter, and the one expected there."""
         last = self.points[-1]
+        free, conditions = (), ()
         if target is not None:
-            return self._solved(self._expected(target, step), last.cycle.mu | {self.parameter: target}, (), ())
-        motion, value = predict_by_arclength(self._last(), last.arclength + step, self._series()), self._value_at(step)
+            motion, value = self._expected(target, step), target
+        else:
+            motion = predict_by_arclength(self._last(), last.arclength + step, self._series())
+            value = self._value_at(step)
+            free, conditions = (self.parameter,), (self._plane(motion, value),)
         mu = last.cycle.mu | {self.parameter: value}
-        return self._solved(motion, mu, (self.parameter,), (self._plane(motion, value),))
+        return self._solved(motion, mu, free, conditions), replace(last.cycle, motion=motion, mu=mu)
 
     def _solved(self, motion, mu, free, conditions) -> Cycle:
         options = self.options
@@ -270,13 +331,13 @@ class CycleTracer:
             exponents = floquet_exponents(self.solver, linear, self.options.exponents)
         value = cycle.mu[self.parameter]
         tests = {name: float(event(cycle)) for name, event in self.events.items()}
-        length = 0.0 if after is None else after.arclength + self._distance(after, cycle)
+        length = 0.0 if after is None else after.arclength + self._distance(after.cycle, cycle)
         return CyclePoint(cycle, value, length, exponents, asked, tests)
 
-    def _distance(self, point: CyclePoint, cycle: Cycle) -> float:
-        h = max(cycle.motion.harmonics, point.motion.harmonics, key=lambda h: h.count)
-        change = h.resized(cycle.motion.coefficients) - h.resized(point.motion.coefficients)
-        moved = (cycle.mu[self.parameter] - point.value) / self.options.scale
+    def _distance(self, one: Cycle, other: Cycle) -> float:
+        h = max(one.motion.harmonics, other.motion.harmonics, key=lambda h: h.count)
+        change = h.resized(other.motion.coefficients) - h.resized(one.motion.coefficients)
+        moved = (other.mu[self.parameter] - one.mu[self.parameter]) / self.options.scale
         return float(np.sqrt(np.sum(change**2 * self._weight) + moved**2))
 
     # -- special points
@@ -286,7 +347,8 @@ class CycleTracer:
         found = []
         if len(self.points) > 2:
             before = self.points[-3]
-            if (a.value - before.value) * (b.value - a.value) < 0:
+            turns = (a.value - before.value) * (b.value - a.value) < 0
+            if turns and max(abs(a.value - before.value), abs(b.value - a.value)) > STILL * self.options.scale:
                 found.append(self._fold(before, a, b))
         for name in self.events:
             if a.tests[name] * b.tests[name] < 0:

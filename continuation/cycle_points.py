@@ -30,6 +30,8 @@ class CycleBranchOptions:
     step : float
         First step in arclength, with the parameter over `scale` and the motion over `motion_scale`.
     min_step, max_step : float
+    max_angle : float
+        Largest angle (rad) between the ways from point to point.
     scale : float
         Of the parameter.
     motion_scale : float
@@ -51,6 +53,7 @@ class CycleBranchOptions:
     step: float = 0.05
     min_step: float = 1e-4
     max_step: float = 0.3
+    max_angle: float = 1.5
     scale: float = 1.0
     motion_scale: float = 1.0
     limits: tuple[float, float] = (-np.inf, np.inf)
@@ -158,7 +161,7 @@ def crossing_of(exponents: Exponents) -> complex:
 
 def change_between(a: Exponents, b: Exponents) -> str | None:
     """Kind of the bifurcation between two cycles, None if there is none."""
-    if a.unstable == b.unstable:
+    if a.unstable == b.unstable or min(a.unstable, b.unstable) < 0:
         return None
     few, many = sorted((a, b), key=lambda e: e.unstable)
     crossing = crossing_of(min((few, many), key=lambda e: abs(crossing_of(e).real)))

@@ -179,8 +179,12 @@ class CycleSolver:
         extra = free_values(motion, mu, free)
         return np.append(force.ravel(), [c.miss(motion.coefficients, extra) for c in conditions])
 
+    def sizes(self, motion: PeriodicMotion) -> np.ndarray:
+        """(n,) sizes that changes of a motion are measured in."""
+        return self.system.scales
+
     def _size(self, change: np.ndarray, motion: PeriodicMotion) -> float:
-        c, scale = motion.coefficients, self.system.scales
+        c, scale = motion.coefficients, self.sizes(motion)
         step = np.abs(change[: c.size].reshape(c.shape) / scale).max()
         return float(step / max(np.abs(c[1:] / scale).max(), 1e-300))
 

@@ -19,6 +19,8 @@ from continuation.periodic import PeriodicMotion
 
 #: Entries of the Jacobian whose blocks are made at once.
 TOGETHER = 256
+#: Share of the mean in the size of an unknown that hardly moves.
+LITTLE = 1e-2
 
 
 class FirstOrderSystem:
@@ -34,6 +36,12 @@ class FirstOrderSystem:
 
     def __init__(self, system):
         self.system, self.size, self.scales = system, system.size, np.ones(system.size)
+
+    def sizes(self, motion: PeriodicMotion) -> np.ndarray:
+        """(n,) sizes of the unknowns in a motion: how far they move, and a little of where they are."""
+        c = motion.coefficients
+        moved = np.linalg.norm(c[1:], axis=0) + LITTLE * np.abs(c[0])
+        return np.where(moved > 0, moved, moved.max(initial=0.0) or 1.0)
 
     def residual(self, motion: PeriodicMotion, mu: Mapping[str, float]) -> np.ndarray:
         """Residual (N, n) at the samples."""
@@ -101,6 +109,10 @@ class DirectLinearisation:
         else:
             self._entries = np.arange(system.size**2)
             self._values = np.stack([[matrix.T.ravel() for matrix in pair] for pair in pairs]).transpose(1, 2, 0)
+        # All unknowns are measured by their sizes, and the equations with them.
+        self.scale = system.sizes(motion)
+        columns, rows = np.divmod(self._entries, system.size)
+        self._values = self._values * (self.scale[columns] / self.scale[rows])[:, None]
 
     def _matrix_of(self, blocks: np.ndarray):
         """Whole matrix of blocks (entries, S, S), dense or sparse."""
@@ -138,15 +150,15 @@ class DirectLinearisation:
         return vector.reshape(self.system.size, -1).T
 
     def lift(self, coefficients: np.ndarray) -> np.ndarray:
-        """Coefficients (S, n) of unknowns from those of Hill's method: themselves."""
-        return coefficients
+        """Coefficients (S, n) of unknowns from those measured by their sizes."""
+        return coefficients * self.scale
 
     @property
     def reduced(self) -> DirectLinearisation:
         return self
 
     def on_samples(self, samples: np.ndarray, shift: complex) -> np.ndarray:
-        """Change (N, n) of the residual for samples (N, n) of a change ``exp(shift t)`` of the motion."""
+        """Change (N, n) of the residual for samples (N, n) of a change ``exp(shift t)`` of the motion, by sizes."""
         rates = Rates(self.motion.harmonics, self.motion.omega, shift).apply(1, samples)
         columns, rows = np.divmod(self._entries, self.system.size)
         slopes, masses = self._values
@@ -167,8 +179,9 @@ class DirectLinearisation:
         """
         self.free = tuple(free)
         h, motion = self.motion.harmonics, self.motion
-        columns = [h.project(self.system.slope(motion, self.mu, name)).T.ravel() for name in free]
-        rows = [np.concatenate([c.row.T.ravel(), c.extra]) for c in conditions]
+        slopes = (self.system.slope(motion, self.mu, name) for name in free)
+        columns = [h.project(slope / self.scale).T.ravel() for slope in slopes]
+        rows = [np.concatenate([(c.row * self.scale).T.ravel(), c.extra]) for c in conditions]
         solver = factorise(self._parts[0], SYMMETRIC)
         self._solver = bordered(solver, columns, rows)
 
@@ -176,13 +189,14 @@ class DirectLinearisation:
         """Change of coefficients and free unknowns for a change of the unbalance; no iterations, nothing left."""
         shape = self.motion.coefficients.shape
         size = self.motion.coefficients.size
-        found = self._solver.solve(np.concatenate([rhs[:size].reshape(shape).T.ravel(), rhs[size:]]))
-        return np.concatenate([self.shaped(found[:size]).ravel(), found[size:]]), 0, 0.0
+        force = (rhs[:size].reshape(shape) / self.scale).T.ravel()
+        found = self._solver.solve(np.concatenate([force, rhs[size:]]))
+        return np.concatenate([self.lift(self.shaped(found[:size])).ravel(), found[size:]]), 0, 0.0
 
     @property
     def units(self) -> np.ndarray:
         """Sizes that changes of coefficients and free unknowns are measured in."""
-        return units_of(self.motion, self.mu, self.free, self.system.scales)
+        return units_of(self.motion, self.mu, self.free, self.scale)
 
 
 def _entries_of(matrix) -> tuple[np.ndarray, np.ndarray]:

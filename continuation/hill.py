@@ -38,6 +38,8 @@ _ROUNDS = 3
 _CLOSED = 1e-4
 #: Distance over omega within which turned exponents with like perturbations are one.
 _ALIKE = 0.02
+#: Distance over omega of the exponent of the shift in time from zero up to which exponents are trusted.
+_TRUSTED = 0.05
 #: Distance past half the frequency that the imaginary part of a real negative multiplier may come out, over omega.
 _EDGE = 1e-4
 
@@ -75,7 +77,13 @@ class Exponents:
 
     @property
     def unstable(self) -> int:
-        """Dimension in which perturbations grow; those that grow slower than the shift in time moves do not count."""
+        """Dimension in which perturbations grow; those that grow slower than the shift in time moves do not count.
+
+        It is -1, not known, where the exponent of the shift in time is far from zero: near a homoclinic orbit, say,
+        perturbations grow and decay within a period by more than rounding leaves.
+        """
+        if self.trivial > _TRUSTED * self.omega:
+            return -1
         grows = self.values[self.values.real > max(2.0 * self.trivial, 1e-6 * self.omega)]
         return int(sum(1 if self.is_real(value) else 2 for value in grows))
 

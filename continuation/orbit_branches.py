@@ -17,13 +17,25 @@ from continuation.cycle_branch import CycleTracer
 from continuation.cycle_points import FOLD, TORUS, CycleBranchOptions, CyclePoint, SpecialCycle
 from continuation.cycles import Cycle, cycles_beside_onset
 from continuation.harmonics import Harmonics
-from continuation.options import ContinuationOptions, NotABifurcation, NotConverged, require
+from continuation.normal_form import hopf_normal_form
+from continuation.options import (
+    ContinuationError,
+    ContinuationOptions,
+    DerivativeMissing,
+    NotABifurcation,
+    NotConverged,
+    require,
+)
 from continuation.orbits import Orbit, OrbitOptions, OrbitSolver, add_exponents
 from continuation.periodic import PeriodicMotion
 from continuation.tracer import as_observers, run_observed
 
-#: Largest amplitude of the second orbit of a branch over that of the first.
-SECOND = 2.0
+#: Amplitude of the second orbit of a branch over that of the first.
+SECOND = 1.5
+#: Second harmonic and shift of the mean over the critical mode in the first orbit, at most.
+SMALL = 0.3
+#: Halvings of the first orbit until it is where the normal form has it.
+HALVINGS = 12
 
 
 def continue_orbits(
@@ -78,12 +90,14 @@ def orbits_from_hopf(
     system,
     special: SpecialPoint,
     parameter: str,
-    amplitude: float,
     options: ContinuationOptions | None = None,
     discretisation: OrbitOptions | None = None,
     observers=None,
 ) -> Branch:
     """Follow the periodic orbits born at a located Hopf point.
+
+    The first orbit lies a first step along the branch from the Hopf point by the normal form, or nearer where that does
+    not hold so far away.
 
     Parameters
     ----------
@@ -91,8 +105,6 @@ def orbits_from_hopf(
     special : SpecialPoint
         A located Hopf point.
     parameter : str
-    amplitude : float
-        Of the first orbit: largest norm of the critical mode in it, in units of the state.
     options, discretisation, observers
         As in `continue_orbits`.
 
@@ -101,26 +113,14 @@ def orbits_from_hopf(
     NotABifurcation
         The point is no located Hopf point.
     NotConverged
-        No orbit of that amplitude was found.
+        No orbit was found beside it.
     """
     if special.kind != "hopf" or not special.located:
         raise NotABifurcation(f"Orbits start at a located Hopf point, not at a {special.kind}.")
-    require(amplitude > 0, f"The first amplitude must be positive, not {amplitude}.")
     follower = _Follower(system, parameter, options, discretisation, special.mu)
-    h, q = Harmonics(follower.shape.harmonics), np.asarray(special.vectors["right"], complex)
-    turn = 2 * (np.exp(2j * np.pi * np.arange(64) / 64)[:, None] * q).real
-    wave = np.zeros((h.count + 1, system.size), complex)
-    wave[0], wave[1] = special.u, amplitude / np.linalg.norm(turn, axis=1).max() * q
-    small = PeriodicMotion(h, h.real(wave), float(special.values["omega"]))
-    size = np.linalg.norm(small.coefficients[1:])
-    row = small.coefficients / size
-    row[0] = 0.0
-    ratio = min(SECOND, 1.0 + follower.tracer.options.step * follower.tracer.options.motion_scale / size)
 
     def steps():
-        rest, first, second = cycles_beside_onset(
-            follower.tracer.solver, small, dict(special.mu), parameter, row, ratio
-        )
+        rest, first, second = follower.beside_hopf(special)
         follower.tracer.begin(first, False, follower.take, rest)
         follower.tracer.extend(second, False, follower.take)
         return follower.tracer.run(follower.take)
@@ -185,7 +185,8 @@ class _Follower:
             step=options.step,
             min_step=options.min_step,
             max_step=options.max_step,
-            scale=options.parameter_scales.get(parameter, 1.0),
+            max_angle=options.max_angle,
+            scale=options.units([parameter])[parameter],
             motion_scale=options.state_scale * np.sqrt(n),
             limits=(low, high),
             max_points=options.max_points + 1,
@@ -210,6 +211,39 @@ class _Follower:
             except NotConverged as error:
                 reason, step = str(error), 0.5 * step
         raise NotConverged(f"No second orbit was found beside the first: {reason}", "first step")
+
+    def beside_hopf(self, special: SpecialPoint) -> tuple[Cycle, Cycle, Cycle]:
+        """Equilibrium at a Hopf point as a cycle at rest, and two small orbits beside it."""
+        kept, system, omega = self.tracer.options, self.tracer.solver.system.system, float(special.values["omega"])
+        q = np.asarray(special.vectors["right"], complex)
+        q, h = q / np.linalg.norm(q), Harmonics(self.shape.harmonics)
+        rate, most = 0.0, np.inf
+        try:
+            form = hopf_normal_form(system, special.u, special.mu, omega, q, self.parameter)
+            rate = -form.c1.real / form.crossing.real
+            most = SMALL / max(np.linalg.norm(form.h20), np.linalg.norm(form.h11), 1e-300)
+        except DerivativeMissing:
+            pass
+        # |z|^2 of the orbit a step away: (a |z|)^2 + (b |z|^2)^2 = step^2
+        a, b = np.sqrt(2.0) / kept.motion_scale, rate / kept.scale
+        radius = min(kept.step * np.sqrt(2.0 / (a**2 + np.sqrt(a**4 + (2 * b * kept.step) ** 2))), most)
+        reason = ""
+        for _ in range(HALVINGS):
+            wave = np.zeros((h.count + 1, system.size), complex)
+            wave[0], wave[1] = special.u, radius * q
+            small = PeriodicMotion(h, h.real(wave), omega)
+            row = small.coefficients / np.linalg.norm(small.coefficients[1:])
+            row[0] = 0.0
+            try:
+                cycles = cycles_beside_onset(self.tracer.solver, small, dict(special.mu), self.parameter, row, SECOND)
+                missed = (cycles[1].mu[self.parameter] - special.mu[self.parameter] - rate * radius**2) / kept.scale
+                if abs(missed) <= 0.5 * np.hypot(a * radius, b * radius**2):
+                    return cycles
+                reason = "it is not where the normal form has it"
+            except ContinuationError as error:
+                reason = str(error)
+            radius *= 0.5
+        raise NotConverged(f"No orbit was found beside the Hopf point: {reason}", "first step")
 
     def restore(self, branch: Branch) -> None:
         """Take the points of a branch; the last one with its exponents."""

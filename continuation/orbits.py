@@ -67,6 +67,10 @@ class OrbitSolver(CycleSolver):
         """Linearisation about a motion."""
         return DirectLinearisation(self.system, motion, mu)
 
+    def sizes(self, motion: PeriodicMotion) -> np.ndarray:
+        """(n,) sizes that changes of a motion are measured in."""
+        return self.system.sizes(motion)
+
     def learn(self, rows: np.ndarray) -> np.ndarray:
         """Nothing: there is no basis to extend."""
         return np.zeros((self.system.size, 0))
@@ -136,8 +140,9 @@ class Orbit:
         return values[np.argsort(-np.abs(values), kind="stable")]
 
     @property
-    def stable(self) -> bool:
-        return self.floquet.stable
+    def stable(self) -> bool | None:
+        """True without growing perturbations; None where the exponents are not to be trusted."""
+        return None if self.floquet.unstable < 0 else self.floquet.stable
 
 
 def _peak(x):

@@ -16,6 +16,7 @@ from continuation import (
     continue_branch,
     continue_orbits,
     find_orbit,
+    hopf_normal_form,
     orbit_at,
     orbits_from_hopf,
     resume_orbits,
@@ -23,6 +24,9 @@ from continuation import (
 from continuation.first_order import DirectLinearisation, FirstOrderSystem
 from continuation.harmonics import Harmonics
 from continuation.periodic import PeriodicMotion
+from tests.systems.brusselator import brusselator, brusselator_1d
+from tests.systems.excitable import fitzhugh_nagumo
+from tests.systems.lorenz import lorenz
 from tests.systems.normal_forms import bautin, stuart_landau, warped_stuart_landau
 from tests.systems.van_der_pol import van_der_pol
 
@@ -51,9 +55,10 @@ def test_linearisation_by_differences():
     up, down = (PeriodicMotion(motion.harmonics, motion.coefficients + s * h * change, 2.0) for s in (1, -1))
     difference = motion.harmonics.project(system.residual(up, MU) - system.residual(down, MU)) / (2 * h)
     linear = DirectLinearisation(system, motion, MU)
-    assert np.allclose(linear.shaped(linear.quadratic(0.0)[0] @ change.T.ravel()), difference, rtol=1e-6, atol=1e-7)
-    samples = motion.harmonics.evaluate(change)
-    assert np.allclose(motion.harmonics.project(linear.on_samples(samples, 0.0)), difference, rtol=1e-6, atol=1e-7)
+    found = linear.lift(linear.shaped(linear.quadratic(0.0)[0] @ (change / linear.scale).T.ravel()))
+    assert np.allclose(found, difference, rtol=1e-6, atol=1e-7)
+    rates = linear.on_samples(motion.harmonics.evaluate(change / linear.scale), 0.0)
+    assert np.allclose(linear.lift(motion.harmonics.project(rates)), difference, rtol=1e-6, atol=1e-7)
 
 
 def test_series_grow_for_relaxation_oscillations():
@@ -88,11 +93,76 @@ def test_cycles_from_a_hopf_point_follow_the_square_root():
     hopf = continue_branch(
         system, [0, 0], {**MU, "mu": -0.5}, "mu", ContinuationOptions(eigenvalues=2, limits={"mu": (-1, 1)})
     ).of_kind("hopf")[0]
-    branch = orbits_from_hopf(system, hopf, "mu", 0.1, ContinuationOptions(limits={"mu": (0, 0.5)}))
+    branch = orbits_from_hopf(system, hopf, "mu", ContinuationOptions(limits={"mu": (0, 0.5)}))
     assert branch.reason == "limit of mu reached"
     assert np.allclose(branch.values("period"), 2 * np.pi / (2 - 0.7 * branch.values()), rtol=1e-8)
     assert set(branch.unstable) == {0}
     assert np.isclose(orbit_at(system, branch, -1).amplitude()[0], np.sqrt(0.5), rtol=1e-7)
+
+
+def scaled_brusselator(unit):
+    """The Brusselator with its second unknown in another unit."""
+    plain = brusselator()
+    return JaxSystem(lambda u, mu: plain._residual(u * jnp.array([1, 1 / unit]), mu) * jnp.array([1, unit]), 2)
+
+
+@pytest.mark.parametrize(
+    ("system", "start", "mu", "parameter", "limits", "criticality"),
+    [
+        (brusselator(), [1.0, 1.0], {"A": 1.0, "B": 1.0}, "B", (0.5, 4.0), "super"),
+        (scaled_brusselator(1e-6), [1.0, 1e-6], {"A": 1.0, "B": 1.0}, "B", (0.5, 4.0), "super"),
+        (lorenz(), [4.9, 4.9, 9.0], {"sigma": 10.0, "b": 8 / 3, "r": 10.0}, "r", (2.0, 30.0), "sub"),
+        (fitzhugh_nagumo(0.08), [-1.2, -0.62], {"I": 0.0}, "I", (0.0, 1.0), "sub"),
+        (fitzhugh_nagumo(0.001), [-1.2, -0.62], {"I": 0.0}, "I", (0.0, 1.0), "sub"),
+        (bautin(), [0.0, 0.0], {"mu": -0.5, "nu": 1.0}, "mu", (-1.0, 1.0), "sub"),
+        (bautin(), [0.0, 0.0], {"mu": -0.5, "nu": 0.0}, "mu", (-1.0, 1.0), "degenerate"),
+    ],
+    ids=["brusselator", "badly scaled", "lorenz", "fitzhugh-nagumo", "stiff", "bautin", "generalised hopf"],
+)
+def test_first_orbits_beside_hopf_points(system, start, mu, parameter, limits, criticality):
+    """Found without any number given, on the side and with the amplitude that the normal form says."""
+    eigenvalues = ContinuationOptions(eigenvalues=system.size, limits={parameter: limits})
+    hopf = continue_branch(system, start, mu, parameter, eigenvalues).of_kind("hopf")[0]
+    assert hopf.values["criticality"] == criticality
+    branch = orbits_from_hopf(system, hopf, parameter, ContinuationOptions(limits={parameter: limits}, max_points=1))
+    form = hopf_normal_form(system, hopf.u, hopf.mu, hopf.values["omega"], hopf.vectors["right"], parameter)
+    change = branch.values()[0] - hopf.mu[parameter]
+    amplitude = orbit_at(system, branch, 0).amplitude()
+    assert amplitude.max() > 0
+    if criticality == "degenerate":  # mu = r^4
+        assert np.isclose(change, amplitude[0] ** 4, rtol=1e-6)
+        return
+    assert np.sign(change) == form.side()
+    predicted = [form.amplitude_coefficient(axis) * np.sqrt(abs(change)) for axis in np.eye(system.size)]
+    assert np.allclose(amplitude, predicted, rtol=0.25)
+    assert branch.points[0].unstable == (0 if criticality == "super" else 1)
+
+
+@pytest.mark.parametrize("scale", [None, 0.1, 1.0])
+def test_steps_of_any_unit_pass_a_fold_of_cycles_once(scale):
+    """Cycles mu = r^4 - nu r^2 of the Bautin system in order, by steps of a fifth of the range and others."""
+    system, given = bautin(), {} if scale is None else {"mu": scale}
+    hopf = continue_branch(
+        system, [0, 0], {"mu": -0.5, "nu": 1.0}, "mu", ContinuationOptions(eigenvalues=2, limits={"mu": (-1, 1)})
+    ).of_kind("hopf")[0]
+    branch = orbits_from_hopf(system, hopf, "mu", ContinuationOptions(limits={"mu": (-1, 0.3)}, parameter_scales=given))
+    assert branch.values()[-1] == 0.3
+    assert [(s.kind, s.located) for s in branch.special] == [("fold of cycles", True)]
+    radius = np.array([orbit_at(system, branch, i).amplitude()[0] for i in range(len(branch))])
+    assert np.all(np.diff(radius) > 0)
+    assert np.allclose(branch.values(), radius**4 - radius**2, rtol=0, atol=1e-8)
+
+
+def test_orbits_towards_a_homoclinic_one_have_no_false_bifurcations():
+    """The branch of Lorenz ends on the homoclinic orbit at r = 13.926 (Sparrow 1982)."""
+    system, mu = lorenz(), {"sigma": 10.0, "b": 8 / 3, "r": 10.0}
+    limits = {"r": (2.0, 30.0)}
+    hopf = continue_branch(system, [4.9, 4.9, 9.0], mu, "r", ContinuationOptions(eigenvalues=3, limits=limits))
+    branch = orbits_from_hopf(
+        system, hopf.of_kind("hopf")[0], "r", ContinuationOptions(limits=limits), OrbitOptions(max_harmonics=60)
+    )
+    assert not branch.special and set(branch.unstable) <= {1, -1}
+    assert abs(branch.values()[-1] - 13.926) < 1e-2 and "harmonics are too few" in branch.reason
 
 
 def test_fold_of_cycles_of_the_bautin_system(tmp_path):
@@ -103,20 +173,18 @@ def test_fold_of_cycles_of_the_bautin_system(tmp_path):
         system, [0, 0], mu, "mu", ContinuationOptions(eigenvalues=2, limits={"mu": (-1, 1)})
     ).of_kind("hopf")[0]
     assert hopf.values["criticality"] == "sub"
-    branch = orbits_from_hopf(system, hopf, "mu", 0.2, ContinuationOptions(limits={"mu": (-1, 0.3)}, max_step=0.2))
+    branch = orbits_from_hopf(system, hopf, "mu", ContinuationOptions(limits={"mu": (-1, 0.3)}))
     (fold,) = branch.of_kind("fold of cycles")
     assert abs(fold.mu["mu"] + 0.25) < 1e-8
     at = fold.index
     assert set(branch.unstable[: at + 1]) == {1} and set(branch.unstable[at + 1 :]) == {0}
     branch.save(tmp_path / "cycles.h5")
-    part = orbits_from_hopf(
-        system, hopf, "mu", 0.2, ContinuationOptions(limits={"mu": (-1, 0.3)}, max_step=0.2, max_points=5)
-    )
+    part = orbits_from_hopf(system, hopf, "mu", ContinuationOptions(limits={"mu": (-1, 0.3)}, max_points=5))
     part.save(tmp_path / "part.h5")
     longer = resume_orbits(
         system,
         Branch.load(tmp_path / "part.h5"),
-        ContinuationOptions(limits={"mu": (-1, 0.3)}, max_step=0.2),
+        ContinuationOptions(limits={"mu": (-1, 0.3)}),
     )
     assert np.allclose(longer.values(), branch.values(), rtol=0, atol=1e-7)
     again = orbit_at(system, Branch.load(tmp_path / "cycles.h5"), -1)
@@ -187,6 +255,30 @@ def test_a_branch_stops_where_it_is_asked_to():
     assert branch.reason == "stopped at: fold of cycles" and branch.special[-1].index >= len(branch) - 3
 
 
+def test_an_orbit_of_a_discretised_equation_takes_few_sparse_factorisations(monkeypatch):
+    """The Brusselator with diffusion, 40 unknowns: at most three for an orbit, the one of its exponents among them."""
+    from continuation import linear
+
+    made = []
+
+    def count(self, matrix, *arguments):
+        made.append(matrix.shape[0])
+        original(self, matrix, *arguments)
+
+    points, mu = 20, {"A": 2.0, "B": 5.45, "D1": 0.008, "D2": 0.004, "l": 0.49}
+    system, limits = brusselator_1d(points), {"l": (0.48, 0.53)}
+    hopf = continue_branch(
+        system, np.tile([2.0, 2.725], points), mu, "l", ContinuationOptions(eigenvalues=4, near=2.2j, limits=limits)
+    ).of_kind("hopf")[0]
+    original = linear.SparseSolver.__init__
+    monkeypatch.setattr(linear.SparseSolver, "__init__", count)
+    monkeypatch.setattr(linear.DenseSolver, "__init__", None)
+    branch = orbits_from_hopf(system, hopf, "l", ContinuationOptions(limits=limits))
+    assert branch.reason == "limit of l reached" and set(branch.unstable) == {0} and not branch.special
+    whole = [size for size in made if size > system.size]
+    assert len(whole) <= 3 * len(branch)
+
+
 def test_a_guess_that_is_no_orbit():
     decay = JaxSystem(lambda u, mu: jnp.stack([-u[0] - u[1], u[0] - u[1]]), 2)
     with pytest.raises(NotConverged):
@@ -202,4 +294,4 @@ def test_orbits_start_at_hopf_points_only():
         ContinuationOptions(eigenvalues=2, limits={"mu": (-1, 1)}, locate=False),
     )
     with pytest.raises(NotABifurcation):
-        orbits_from_hopf(bautin(), branch.special[0], "mu", 0.1)
+        orbits_from_hopf(bautin(), branch.special[0], "mu")

@@ -49,7 +49,7 @@ def test_langford():
     # On the axis z = mu the growth is 2 mu - 3 + 0.2 (1 - mu^2).
     assert np.isclose(hopf.mu["mu"], 5 - np.sqrt(11), rtol=1e-10)
     assert abs(hopf.mu["mu"] - 1.683) < 5e-4 and np.isclose(hopf.values["omega"], 0.25)
-    branch = orbits_from_hopf(system, hopf, "mu", 0.1, ContinuationOptions(limits={"mu": (1.6, 2.05)}))
+    branch = orbits_from_hopf(system, hopf, "mu", ContinuationOptions(limits={"mu": (1.6, 2.05)}))
     (torus,) = branch.of_kind("torus")
     assert abs(torus.mu["mu"] - 2.0) < 1e-9
     assert branch.unstable[0] == 0 and branch.unstable[-1] == 2
@@ -139,7 +139,7 @@ def test_cycles_of_the_brusselator_agree_with_the_normal_form_to_first_order():
     system = brusselator()
     point, form = hopf_form(system, [1.0, 1.5], {"A": 1.0, "B": 1.5}, "B", 0.5, 3.0)
     branch = orbits_from_hopf(
-        system, point, "B", 0.08, ContinuationOptions(limits={"B": (1.9, 2.06)}, step=0.02, max_step=0.05)
+        system, point, "B", ContinuationOptions(limits={"B": (1.9, 2.06)}, step=0.02, max_step=0.5)
     )
     change = branch.values() - 2.0
     x = np.array([1.0, 0.0])
