@@ -26,34 +26,30 @@ class Parameter:
         Key of the case that holds it.
     quantity : Quantity
         SI unit of its values.
-    title : str
-        What it is called in figures and tables.
-    symbol : str
-        Of formulas; empty where there is none.
-    shown_unit : str
-        Unit in figures and tables.
-    scale : float
-        What a value is divided by to be in `shown_unit`.
+    title, symbol : str
+        What figures, tables and formulas call it; the symbol is empty where there is none.
+    usual : tuple
+        Start, stop and count of the range taken where only the name is given; SI.
     low, high : float
         Values that can be computed, SI.
     low_included : bool
         Whether `low` itself can be.
-    usual : tuple
-        Start, stop and count of the range taken where only the name is given; SI.
+    shown_unit, scale : str, float
+        Unit in figures and tables, and what a value is divided by to be in it.
     log : bool
         Whether the usual range has logarithmic steps.
+    swept : bool
+        Whether modes are tracked along it.
+    note : str
+        Added to the name in lists, where the name alone does not say what it is.
     moves_equilibrium : bool
         Whether the steady state changes with it. Those that do not are surroundings: the linearised structure stays.
         The length of a line with friction does change it, although it stands among those: see
         `dbvfiv.studies.stability.place.is_surrounding`.
     design : bool
         Whether the model is built anew for each value.
-    swept : bool
-        Whether modes are tracked along it.
     system_name : str
-        Its name in `dbvfiv.model.system.ValveSystem`; empty for parameters of the design.
-    note : str
-        Added to the name in lists, where the name alone does not say what it is.
+        Its name in `dbvfiv.model.system.ValveSystem`; its own where not given, none for parameters of the design.
     """
 
     name: str
@@ -61,18 +57,22 @@ class Parameter:
     quantity: Quantity
     title: str
     usual: tuple[float, float, int]
-    symbol: str = ""
-    shown_unit: str = ""
-    scale: float = 1.0
     low: float = 0.0
     high: float = math.inf
     low_included: bool = True
+    symbol: str = ""
+    shown_unit: str = ""
+    scale: float = 1.0
     log: bool = False
+    swept: bool = False
+    note: str = ""
     moves_equilibrium: bool = False
     design: bool = False
-    swept: bool = False
     system_name: str = ""
-    note: str = ""
+
+    def __post_init__(self) -> None:
+        if not self.system_name and not self.design:
+            object.__setattr__(self, "system_name", self.name)
 
     @property
     def surrounding(self) -> bool:
@@ -106,165 +106,39 @@ class Parameter:
         return f"{self.symbol} = {shown}" if self.symbol else shown
 
 
+_PER_SECOND, _SECONDS, _METRES = Quantity("1/s", "1/s"), Quantity("s", "s"), Quantity("m", "m")
+_MOVED = {"log": True, "swept": True}
+_DESIGNED = {"moves_equilibrium": True, "design": True}
+# fmt: off
 _TABLE = (
-    Parameter(
-        name="pressure",
-        key="drive.pressure",
-        quantity=Quantity("Pa", "kPa", head=True),
-        title="Static inlet pressure",
-        usual=(300.0, 36000.0, 61),
-        shown_unit="kPa",
-        scale=1e3,
-        high=1e7,
-        low_included=False,
-        log=True,
-        moves_equilibrium=True,
-        swept=True,
-        system_name="inlet",
-    ),
-    Parameter(
-        name="density",
-        key="fluid.density",
-        quantity=Quantity("kg/m^3", "kg/m^3"),
-        title="Fluid density",
-        usual=(0.5, 2000.0, 61),
-        shown_unit="kg/m³",
-        high=30000.0,
-        low_included=False,
-        log=True,
-        swept=True,
-        system_name="density",
-    ),
-    Parameter(
-        name="alpha",
-        key="damping.alpha",
-        quantity=Quantity("1/s", "1/s"),
-        title="Mass damping",
-        usual=(0.0, 40.0, 41),
-        symbol="α",
-        shown_unit="1/s",
-        high=1e6,
-        swept=True,
-        system_name="alpha",
-    ),
-    Parameter(
-        name="beta",
-        key="damping.beta",
-        quantity=Quantity("s", "s"),
-        title="Stiffness damping",
-        usual=(0.0002, 0.02, 61),
-        symbol="β",
-        shown_unit="s",
-        high=1e3,
-        log=True,
-        swept=True,
-        system_name="beta",
-    ),
-    Parameter(
-        name="loss_factor",
-        key="damping.loss_factor",
-        quantity=Quantity(""),
-        title="Factor on the loss factors",
-        usual=(0.25, 3.0, 45),
-        symbol="κ",
-        high=10.0,
-        log=True,
-        swept=True,
-        system_name="loss_factor",
-        note="factor on the loss factors of all materials",
-    ),
-    Parameter(
-        name="storage",
-        key="fluid.continuity",
-        quantity=Quantity(""),
-        title="Continuity law (0 quasi-steady, 1 storage)",
-        usual=(0.0, 1.0, 21),
-        high=1.0,
-        system_name="storage",
-        note="blend of the continuity laws, 0 quasi-steady to 1 storage",
-    ),
-    Parameter(
-        name="pipe_length",
-        key="upstream.length",
-        quantity=Quantity("m", "m"),
-        title="Length of the pipe upstream",
-        usual=(0.5, 100.0, 41),
-        symbol="L",
-        shown_unit="m",
-        high=1e5,
-        low_included=False,
-        log=True,
-        swept=True,
-        system_name="pipe_length",
-        note="of the line upstream",
-    ),
-    Parameter(
-        name="tail_length",
-        key="downstream.length",
-        quantity=Quantity("m", "m"),
-        title="Length of the pipe downstream",
-        usual=(0.5, 100.0, 41),
-        symbol="L₂",
-        shown_unit="m",
-        high=1e5,
-        low_included=False,
-        log=True,
-        swept=True,
-        system_name="tail_length",
-        note="of the pipe downstream",
-    ),
-    Parameter(
-        name="wave_speed",
-        key="upstream.wave_speed",
-        quantity=Quantity("m/s", "m/s"),
-        title="Wave speed in the pipe upstream",
-        usual=(100.0, 1400.0, 27),
-        symbol="c",
-        shown_unit="m/s",
-        low=1.0,
-        high=1e7,
-        log=True,
-        swept=True,
-        system_name="wave_speed",
-        note="in an elastic line upstream",
-    ),
-    Parameter(
-        name="thickness",
-        key="valve.thickness_factor",
-        quantity=Quantity(""),
-        title="Wall thickness factor",
-        usual=(0.6, 1.4, 17),
-        low=0.05,
-        high=10.0,
-        moves_equilibrium=True,
-        design=True,
-        note="factor of the wall thickness",
-    ),
-    Parameter(
-        name="angle",
-        key="layers",
-        quantity=Quantity("deg", "deg"),
-        title="Fibre angle",
-        usual=(20.0, 80.0, 25),
-        shown_unit="degrees",
-        high=90.0,
-        moves_equilibrium=True,
-        design=True,
-        note="of the plies, degrees",
-    ),
-    Parameter(
-        name="strain",
-        key="materials.strain_level",
-        quantity=Quantity("", "%"),
-        title="Strain level of the rubbers",
-        usual=(0.1, 0.6, 21),
-        low=0.1,
-        high=0.6,
-        moves_equilibrium=True,
-        design=True,
-        note="level of the rubbers",
-    ),
+    Parameter("pressure", "drive.pressure", Quantity("Pa", "kPa", head=True), "Static inlet pressure",
+              (300.0, 36000.0, 61), 0.0, 1e7, False, shown_unit="kPa", scale=1e3, moves_equilibrium=True,
+              system_name="inlet", **_MOVED),
+    Parameter("density", "fluid.density", Quantity("kg/m^3", "kg/m^3"), "Fluid density", (0.5, 2000.0, 61),
+              0.0, 30000.0, False, shown_unit="kg/m³", **_MOVED),
+    Parameter("alpha", "damping.alpha", _PER_SECOND, "Mass damping", (0.0, 40.0, 41), 0.0, 1e6, symbol="α",
+              shown_unit="1/s", swept=True),
+    Parameter("beta", "damping.beta", _SECONDS, "Stiffness damping", (0.0002, 0.02, 61), 0.0, 1e3, symbol="β",
+              shown_unit="s", **_MOVED),
+    Parameter("loss_factor", "damping.loss_factor", Quantity(""), "Factor on the loss factors", (0.25, 3.0, 45),
+              0.0, 10.0, symbol="κ", note="factor on the loss factors of all materials", **_MOVED),
+    Parameter("storage", "fluid.continuity", Quantity(""), "Continuity law (0 quasi-steady, 1 storage)",
+              (0.0, 1.0, 21), 0.0, 1.0, note="blend of the continuity laws, 0 quasi-steady to 1 storage"),
+    Parameter("pipe_length", "upstream.length", _METRES, "Length of the pipe upstream", (0.5, 100.0, 41),
+              0.0, 1e5, False, symbol="L", shown_unit="m", note="of the line upstream", **_MOVED),
+    Parameter("tail_length", "downstream.length", _METRES, "Length of the pipe downstream", (0.5, 100.0, 41),
+              0.0, 1e5, False, symbol="L₂", shown_unit="m", note="of the pipe downstream", **_MOVED),
+    Parameter("wave_speed", "upstream.wave_speed", Quantity("m/s", "m/s"), "Wave speed in the pipe upstream",
+              (100.0, 1400.0, 27), 1.0, 1e7, symbol="c", shown_unit="m/s", note="in an elastic line upstream",
+              **_MOVED),
+    Parameter("thickness", "valve.thickness_factor", Quantity(""), "Wall thickness factor", (0.6, 1.4, 17),
+              0.05, 10.0, note="factor of the wall thickness", **_DESIGNED),
+    Parameter("angle", "layers", Quantity("deg", "deg"), "Fibre angle", (20.0, 80.0, 25), 0.0, 90.0,
+              shown_unit="degrees", note="of the plies, degrees", **_DESIGNED),
+    Parameter("strain", "materials.strain_level", Quantity("", "%"), "Strain level of the rubbers", (0.1, 0.6, 21),
+              0.1, 0.6, note="level of the rubbers", **_DESIGNED),
 )
+# fmt: on
 
 #: Every parameter by its name.
 PARAMETERS = {row.name: row for row in _TABLE}

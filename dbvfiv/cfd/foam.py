@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import hashlib
+import json
 import math
 import os
 import re
@@ -10,14 +12,22 @@ import signal
 import subprocess
 import time
 from dataclasses import dataclass
+from functools import cached_property
+from importlib.resources import files
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pyvista
 
-from ..errors import SolveError
+from ..errors import CaseError, SolveError
+from ..exchange.bodies import WallFaces
 from ..observer import Observer
-from .domain import PATCHES, FlowMesh
+from ..record.mesh import MeshData
+from .domain import PATCHES, ROOM, Domain, FlowMesh
+
+if TYPE_CHECKING:
+    from ..model.state import SteadyState
 
 #: Turbulence of the stream that comes in: fluctuations over the mean velocity, eddies over the diameter.
 INTENSITY, EDDIES = 0.03, 0.07
@@ -61,20 +71,17 @@ class Stream:
         return k, math.sqrt(k) / (_C_MU**0.25 * EDDIES * self.bore)
 
 
+#: Files of a case as they are, and what is put into two of them.
+_FILES = ("Allrun", "constant/turbulenceProperties", "system/fvSchemes", "system/fvSolution")
+
+
 def case_files(stream: Stream) -> dict[str, str]:
     """All files but the mesh, by their places in the case."""
-    files = {f"0/{name}": text for name, text in _fields(stream).items()}
-    files["constant/transportProperties"] = _foam(
-        "transportProperties", f"transportModel Newtonian;\nnu {stream.viscosity:.8g};\n"
-    )
-    files["constant/turbulenceProperties"] = _foam(
-        "turbulenceProperties", "simulationType RAS;\nRAS { RASModel kOmegaSST; turbulence on; printCoeffs off; }\n"
-    )
-    files["system/controlDict"] = _foam("controlDict", _CONTROL % stream.iterations)
-    files["system/fvSchemes"] = _foam("fvSchemes", _SCHEMES)
-    files["system/fvSolution"] = _foam("fvSolution", _SOLUTION)
-    files["Allrun"] = _RUN
-    return files
+    texts = files("dbvfiv.cfd").joinpath("case")
+    put_in = {"constant/transportProperties": stream.viscosity, "system/controlDict": stream.iterations}
+    found = {f"0/{name}": text for name, text in _fields(stream).items()}
+    found |= {name: texts.joinpath(name).read_text() for name in _FILES}
+    return found | {name: texts.joinpath(name).read_text() % value for name, value in put_in.items()}
 
 
 def _fields(stream: Stream) -> dict[str, str]:
@@ -153,87 +160,6 @@ def _field(name, kind, dimensions, start, inlet, outlet, wall, far=None) -> str:
 
 def _foam(name: str, body: str, kind: str = "dictionary") -> str:
     return f"FoamFile {{ version 2.0; format ascii; class {kind}; object {name}; }}\n\n{body}"
-
-
-_CONTROL = """application simpleFoam;
-startFrom latestTime;
-startTime 0;
-stopAt endTime;
-endTime %d;
-deltaT 1;
-writeControl timeStep;
-writeInterval 100;
-purgeWrite 1;
-writeFormat ascii;
-writePrecision 8;
-timePrecision 8;
-runTimeModifiable true;
-functions
-{
-    inletPressure
-    {
-        type surfaceFieldValue;
-        libs (fieldFunctionObjects);
-        writeFields false;
-        log false;
-        regionType patch;
-        name inlet;
-        operation areaAverage;
-        fields (p);
-    }
-}
-"""
-
-_SCHEMES = """ddtSchemes { default steadyState; }
-gradSchemes { default cellLimited Gauss linear 1; grad(p) Gauss linear; }
-divSchemes
-{
-    default none;
-    div(phi,U) bounded Gauss linearUpwind limited;
-    div(phi,k) bounded Gauss limitedLinear 1;
-    div(phi,omega) bounded Gauss limitedLinear 1;
-    div((nuEff*dev2(T(grad(U))))) Gauss linear;
-}
-laplacianSchemes { default Gauss linear limited corrected 0.33; }
-interpolationSchemes { default linear; }
-snGradSchemes { default limited corrected 0.33; }
-wallDist { method meshWave; }
-"""
-
-_SOLUTION = """solvers
-{
-    p
-    {
-        solver PCG;
-        preconditioner DIC;
-        tolerance 1e-9;
-        relTol 0.05;
-        maxIter 400;
-    }
-    "(U|k|omega)"
-    {
-        solver PBiCGStab;
-        preconditioner DILU;
-        tolerance 1e-10;
-        relTol 0.1;
-    }
-}
-SIMPLE
-{
-    nNonOrthogonalCorrectors 0;
-    consistent yes;
-    residualControl { p 2e-5; U 1e-5; "(k|omega)" 1e-5; }
-}
-relaxationFactors { equations { U 0.85; k 0.7; omega 0.7; } }
-"""
-
-_RUN = """#!/bin/sh
-# Checks the mesh and runs to a steady state.
-cd "${0%/*}" || exit 1
-[ -d "$WM_PROJECT_DIR" ] || [ ! -d /usr/share/openfoam ] || export WM_PROJECT_DIR=/usr/share/openfoam # Debian's
-checkMesh > log.checkMesh 2>&1
-exec simpleFoam > log.simpleFoam 2>&1
-"""
 
 
 #: Faces of a hexahedron, their normals pointing out of it.
@@ -447,3 +373,138 @@ def _history(folder: Path) -> np.ndarray:
     for path in sorted(folder.glob("postProcessing/inletPressure/*/*.dat"), key=lambda p: int(p.parent.name)):
         found |= {int(row[0]): row[1] for row in np.loadtxt(path, ndmin=2)}
     return np.array(sorted(found.items())).reshape(-1, 2)
+
+
+#: Holds the inputs of the run, beside the files of OpenFOAM.
+NOTE = "question.json"
+#: Of water at 20 degrees, m2/s.
+WATER_VISCOSITY = 1.0e-6
+
+
+@dataclass(frozen=True)
+class FlowCase:
+    """Viscous flow through the shape of one steady state, with the volume flow of that state.
+
+    Attributes
+    ----------
+    name : str
+        Of the valve, for titles.
+    mesh : MeshData
+        Of the shell.
+    state : SteadyState
+    density : float, kg/m3
+    pipe : float, optional
+        Diameter of the pipe in which the valve stands, m; the jet goes into a room without it.
+    fineness : float
+        Cells in each direction over the usual number.
+    iterations : int
+        At most.
+    viscosity : float, m2/s
+    """
+
+    name: str
+    mesh: MeshData
+    state: SteadyState
+    density: float
+    pipe: float | None = None
+    fineness: float = 0.5
+    iterations: int = 400
+    viscosity: float = WATER_VISCOSITY
+
+    @cached_property
+    def faces(self) -> WallFaces:
+        """Faces of the deformed wall."""
+        return WallFaces.of(self.mesh, self.state.nodal)
+
+    @cached_property
+    def domain(self) -> Domain:
+        """Region of fluid that is meshed.
+
+        Raises
+        ------
+        CaseError
+            If the valve does not go into the pipe, or more than a quarter of it is computed.
+        """
+        if not self.mesh.part.is_quarter:
+            raise CaseError(
+                "The flow in three dimensions is meshed in a quarter between two planes of symmetry; this state is "
+                f"that of a {self.mesh.part.name} of the valve."
+            )
+        widest = float(np.hypot(self.faces.outer[..., 0], self.faces.outer[..., 1]).max())
+        if self.pipe is None:
+            return Domain(self.faces, ROOM * float(self.faces.outer[-1, 0, 1]), True, self.fineness)
+        if self.pipe <= 2.02 * widest:
+            raise CaseError(
+                f"The pipe is {1e3 * self.pipe:g} mm wide and the wall of this state {2e3 * widest:.4g} mm; it must be "
+                f"at least {2.02e3 * widest:.4g} mm."
+            )
+        return Domain(self.faces, 0.5 * self.pipe, False, self.fineness)
+
+    @cached_property
+    def cells(self) -> FlowMesh:
+        """The mesh.
+
+        Raises
+        ------
+        CaseError
+            If it does not come out sound.
+        """
+        try:
+            return FlowMesh.of(self.domain)
+        except ValueError as error:
+            raise CaseError(f"No sound mesh of this state: {error}") from error
+
+    @property
+    def stream(self) -> Stream:
+        """The flow that is asked for."""
+        return Stream(
+            self.state.volume_flow,
+            2.0 * self.domain.bore,
+            self.density,
+            self.viscosity,
+            self.pipe is None,
+            self.iterations,
+        )
+
+    @property
+    def inputs(self) -> dict[str, Any]:
+        """Quantities in which two runs must agree for one to continue the other."""
+        shape = hashlib.sha256(np.round(self.state.nodal, 9).tobytes() + self.mesh.nodes.tobytes()).hexdigest()[:16]
+        return {
+            "shape": shape,
+            "volume_flow": self.state.volume_flow,
+            "pipe": self.pipe,
+            "fineness": self.fineness,
+            "viscosity": self.viscosity,
+        }
+
+    def write(self, folder: str | Path) -> bool:
+        """Write the case, unless the folder holds it already; returns whether it did not.
+
+        Raises
+        ------
+        CaseError
+            If the folder holds another case, or cannot be written.
+        """
+        folder = Path(folder)
+        try:
+            known = (folder / NOTE).exists()
+            if known and json.loads((folder / NOTE).read_text()) != self.inputs:
+                raise CaseError(
+                    f"{str(folder)!r} holds the flow through another shape or on another mesh; name a new one."
+                )
+            if not known and folder.exists() and any(folder.iterdir()):
+                raise CaseError(f"{str(folder)!r} is not empty and holds no flow of this program; name a new folder.")
+            for name, text in case_files(self.stream).items():
+                path = folder / name
+                if known and name.startswith("0/"):
+                    continue
+                path.parent.mkdir(parents=True, exist_ok=True)
+                path.write_text(text)
+            (folder / "Allrun").chmod(0o755)
+            if not known:
+                write_mesh(self.cells, folder)
+                (folder / NOTE).write_text(json.dumps(self.inputs, indent=1) + "\n")
+        except OSError as error:
+            raise CaseError(f"{str(folder)!r} cannot be written ({error.strerror or error}).") from error
+        return not known

@@ -332,10 +332,8 @@ def cfd(
 
     dbvfiv cfd my.h5 --state "36 kPa" --pipe "330 mm" -o flow36 --plots figures
     """
-    from ..cfd.comparison import FlowComparison
-    from ..cfd.figures import draw
-    from ..cfd.flow_case import WATER_VISCOSITY, FlowCase
-    from ..cfd.foam import read_fields, run_openfoam
+    from ..cfd.comparison import FlowComparison, draw
+    from ..cfd.foam import WATER_VISCOSITY, FlowCase, read_fields, run_openfoam
 
     state = _choose_state(file, pressure)
     result = state.results

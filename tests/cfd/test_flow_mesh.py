@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 
 from dbvfiv.cfd.domain import PATCHES
-from dbvfiv.cfd.flow_case import FlowCase
-from dbvfiv.cfd.foam import faces_of
+from dbvfiv.cfd.foam import FlowCase, faces_of
 from dbvfiv.errors import CaseError
 from dbvfiv.exchange.bodies import shape_of
 from dbvfiv.exchange.files import triangulated

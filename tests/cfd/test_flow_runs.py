@@ -6,10 +6,8 @@ import numpy as np
 import pytest
 
 from dbvfiv.cfd import foam
-from dbvfiv.cfd.comparison import FlowComparison
-from dbvfiv.cfd.figures import draw
-from dbvfiv.cfd.flow_case import FlowCase
-from dbvfiv.cfd.foam import FlowFields, read_fields
+from dbvfiv.cfd.comparison import FlowComparison, draw
+from dbvfiv.cfd.foam import FlowCase, FlowFields, read_fields
 from dbvfiv.drawing.style import draw_figures
 from dbvfiv.errors import CaseError, SolveError
 

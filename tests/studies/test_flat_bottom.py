@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import dbvfiv
-from dbvfiv.cfd.flow_case import FlowCase
+from dbvfiv.cfd.foam import FlowCase
 from dbvfiv.errors import CaseError
 from dbvfiv.record.mesh import WholeValve
 from dbvfiv.studies.case import thesis_case
