@@ -9,7 +9,7 @@ from typing import Any, overload
 
 from .case.axis import is_single, read_pressures, write_axis
 from .case.model import Changes, change_case
-from .drawing import described
+from .drawing import views
 from .drawing.style import draw_figures, write_figures
 from .errors import SolveError
 from .fit.damping import DampingReport, describe_damping
@@ -86,7 +86,7 @@ class Valve:
 
     def plot(self, folder: str | Path = ".", format: str = "png", only: Sequence[str] = ()) -> list[Path]:
         """Draw the valve as its case describes it, with measures, wall and layers; nothing is solved."""
-        figures = draw_figures(described.drawers_of(self.session.described), only, f"case {self.name!r}")
+        figures = draw_figures(views.drawers_of(self.session.described), only, f"case {self.name!r}")
         return write_figures(figures, folder, format)
 
     def replace(self, changes: Changes) -> Valve:

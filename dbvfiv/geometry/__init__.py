@@ -1,8 +1,7 @@
 """The valve's mid-surface: sections, surfaces between them, and the graded mesh on it."""
 
-from .key_point_table import key_point_table
 from .sections import Profile, flange_section, key_point_sections, lip_section
-from .surface import Surface, surface_of
+from .surface import Surface, key_point_table, surface_of
 from .valve_mesh import ValveMesh, valve_mesh
 
 __all__ = [

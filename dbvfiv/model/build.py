@@ -16,7 +16,7 @@ from ..geometry import ValveMesh, valve_mesh
 from ..geometry.divisions import grading
 from ..materials.laws import OrthotropicPly
 from ..shell import Layer, Section, Shell, ShellMesh, Weight
-from ..shell.zones import Zones
+from ..shell.section import Zones
 from .supports import free_unknowns
 
 

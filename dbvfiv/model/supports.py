@@ -28,12 +28,12 @@ from ..contact import (
     PlaneContact,
     Rebound,
     class_stiffness,
-    nodal_thickness,
+    contact_form,
     tributary_area,
 )
-from ..contact.plane import contact_form
 from ..geometry import ValveMesh
 from ..shell import Shell
+from ..shell.mesh import nodal_thickness
 
 
 def free_unknowns(mesh: ValveMesh) -> np.ndarray:
@@ -165,7 +165,7 @@ def face_contact(case: Case, mesh: ValveMesh, shell: Shell) -> FaceContact | Non
     if supports.contact != "faces":
         return None
     gap = (1.0 - case.fluid.area_floor) * case.valve.initial_gap
-    depth = 0.5 * nodal_thickness(shell)
+    depth = 0.5 * nodal_thickness(shell.mesh)
     at_lips = mesh.nodes[:, 2] <= case.valve.duckbill_length * (1 + 1e-9)
     depth = np.where(at_lips, depth + _inside(case, gap), depth)
     law = ContactLaw(supports.contact_stiffness, ROUNDING * case.valve.initial_gap)

@@ -20,7 +20,7 @@ import numpy as np
 
 from ..case.part import HALF, QUARTER, Part
 from ..geometry import ValveMesh
-from ..shell.supports import DofMap
+from ..shell.mesh import DofMap
 
 
 @dataclass(frozen=True)

@@ -7,8 +7,7 @@ import numpy as np
 
 from ..materials.energy import OGDEN_FROM
 from ..shell.kernel_rubber import FAST, first_invariant, has_more, ogden_terms
-from ..shell.kernel_section import linear_response, point_strain
-from ..shell.kernel_strain import numbers_of, strains_at
+from ..shell.kernel_section import linear_response, numbers_of, point_strain, strains_at
 
 
 @numba.njit(cache=True)

@@ -5,9 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from ..case.parameters import PARAMETERS, Mu
-from ..drawing.described import valve_figure
 from ..drawing.materials import damping_figure
-from ..drawing.views import deformed, layer_stress
+from ..drawing.views import deformed, layer_stress, valve_figure
 from ..errors import CaseError
 from ..fit.cards import law_from_case
 from ..fit.damping import describe_damping

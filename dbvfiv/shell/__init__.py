@@ -1,10 +1,9 @@
 """Layered, thick, finite-rotation four-node shell on any quadrilateral mesh."""
 
 from .memory import Memory, WallMemory
-from .mesh import ShellMesh, nodal_directors, tangent_frames
+from .mesh import DofMap, ShellMesh, nodal_directors, tangent_frames
 from .section import Layer, Section
 from .shell import Shell, StepWall
-from .supports import DofMap
 from .weight import Weight
 
 __all__ = [

@@ -16,8 +16,7 @@ import numpy as np
 
 from .assumed_strain import FACTORS, PAIRS, PRODUCTS, VECTORS
 from .kernel_rubber import FAST
-from .kernel_section import section_stress, section_tangent
-from .kernel_strain import numbers_of, strains_at
+from .kernel_section import numbers_of, section_stress, section_tangent, strains_at
 from .reference import SHEAR_EDGES
 
 _VECTORS = np.ascontiguousarray(VECTORS)

@@ -11,8 +11,7 @@ import numba
 import numpy as np
 
 from .kernel_rubber import FAST
-from .kernel_section import add_point_stress, linear_response
-from .kernel_strain import numbers_of, strains_at
+from .kernel_section import add_point_stress, linear_response, numbers_of, strains_at
 
 
 @numba.njit(cache=True, fastmath=FAST)

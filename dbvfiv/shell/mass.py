@@ -10,8 +10,7 @@ import numpy as np
 
 from .kernel_rubber import FAST
 from .reference import SHAPE, ReferenceGeometry
-from .section import Section
-from .zones import WallParts
+from .section import Section, WallParts
 
 CONSISTENT, AVERAGED = "consistent", "averaged"
 MASSES = (CONSISTENT, AVERAGED)

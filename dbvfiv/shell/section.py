@@ -1,8 +1,8 @@
-"""The wall: layers from inside to outside and how they are integrated through the thickness."""
+"""The wall: layers from inside to outside, integrated through the thickness, and zones that do not have all of them."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -239,3 +239,68 @@ class Section:
 def strain_rotation(c: float, s: float) -> np.ndarray:
     """(3, 3) matrix that takes [E11, E22, 2E12] to axes turned by the angle with cosine c and sine s."""
     return np.array([[c * c, s * s, c * s], [s * s, c * c, -c * s], [-2 * c * s, 2 * c * s, c * c - s * s]])
+
+
+@dataclass(frozen=True)
+class Zones:
+    """Zones of the wall: elements that have the same layers.
+
+    Attributes
+    ----------
+    presence : (nz, nl) bool array
+        True where a zone has a layer.
+    of_element : (ne,) int array
+        Zone of each element.
+    """
+
+    presence: np.ndarray
+    of_element: np.ndarray
+
+    @classmethod
+    def of(cls, present: np.ndarray) -> Zones:
+        """Zones of elements that have the same layers; present (ne, nl) bool."""
+        presence, zone = np.unique(np.asarray(present, bool), axis=0, return_inverse=True)
+        return cls(presence, np.ravel(zone))
+
+
+@dataclass(frozen=True)
+class WallParts:
+    """A wall zone by zone.
+
+    Attributes
+    ----------
+    section : Section
+        All its layers.
+    zones : Zones
+    """
+
+    section: Section
+    zones: Zones
+
+    @cached_property
+    def sections(self) -> tuple[Section, ...]:
+        """Section (layers through the thickness) of each zone."""
+        return tuple(replace(self.section, present=tuple(map(bool, row))) for row in self.zones.presence)
+
+    @cached_property
+    def elements(self) -> tuple[np.ndarray, ...]:
+        """Elements of each zone."""
+        return tuple(np.flatnonzero(self.zones.of_element == i) for i in range(len(self.sections)))
+
+    def _by_element(self, values: list[np.ndarray]) -> np.ndarray:
+        return np.stack(values)[self.zones.of_element]
+
+    @cached_property
+    def plane_stiffness(self) -> np.ndarray:
+        """(ne, 6, 6): that of the section of each element."""
+        return self._by_element([section.plane_stiffness for section in self.sections])
+
+    @cached_property
+    def inertia(self) -> np.ndarray:
+        """(ne, 3): that of the section of each element."""
+        return self._by_element([section.inertia for section in self.sections])
+
+    @cached_property
+    def points(self) -> np.ndarray:
+        """(ne, np, 2): those of the section of each element."""
+        return self._by_element([section.points for section in self.sections])

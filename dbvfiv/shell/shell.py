@@ -11,13 +11,11 @@ from .assumed_strain import ENHANCED, assumed_strains, local_map
 from .energy import FIRST_ORDER, EnergyFunctions
 from .kernel import shell_force, shell_tangent
 from .mass import AVERAGED, assemble_mass, inertia_force, kinetic_energy, mass_integrals
-from .mesh import ShellMesh
+from .mesh import UNKNOWNS_PER_NODE, DofMap, ShellMesh
 from .reference import reference_geometry, shear_map, thickness_over_radius
 from .relaxed_forms import relaxed_force_form
 from .rotation import director_derivatives
-from .section import Section
-from .supports import UNKNOWNS_PER_NODE, DofMap
-from .zones import WallParts, Zones
+from .section import Section, WallParts, Zones
 
 
 @dataclass(frozen=True)

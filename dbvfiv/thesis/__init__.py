@@ -1,16 +1,16 @@
 """The thesis, figure by figure: what this model gives beside what was published.
 
 `entry` says what one figure or table is, and runs what several of them share and keeps it in files; the entries
-stand by subject in `materials`, `strip`, `openings`, `histories` and `flutter`.
+stand by subject in `materials`, `openings` and `histories`.
 """
 
 from collections.abc import Sequence
 
 from ..errors import CaseError
-from . import flutter, histories, materials, openings, strip
+from . import histories, materials, openings
 from .entry import Entry, Number, Workshop
 
-_SUBJECTS = (materials, strip, openings, histories, flutter)
+_SUBJECTS = (materials, openings, histories)
 #: All entries, in the order of the thesis.
 ENTRIES: tuple[Entry, ...] = tuple(
     sorted((entry for subject in _SUBJECTS for entry in subject.ENTRIES), key=lambda entry: entry.place)

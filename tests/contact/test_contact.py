@@ -7,9 +7,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from dbvfiv.contact import ContactLaw, PlaneContact, contact_form, nodal_thickness, tributary_area
+from dbvfiv.contact import ContactLaw, PlaneContact, contact_form, tributary_area
 from dbvfiv.model.pressed_shell import PressedShell
 from dbvfiv.shell import Shell, ShellMesh
+from dbvfiv.shell.mesh import nodal_thickness
 from tests.shell.structures import grid, mixed_section
 
 LAWS = [ContactLaw(1e9), ContactLaw(1e9, 2e-4)]
@@ -26,7 +27,7 @@ def _pressed(law: ContactLaw, depth=None, least_gap=0.0) -> PressedShell:
     free[:5] = False
     free[10:14, 4] = False
     shell = _shell(free)
-    depth = 0.5 * nodal_thickness(shell) if depth is None else depth
+    depth = 0.5 * nodal_thickness(shell.mesh) if depth is None else depth
     contact = PlaneContact(shell, np.arange(30), depth, tributary_area(shell), law, axis=1, least_gap=least_gap)
     return PressedShell(shell, contact, -1.0)
 
@@ -127,7 +128,9 @@ def test_a_contact_force_passes_through_the_touching_point():
     """Force and moment about the origin of the nodal contact force equal those of forces at the face."""
     pressed = _pressed(ContactLaw(1e9))
     shell = Shell(pressed.shell.mesh, mixed_section())
-    contact = PlaneContact(shell, np.arange(30), 0.5 * nodal_thickness(shell), tributary_area(shell), ContactLaw(1e9))
+    contact = PlaneContact(
+        shell, np.arange(30), 0.5 * nodal_thickness(shell.mesh), tributary_area(shell), ContactLaw(1e9)
+    )
     loose = PressedShell(shell, contact)
     nodal = pressed.nodal(_state(pressed))
     q = nodal.ravel()
@@ -159,7 +162,7 @@ def test_points_that_start_beyond_the_plane_are_pushed_only_when_they_close_furt
 
 def test_nodal_thickness_and_area():
     shell = _shell()
-    h, quads = nodal_thickness(shell), shell.mesh.quads
+    h, quads = nodal_thickness(shell.mesh), shell.mesh.quads
     corner, middle = quads[0, 0], quads[0, 2]
     assert h[corner] == shell.mesh.thickness[0]
     assert h[middle] == pytest.approx(np.mean([shell.mesh.thickness[e] for e in range(20) if middle in quads[e]]))

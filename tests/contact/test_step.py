@@ -5,8 +5,15 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from dbvfiv.contact import ContactLaw, ContactStep, PlaneContact, Rebound, nodal_thickness, tributary_area
-from dbvfiv.contact.step import mean_pressure
+from dbvfiv.contact import (
+    ContactLaw,
+    ContactStep,
+    PlaneContact,
+    Rebound,
+    mean_pressure,
+    tributary_area,
+)
+from dbvfiv.shell.mesh import nodal_thickness
 from tests.contact.test_contact import _shell, _state
 
 LAWS = [ContactLaw(1e9), ContactLaw(1e9, 2e-4)]
@@ -48,7 +55,7 @@ def _plane(law) -> PlaneContact:
     free[:5] = False
     free[10:14, 4] = False
     shell = _shell(free)
-    return PlaneContact(shell, np.arange(30), 0.5 * nodal_thickness(shell), tributary_area(shell), law, axis=1)
+    return PlaneContact(shell, np.arange(30), 0.5 * nodal_thickness(shell.mesh), tributary_area(shell), law, axis=1)
 
 
 def _ends(plane, size=1.0):

@@ -10,7 +10,7 @@ import pytest
 from dbvfiv.case.model import Case
 from dbvfiv.geometry import surface_of, valve_mesh
 from dbvfiv.geometry.divisions import grading
-from dbvfiv.geometry.wall_area import wall_deduction
+from dbvfiv.geometry.valve_mesh import wall_deduction
 from dbvfiv.model.build import build_shell
 
 VALVE = Case().valve

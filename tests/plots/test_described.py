@@ -3,7 +3,7 @@
 import numpy as np
 
 import dbvfiv
-from dbvfiv.drawing.described import valve_figure
+from dbvfiv.drawing.views import valve_figure
 from dbvfiv.studies.case import thesis_case
 
 OWN = {

@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 
-from dbvfiv.drawing.views import ValveSkin, faces, nodal_thickness, offset_line
+from dbvfiv.drawing.views import ValveSkin, faces, offset_line
 from dbvfiv.drawing.waves import wave_content
+from dbvfiv.shell.mesh import nodal_thickness
 from dbvfiv.studies.modes.figures import drawn_amplitude
 
 

@@ -8,8 +8,7 @@ import numpy as np
 import scipy.sparse as sp
 from scipy.sparse.linalg import splu
 
-from dbvfiv.contact import ContactLaw, Rebound
-from dbvfiv.contact.step import mean_pressure
+from dbvfiv.contact import ContactLaw, Rebound, mean_pressure
 from tests.verification.moving import Motion
 
 

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from dbvfiv.thesis import ENTRIES, Number
+from dbvfiv.thesis.materials import deflections
 from dbvfiv.thesis.openings import layup
-from dbvfiv.thesis.strip import deflections
 
 
 def test_entries_stand_in_the_order_of_the_thesis():

@@ -10,8 +10,7 @@ import scipy.sparse as sp
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
-from dbvfiv.contact import ContactLaw, Rebound
-from dbvfiv.contact.step import mean_pressure
+from dbvfiv.contact import ContactLaw, Rebound, mean_pressure
 from dbvfiv.motion.scheme import scheme
 from dbvfiv.motion.state import consistent_state
 from dbvfiv.motion.stepper import StepOptions, Stepper

@@ -15,7 +15,7 @@ import pytest
 
 from dbvfiv.materials import fibre_ply, published_rubber
 from dbvfiv.shell import Layer, Section, Shell, ShellMesh
-from dbvfiv.thesis import strip
+from dbvfiv.thesis import materials as strip
 from tests.shell.structures import dead_load, grid, solve_path
 from tests.verification.layered_solid import LayeredSolid
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.integrate import trapezoid
 
-from ...contact import ContactLaw, PlaneContact, nodal_thickness, tributary_area
+from ...contact import ContactLaw, PlaneContact, tributary_area
 from ...geometry import ValveMesh
 from ...model.build import build_shell
 from ...model.pressed_shell import PressedShell
@@ -17,6 +17,7 @@ from ...model.supports import free_unknowns
 from ...model.symmetry import EQUILIBRIA
 from ...model.valve import loaded_share
 from ...shell import Shell
+from ...shell.mesh import nodal_thickness
 from ...shell.recovery import LayerFields, layer_fields
 from ..case import Case
 
@@ -116,7 +117,7 @@ class InnerFace:
         a face all the same.
         """
         shell = self.shell
-        depth = 0.5 * nodal_thickness(shell)
+        depth = 0.5 * nodal_thickness(shell.mesh)
         directors = shell.directors(nodal)[0] if nodal.any() else shell.mesh.directors
         point = shell.mesh.nodes + nodal[:, :3] - depth[:, None] * directors
         lift = np.zeros(len(depth))
@@ -162,7 +163,7 @@ def film_leak(
 
 def face_plane(case: Case, shell: Shell, law: ContactLaw) -> PlaneContact:
     """Contact of the inner face with the closing plane."""
-    depth = 0.5 * nodal_thickness(shell)
+    depth = 0.5 * nodal_thickness(shell.mesh)
     every = np.arange(shell.mesh.node_count)
     return PlaneContact(shell, every, depth, tributary_area(shell), law, least_gap=case.valve.initial_gap)
 

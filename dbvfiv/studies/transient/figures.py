@@ -21,8 +21,9 @@ from ...drawing.style import (
     phase_looks,
     style,
 )
-from ...drawing.views import nodal_thickness, offset_line
+from ...drawing.views import offset_line
 from ...errors import CaseError
+from ...shell.mesh import nodal_thickness
 from ...verdict import Series, in_steps, spectrum
 from ..comparing import colours_of, labels
 from ..result import StudyResult
