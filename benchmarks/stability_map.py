@@ -12,7 +12,7 @@ import numpy as np
 
 from dbvfiv.studies.case import thesis_case
 from dbvfiv.studies.map.column import MapPlan
-from dbvfiv.studies.map.run import run_map
+from dbvfiv.studies.map.study import run_map
 from dbvfiv.studies.stability.place import condition_of
 from dbvfiv.studies.stability.walk import StabilityWalk
 from eigen import leading_modes

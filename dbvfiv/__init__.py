@@ -26,13 +26,13 @@ _PUBLIC = {
     "ClosureResult": "studies.closure.study",
     "CycleResult": "studies.cycle.result",
     "LevelsResult": "studies.levels.study",
-    "MapResult": "studies.map.result",
-    "ModesResult": "studies.modes.result",
-    "OnsetResult": "studies.onset.result",
+    "MapResult": "studies.map.study",
+    "ModesResult": "studies.modes.study",
+    "OnsetResult": "studies.onset.study",
     "SensitivityResult": "studies.sensitivity.result",
     "State": "studies.state",
     "SteadyResult": "studies.steady.study",
-    "SweepResult": "studies.sweep.result",
+    "SweepResult": "studies.sweep.study",
     "TransientResult": "studies.transient.result",
 }
 __all__ = sorted(_PUBLIC)

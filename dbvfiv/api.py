@@ -18,14 +18,14 @@ from .observer import Observer, Progress, is_watched
 from .studies.case import Case, load_case
 from .studies.closure.study import ClosureResult
 from .studies.cycle.result import CycleResult
-from .studies.map.result import MapResult
-from .studies.modes.result import ModesResult
-from .studies.onset.result import OnsetResult
+from .studies.map.study import MapResult
+from .studies.modes.study import ModesResult
+from .studies.onset.study import OnsetResult
 from .studies.sensitivity.result import SensitivityResult
 from .studies.session import Session, named_changes
 from .studies.state import State, sensitivity_keys
 from .studies.steady.study import SteadyResult
-from .studies.sweep.result import SweepResult
+from .studies.sweep.study import SweepResult
 from .studies.transient.result import TransientResult
 
 #: A result file to write; none without it.

@@ -13,9 +13,9 @@ from ..observer import Observer
 from ..studies.case import Case
 from ..studies.closure.study import ClosureResult
 from ..studies.cycle.result import CycleResult
-from ..studies.map.result import MapResult
-from ..studies.modes.result import ModesResult
-from ..studies.onset.result import OnsetResult
+from ..studies.map.study import MapResult
+from ..studies.modes.study import ModesResult
+from ..studies.onset.study import OnsetResult
 from ..studies.session import Session, kept_run
 from ..studies.steady.study import SteadyResult
 

@@ -13,7 +13,7 @@ from ..drawing.style import COMPUTED, PUBLISHED
 from ..drawing.views import ValveSkin
 
 if TYPE_CHECKING:
-    from ..studies.map.result import MapResult
+    from ..studies.map.study import MapResult
     from ..studies.state import State
     from ..studies.steady.study import SteadyResult
 

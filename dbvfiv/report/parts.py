@@ -15,7 +15,7 @@ from ..model.symmetry import symmetry_named
 from ..record.mesh import MeshData
 from ..record.states import shown_summary
 from ..studies.closure.safety import rated_sentence
-from ..studies.map.result import LAWS
+from ..studies.map.study import LAWS
 from . import live
 from .content import Part, Table, picture, pictures_of
 from .gather import Gathered

@@ -16,7 +16,7 @@ from dbvfiv.model.equilibria import LoadPath, rest_state
 from dbvfiv.model.residual import ValveResidual
 from dbvfiv.observer import Observer
 from dbvfiv.studies.case import thesis_case
-from dbvfiv.studies.modes.run import ModesOptions, run_modes
+from dbvfiv.studies.modes.search import ModesOptions, run_modes
 from eigen import SearchOptions
 from eigen.pairs import acceptable
 
@@ -41,8 +41,8 @@ def flutter(model, state):
 
 def test_a_light_fluid_flutters_at_a_small_opening(flutter):
     """One pair to the right, found by both routes, near the thesis's flutter (Th. ch. 7; 36.3 Hz on the fine mesh)."""
-    assert flutter.stable is False and flutter.certified.agrees
-    assert flutter.certified.unstable_count == flutter.certified.unstable_count_independent == 2
+    assert flutter.stable is False and flutter.certificate.agrees
+    assert flutter.certificate.unstable_count == flutter.certificate.unstable_count_independent == 2
     first = flutter.eigenvalues[0]
     assert first.real > 10 and 33 < first.imag / (2 * np.pi) < 39
     assert (flutter.eigenvalues.real[1:] < 0).all()
@@ -52,7 +52,7 @@ def test_water_is_damped(model):
     path = LoadPath(model)
     for pressure in (2e3, 6e3, 18e3, 50e3):
         found = run_modes(model, path.go_to(pressure), WATER)
-        assert found.stable is True and found.certified.unstable_count_independent == 0, pressure
+        assert found.stable is True and found.certificate.unstable_count_independent == 0, pressure
 
 
 def test_sorted_once_each_and_accurate(flutter):
@@ -77,8 +77,8 @@ def test_against_all_eigenvalues_of_a_small_valve():
 def test_the_motion_satisfies_the_time_dependent_equations(model, state, flutter):
     """The time-dependent residual along Re(shape exp(lambda t)) vanishes to first order in the amplitude."""
     dofs = model.shell.dofs
-    value, shape, inlet = flutter.eigenvalues[0], flutter.shapes[0], flutter.inlet_velocities[0]
-    q = dofs.restrict(shape)
+    mode = flutter.modes[0]
+    value, inlet, q = mode.eigenvalue, mode.inlet_velocity, dofs.restrict(mode.shape)
     steady = model.flow.inlet_velocity(state.station_area, state.pressure, LIGHT.density)
 
     residual = ValveResidual(model)
@@ -98,7 +98,8 @@ def test_the_motion_satisfies_the_time_dependent_equations(model, state, flutter
 def test_pressures_and_areas_belong_to_the_mode(model, state, flutter):
     """Areas by finite difference of the deformed rows; no pressure at the outlet."""
     size = 1e-6
-    for shape, areas, pressures in zip(flutter.shapes, flutter.areas, flutter.pressures):
+    for mode in flutter.modes:
+        shape, areas, pressures = mode.shape, mode.area, mode.pressure
         moved = model.rows.areas(model.nodal(state.q) + size * shape.real) - model.rows.areas(
             model.nodal(state.q) - size * shape.real
         )
@@ -107,7 +108,7 @@ def test_pressures_and_areas_belong_to_the_mode(model, state, flutter):
 
 
 def test_shapes_are_scaled_to_their_largest_displacement(flutter):
-    for shape in flutter.shapes:
+    for shape in (mode.shape for mode in flutter.modes):
         phases = np.exp(1j * np.linspace(0, 2 * np.pi, 721))
         reach = max(np.linalg.norm((shape[:, :3] * phase).real, axis=1).max() for phase in phases)
         assert reach == pytest.approx(1.0, abs=1e-6)
@@ -155,28 +156,28 @@ def test_the_verdict_is_withheld_where_the_counts_disagree(model, state):
 
     options = ModesOptions(3, search=SearchOptions(max_frequency=25.0))
     found = run_modes(model, state, LIGHT, options, Listener())
-    assert found.certified.unstable_count == 0 and found.stable is None
+    assert found.certificate.unstable_count == 0 and found.stable is None
     assert told and "may be unstable" in found.verdict.reason and found.verdict.outcome == "undecided"
 
 
 def test_an_unstable_pair_is_proof(model, state):
     """Without stiffness damping the band holds some of the unstable modes: unstable, though the counts differ."""
     found = run_modes(model, state, Mu(density=10.0, alpha=5.0, beta=0.0), ModesOptions(3))
-    assert found.certified.unstable_count > 0 and found.stable is False
+    assert found.certificate.unstable_count > 0 and found.stable is False
 
 
 @pytest.mark.parametrize("density", [1e-3, 2e4])
 def test_extreme_densities(model, state, density):
     found = run_modes(model, state, LIGHT.at(density=density))
     spectrum = found.spectrum
-    assert found.certified.agrees and acceptable(spectrum.residual, spectrum.backward_error, 1e-8).all()
+    assert found.certificate.agrees and acceptable(spectrum.residual, spectrum.backward_error, 1e-8).all()
     assert all(note.endswith(".") for note in found.notes)
 
 
 def test_a_uniform_pressure_has_no_fluid(state):
     shut = ValveModel(thesis_case({"mesh.around": 8, "mesh.along": 16, "drive.kind": "uniform"}))
     found = run_modes(shut, LoadPath(shut).go_to(500.0), WATER, ModesOptions(2))
-    assert found.in_vacuo and found.pressures.shape[1] == 0 and found.stable is True
+    assert np.isnan(found.modes[0].pressure).all() and found.stable is True
 
 
 def test_refusals(model, state, one_sentence):
@@ -204,4 +205,4 @@ def test_the_flutter_of_the_reference_mesh():
     first, second = found.eigenvalues[:2]
     assert first.real == pytest.approx(27, abs=3) and first.imag / (2 * np.pi) == pytest.approx(36.3, rel=0.03)
     assert second.real == pytest.approx(-24, abs=3) and second.imag / (2 * np.pi) == pytest.approx(16.8, rel=0.05)
-    assert found.certified.agrees and found.spectrum.residual.max() < 1e-8
+    assert found.certificate.agrees and found.spectrum.residual.max() < 1e-8

@@ -13,8 +13,8 @@ from dbvfiv.errors import CaseError, SolveError
 from dbvfiv.model import ValveModel
 from dbvfiv.model.equilibria import LoadPath
 from dbvfiv.studies.case import thesis_case
-from dbvfiv.studies.modes.run import ModesOptions, run_modes
-from dbvfiv.studies.sweep.run import SweepOptions, run_sweep
+from dbvfiv.studies.modes.search import ModesOptions, run_modes
+from dbvfiv.studies.sweep.branches import SweepOptions, run_sweep
 from tests.observers import Stop
 
 LIGHT = Mu(density=10.0, alpha=0.0, beta=0.003)
@@ -153,7 +153,7 @@ def test_refusals(model, state, one_sentence):
 
 def test_what_is_done_is_kept_on_the_way(model, state, over_density, monkeypatch):
     """A sweep that is killed leaves the values up to the last time it was kept, with the branches of the whole."""
-    from dbvfiv.studies.sweep import run as sweep
+    from dbvfiv.studies.sweep import branches as sweep
 
     monkeypatch.setattr(sweep, "_KEEP_AFTER", 0.0)
     monkeypatch.setattr(sweep, "_KEEPING", 1e9)

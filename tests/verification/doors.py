@@ -17,13 +17,13 @@ from dbvfiv.motion.start import steady_positions
 from dbvfiv.motion.stepper import StepOptions
 from dbvfiv.observer import Observer
 from dbvfiv.studies.case import Case, load_case
-from dbvfiv.studies.map.run import run_map
-from dbvfiv.studies.modes.run import ModesOptions, run_modes
+from dbvfiv.studies.map.study import run_map
+from dbvfiv.studies.modes.search import ModesOptions, run_modes
 from dbvfiv.studies.onset.search import OnsetOptions, run_onset
 from dbvfiv.studies.session import Session
 from dbvfiv.studies.stability.verdict import UNDECIDED, Verdict
 from dbvfiv.studies.stability.walk import StabilityWalk
-from dbvfiv.studies.sweep.run import SweepOptions, run_sweep
+from dbvfiv.studies.sweep.branches import SweepOptions, run_sweep
 from dbvfiv.studies.transient.study import Runner
 from tests.verification.test_transient_modes import ringing
 

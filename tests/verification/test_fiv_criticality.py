@@ -33,10 +33,14 @@ class Onset:
         (crossing,) = search.scan.run(options.values)
         self.point = point = search.point(crossing)
         self.form = normal_form(
-            self.case, search.walk, point.place, search.critical(point.place, 2j * np.pi * point.frequency), "density"
+            self.case,
+            search.walk,
+            search.place(point.value),
+            search.critical(search.place(point.value), 2j * np.pi * point.frequency),
+            "density",
         )
-        self.model = search.walk.built(point.place).model
-        self.steady = self.lip(search.walk.equilibrium(point.place))
+        self.model = search.walk.built(search.place(point.value)).model
+        self.steady = self.lip(search.walk.equilibrium(search.place(point.value)))
         shape = self.form.q[: self.model.size]
         change = ASIDE * point.value
         #: Amplitude of the lip on the predicted cycle, m.

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from dbvfiv.observer import Observer
-from dbvfiv.studies.modes.run import ModesOptions, run_modes
+from dbvfiv.studies.modes.search import ModesOptions, run_modes
 from dbvfiv.studies.session import Session
 from tests.verification.doors import Asked, ask_all, random_cases, rates_in_time
 

@@ -1,34 +1,31 @@
-"""One column of a stability map: all its cells, and where along it modes reach the imaginary axis."""
+"""Plan of a map, and one of its columns: all its cells, and where along it modes reach the imaginary axis."""
 
 from __future__ import annotations
 
 import math
 import time
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
 
-from eigen import Column
 from eigen.columns import MISSING
 
 from ...case.axis import Axis
 from ...case.parameters import Mu
-from ...errors import CaseError, NotValidError, SolveError
+from ...errors import CaseError, SolveError
+from ...model.symmetry import Symmetry, chosen_symmetries
 from ..case import Case
-from ..stability.crossings import OnsetCorrection, Sample, Scan, locate
-from ..stability.place import condition_of, is_surrounding, point_under
-from ..stability.verdict import NOT_VALID, OUTCOMES, UNDECIDED, Verdict, describe_counts
+from ..stability.line import ROUGH, ParameterLine
+from ..stability.place import is_surrounding
+from ..stability.samples import Sample, SampleKey
+from ..stability.verdict import Verdict
 from ..stability.walk import StabilityWalk
 
-#: What is kept of each cell.
-CELLS = (
-    *("growth_rate", "frequency", "second", "oscillating_rate", "oscillating_frequency", "damping_ratio"),
-    *("unstable", "counted", "certified", "how", "outcome"),
-)
-#: Relative accuracy of onsets along a column, and of those that the full matrices correct.
-LOCATED, ROUGH = 1e-10, 1e-6
+#: Relative accuracy of onsets along a column that the full matrices do not correct.
+LOCATED = 1e-10
 
 
 class ColumnTask(NamedTuple):
@@ -40,13 +37,13 @@ class ColumnTask(NamedTuple):
         Of the axis across.
     level : int
         0 for a column of the grid, more for one that is put between two of them.
-    laws : tuple of int
-        Numbers of the continuity laws under which it is needed.
+    parts : tuple of int
+        Numbers of the parts of the plan in which it is needed.
     """
 
     value: float
     level: int
-    laws: tuple[int, ...]
+    parts: tuple[int, ...]
 
     @property
     def key(self) -> tuple[float, int]:
@@ -64,6 +61,8 @@ class MapPlan:
     x, y : Axis
     laws : tuple of float
         Blends of the continuity laws, one picture each.
+    classes : tuple of Symmetry
+        Classes of motion, that of the equilibria first; of the others cells alone are asked for.
     refine : int
         Number of times that columns are halved where the number of onsets changes.
     """
@@ -72,6 +71,7 @@ class MapPlan:
     x: Axis
     y: Axis
     laws: tuple[float, ...]
+    classes: tuple[Symmetry, ...]
     refine: int = 2
 
     @classmethod
@@ -80,7 +80,22 @@ class MapPlan:
         x, y = case.map.axes
         storage = Mu.of(case).storage
         both = case.map.continuity == "both" and "storage" not in (x.parameter, y.parameter)
-        return cls(case, x, y, (0.0, 1.0) if both else (storage,), case.map.refine)
+        return cls(
+            case,
+            x,
+            y,
+            (0.0, 1.0) if both else (storage,),
+            chosen_symmetries(case.map.symmetry, case.part),
+            case.map.refine,
+        )
+
+    @property
+    def parts(self) -> list[tuple[float, Symmetry]]:
+        """Continuity law and class of motion of each part: the equilibria's class under every law first, the others
+        under that of the case, since the laws differ in no other class.
+        """
+        own, *others = self.classes
+        return [*((law, own) for law in self.laws), *((self.base.storage, other) for other in others)]
 
     @property
     def transposed(self) -> bool:
@@ -106,9 +121,17 @@ class MapPlan:
         named = {self.across.parameter: across, self.along.parameter: along}
         return self.base.at(**({"storage": law} | named))
 
-    def task(self, value: float, level: int = 0) -> ColumnTask:
-        """A column under all laws."""
-        return ColumnTask(value, level, tuple(range(len(self.laws))))
+    def line(self, walk: StabilityWalk, across: float, part: int, edges: bool) -> ParameterLine:
+        """Line of the cells of a column in a part."""
+        (law, motion), along = self.parts[part], self.along
+        base = self.place(across, along.values[0], law)
+        key = SampleKey(law, motion.name, 0, across)
+        asked = along.parameter, along.values, along.log
+        return ParameterLine(walk.in_class(motion), base, *asked, edges=edges, counts="brackets", key=key)
+
+    def task(self, value: float) -> ColumnTask:
+        """A column of the grid, in all parts."""
+        return ColumnTask(value, 0, tuple(range(len(self.parts))))
 
     def coordinate(self, axis: Axis, value: float) -> float:
         """0..1 along an axis, in the logarithm if its values are spaced so."""
@@ -131,149 +154,94 @@ class MapColumn:
         Of the axis across.
     level : int
         0 for a column of the grid, more for one that was put between two of them.
-    cells : dict of (laws, cells) arrays
-        See `CELLS`.
+    samples : dict of tuples of Sample
+        Cells by the number of their part, where it was asked for.
     onsets : (k, 5) array
-        Law (its number), value along the column, frequency in Hz, +1 where a mode becomes unstable along the column, -1
-        where it ceases to be, and the growth rate over the size of the eigenvalue that the full matrices leave there,
-        NaN where it was not corrected by them.
+        Part (its number), value along the column, frequency in Hz, +1 where a mode becomes unstable along the column,
+        -1 where it ceases to be, and the growth rate over the size of the eigenvalue that the full matrices leave
+        there, NaN where it was not corrected by them.
     error : float
         Largest estimated relative error of a leading eigenvalue.
     failure : str
         Why there is no column; empty if there is one.
     seconds : float
         Processor time.
-    band : float
-        Hz; verdicts hold up to it, infinite for all frequencies.
-    why_not_valid : str
-        Why the constants of the rubber do not hold in some or all of the cells; empty where they do.
     """
 
     value: float
     level: int
-    cells: dict[str, np.ndarray]
+    samples: dict[int, Sequence[Sample]]
     onsets: np.ndarray
-    error: float
+    error: float = np.nan
     failure: str = ""
     seconds: float = 0.0
-    band: float = math.inf
-    why_not_valid: str = ""
 
     @classmethod
-    def missing(cls, plan: MapPlan, task: ColumnTask, sentence: str, seconds: float = 0.0) -> MapColumn:
-        """A marked gap."""
-        shape = (len(plan.laws), len(plan.along.values))
-        cells = {name: np.full(shape, np.nan) for name in CELLS[:6]}
-        cells |= {
-            "unstable": np.full(shape, -1),
-            "counted": np.full(shape, -1),
-            "certified": np.zeros(shape, bool),
-            "how": np.full(shape, MISSING),
-            "outcome": np.full(shape, OUTCOMES.index(UNDECIDED)),
-        }
-        return cls(task.value, task.level, cells, np.zeros((0, 5)), np.nan, sentence, seconds)
+    def gap(cls, task: ColumnTask, sentence: str, seconds: float = 0.0) -> MapColumn:
+        """A column without a state."""
+        return cls(task.value, task.level, {}, np.zeros((0, 5)), failure=sentence, seconds=seconds)
 
-    def has(self, law: int) -> bool:
-        """True where the column was solved under a continuity law, given by its number."""
-        how = self.cells.get("how")
-        return not self.failure and (how is None or bool((how[law] != MISSING).any()))
+    def has(self, part: int) -> bool:
+        """True where the column was solved in a part, given by its number."""
+        return any(sample.how != MISSING for sample in self.samples.get(part, ()))
 
-    def verdict(self, law: int, cell: int) -> Verdict:
+    def numbers(self, part: int, name: str) -> np.ndarray:
+        """A quantity of the cells of a part, see `Sample.number`."""
+        return np.array([sample.number(name) for sample in self.samples[part]])
+
+    @property
+    def band(self) -> float:
+        """Frequency, Hz, up to which verdicts hold; infinite for all."""
+        return min((sample.band for row in self.samples.values() for sample in row), default=math.inf)
+
+    @property
+    def refusal(self) -> str:
+        """Why the constants of the rubber do not hold in some or all of the cells; empty where they do."""
+        return next((sample.refusal for row in self.samples.values() for sample in row if sample.refusal), "")
+
+    def verdict(self, part: int, cell: int) -> Verdict:
         """Verdict on a cell."""
-        own = {name: values[law, cell] for name, values in self.cells.items()}
-        outcome = OUTCOMES[int(own["outcome"])]
-        if outcome == NOT_VALID:
-            return Verdict.not_valid(self.why_not_valid)
-        if self.failure:
-            return Verdict.undecided(self.failure)
-        unstable, counted, certified = int(own["unstable"]), int(own["counted"]), bool(own["certified"])
-        numbers = (float(own[name]) for name in ("oscillating_rate", "oscillating_frequency", "damping_ratio"))
-        reason = describe_counts(unstable, counted, certified, 0.0, self.band)
-        return Verdict(outcome, reason, *numbers, certain=certified, band=self.band)
+        return Verdict.undecided(self.failure) if self.failure else self.samples[part][cell].verdict
 
 
-def grid_of(plan: MapPlan, found, name: str) -> np.ndarray:
-    """A quantity of finished columns on the grid of a plan, (laws, y values, x values)."""
-    blank = MapColumn.missing(plan, plan.task(0.0), "").cells[name]
-    by_value = {column.value: column.cells[name] for column in found if column.level == 0}
-    table = np.stack([by_value.get(value, blank) for value in plan.across.values], axis=2)
-    return table.transpose(0, 2, 1) if plan.transposed else table
+def grid_of(plan: MapPlan, columns: Iterable[MapColumn], name: str, parts: Iterable[int]) -> np.ndarray:
+    """A quantity of finished columns on the grid of a plan, (parts, y values, x values); see `Sample.number`."""
+    blank = [Sample(value) for value in plan.along.values]
+    found = {column.value: column.samples for column in columns if column.level == 0}
+    rows = [[found.get(value, {}).get(part, blank) for value in plan.across.values] for part in parts]
+    table = np.array([[[sample.number(name) for sample in cells] for cells in row] for row in rows])
+    return table if plan.transposed else table.transpose(0, 2, 1)
 
 
 def solve_column(plan: MapPlan, walk: StabilityWalk, task: ColumnTask) -> MapColumn:
     """A column; a steady state that is not found leaves a gap with the reason.
 
     On the grid every cell gets a certificate; in columns between, put in for the onset curves, those that onsets lie
-    between.
+    between. Where both axes change the steady state, states are found anew, whatever columns came before.
     """
     started = time.process_time()
-    value, level, laws = task
-    columns, onsets = [], []
-    cells = MapColumn.missing(plan, task, "").cells
+    walk = walk if is_surrounding(plan.case, plan.along.parameter) else walk.apart()
+    samples: dict[int, Sequence[Sample]] = {}
+    onsets, worst = [], 0.0
     try:
-        for number in laws:
-            column, verdicts, found = _law(plan, walk, value, plan.laws[number], level > 0)
-            columns.append((column, verdicts))
-            onsets += [(number, *onset) for onset in found]
-    except NotValidError as error:
-        cells["outcome"][list(laws)] = OUTCOMES.index(NOT_VALID)
-        seconds = time.process_time() - started
-        return MapColumn(value, level, cells, np.zeros((0, 5)), 0.0, "", seconds, why_not_valid=str(error))
+        for part in task.parts:
+            line = plan.line(walk, task.value, part, task.level > 0)
+            samples[part], worst = line.cells(), max(worst, line.error)
+            if part < len(plan.laws):
+                onsets += [(part, *row) for row in _onsets(line)]
     except (SolveError, CaseError) as error:
-        return MapColumn.missing(plan, task, str(error), time.process_time() - started)
-    for number, (column, verdicts) in zip(laws, columns):
-        for name in set(CELLS) & vars(column).keys():
-            cells[name][number] = getattr(column, name)
-        cells["certified"][number] = column.certified
-        cells["oscillating_rate"][number] = [verdict.growth_rate for verdict in verdicts]
-        cells["oscillating_frequency"][number] = [verdict.frequency for verdict in verdicts]
-        cells["damping_ratio"][number] = [verdict.damping_ratio for verdict in verdicts]
-        cells["outcome"][number] = [OUTCOMES.index(verdict.outcome) for verdict in verdicts]
-    return MapColumn(
-        value,
-        level,
-        cells,
-        np.array(onsets, float).reshape(-1, 5),
-        max(column.error for column, _ in columns),
-        "",
-        time.process_time() - started,
-        min((v.band for _, verdicts in columns for v in verdicts if np.isfinite(v.band)), default=math.inf),
-        next((v.reason for _, verdicts in columns for v in verdicts if v.outcome == NOT_VALID), ""),
-    )
+        return MapColumn.gap(task, str(error), time.process_time() - started)
+    table, seconds = np.array(onsets, float).reshape(-1, 5), time.process_time() - started
+    return MapColumn(task.value, task.level, samples, table, worst, seconds=seconds)
 
 
-def _law(
-    plan: MapPlan, walk: StabilityWalk, value: float, law: float, edges: bool
-) -> tuple[Column, list[Verdict], list[tuple[float, ...]]]:
-    along = plan.along
-    places = [plan.place(value, other, law) for other in along.values]
-    if not is_surrounding(plan.case, along.parameter):
-        return _state_by_state(plan, walk.apart(), places)
-    column = walk.column(places, edges=edges)
-    verdicts = walk.verdicts(places, column)
-    sample = column.eigenvalues or (lambda condition: walk.column([point_under(places[0], condition)]).leading[0])
-    cell = column.cell or (lambda condition: walk.column([point_under(places[0], condition)]))
-    scan = Scan(
-        lambda other: sample(condition_of(plan.place(value, other, law))),
-        along.log,
-        lambda other: bool(cell(condition_of(plan.place(value, other, law))).certified[0]),
-    )
-    # what the cells know need not be found again
-    _enter_known(scan, along, column)
-    found = _onsets(scan, along, LOCATED if column.corrected is None else ROUGH)
-    if column.corrected is None:
-        return column, verdicts, found
-
-    correct = OnsetCorrection(
-        column,
-        lambda other: condition_of(plan.place(value, other, law)),
-        lambda other: walk.spectrum(plan.place(value, other, law)).eigenvalues,
-    )
-    onsets = []
-    for other, frequency, direction, _ in found:
-        other, frequency, left = correct(other, frequency)
-        onsets.append((other, frequency, direction, left))
-    return column, verdicts, onsets
+def _onsets(line: ParameterLine) -> list[tuple[float, float, float, float]]:
+    """Value, frequency, direction, and what is left of the growth rate over the size of the eigenvalue."""
+    found = []
+    for crossing in line.scan.run(line.values):
+        onset = line.locate(crossing, ROUGH if line.is_reduced else LOCATED)
+        found.append((onset.value, onset.frequency, 1.0 if crossing.gains else -1.0, onset.residual))
+    return found
 
 
 def shared_place(plan: MapPlan, value: float) -> Mu | None:
@@ -281,49 +249,3 @@ def shared_place(plan: MapPlan, value: float) -> Mu | None:
     if not is_surrounding(plan.case, plan.along.parameter):
         return None
     return plan.place(value, plan.along.values[0], plan.laws[0])
-
-
-def _enter_known(scan: Scan, along: Axis, column: Column) -> None:
-    """Put what the cells know into a scan: samples, and values at which there is none."""
-    for value, row, certified, counted, how in zip(
-        map(float, along.values), column.leading, column.certified, column.counted, column.how
-    ):
-        if how == MISSING:
-            scan.failures[value] = "the constants of the rubber do not hold"
-        else:
-            scan.samples[value] = Sample(value, row, bool(certified) if counted >= 0 else None)
-
-
-def _state_by_state(plan: MapPlan, walk: StabilityWalk, places: list[Mu]):
-    """Both axes change the steady state: every cell has its own, solved directly, whatever columns came before."""
-    parts = [_cell_or_blank(walk, place) for place in places]
-    column = Column.joined(parts)
-    verdicts = walk.verdicts(places, column)
-    parameter = plan.along.parameter
-
-    def cell(other: float) -> Column:
-        return walk.column([places[0].at(**{parameter: other})])
-
-    scan = Scan(lambda other: cell(other).leading[0], plan.along.log, lambda other: bool(cell(other).certified[0]))
-    _enter_known(scan, plan.along, column)
-    return column, verdicts, _onsets(scan, plan.along, LOCATED)
-
-
-def _cell_or_blank(walk: StabilityWalk, place: Mu) -> Column:
-    """Column of one place; blank where the constants of the rubber do not hold."""
-    try:
-        return walk.column([place])
-    except NotValidError:
-        return Column.blank(1)
-
-
-def _onsets(scan: Scan, along: Axis, accuracy: float) -> list[tuple[float, float, float, float]]:
-    """Value, frequency, direction, and what is left of the growth rate over the size of the eigenvalue."""
-    found = []
-    for crossing in scan.run(along.values):
-        value = locate(scan, crossing, accuracy)
-        eigenvalue = complex(scan.within(value).eigenvalues[crossing.index])
-        direction = 1.0 if crossing.high.unstable > crossing.low.unstable else -1.0
-        left = abs(eigenvalue.real) / max(abs(eigenvalue), 1.0)
-        found.append((value, abs(eigenvalue.imag) / (2 * np.pi), direction, left))
-    return found

@@ -14,7 +14,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from ..stability.crossings import ACCURATE
+from ..stability.line import ACCURATE
 from .column import MapColumn, MapPlan
 
 #: Distance in the unit square, frequencies counted relatively, up to which onsets of neighbouring columns are linked.
@@ -247,10 +247,9 @@ class Web:
 
         The number of unstable modes at the lower edge then changes otherwise than the ends of curves there explain.
         """
-        cells = [self.columns[j].cells for j in (i, i + 1)]
-        if any(not table or table["unstable"][self.law, 0] < 0 for table in cells):
+        modes = [self.columns[j].samples[self.law][0].unstable for j in (i, i + 1)]
+        if min(modes) < 0:
             return False
-        modes = [float(table["unstable"][self.law, 0]) for table in cells]
         change = modes[1] - modes[0]
         for column, side, sign in ((i, 1, 1.0), (i + 1, -1, -1.0)):
             for k in self.loose(column, side):

@@ -30,7 +30,7 @@ _COLUMNS = (
 )
 #: What is kept of each cell.
 CELLS = ("amplitude", "frequency", "growing")
-SPEC = TableSpec(ROWS, _COLUMNS, chunk=512, later=True)
+SPEC = TableSpec(ROWS, _COLUMNS, chunk=512)
 
 
 class CycleCells(NamedTuple):
@@ -74,7 +74,7 @@ def cycles_along(case: Case, plan: MapPlan, column: MapColumn, law: int, walk: S
     stable one of largest amplitude.
     """
     found, reasons = CycleCells.blank(len(plan.along.values)), []
-    unstable = column.cells["unstable"][law] > 0
+    unstable = column.numbers(law, "unstable") > 0
     for number, along, frequency, direction, _ in column.onsets:
         if int(number) != law or not frequency or _is_covered(plan, found, along, direction):
             continue

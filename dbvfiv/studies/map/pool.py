@@ -9,7 +9,6 @@ import threading
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import FIRST_COMPLETED, Executor, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
-from dataclasses import replace
 
 import numpy as np
 
@@ -108,7 +107,7 @@ class ColumnPool:
                 tries[task] += 1
                 if tries[task] >= TRIES:
                     left.discard(task)
-                    yield MapColumn.missing(self.plan, task, f"{TRIES} workers died over this column.")
+                    yield MapColumn.gap(task, f"{TRIES} workers died over this column.")
             if lost:
                 self.warn(f"A worker was lost; {len(left)} columns are given to new ones.")
 
@@ -139,7 +138,7 @@ class ColumnPool:
                 try:
                     running[self._pool.submit(_solve, task, self._state(task))] = task
                 except SolveError as error:
-                    yield task, MapColumn.missing(self.plan, task, str(error))
+                    yield task, MapColumn.gap(task, str(error))
                 except BrokenProcessPool:
                     queue.insert(0, task)
                     break
@@ -161,7 +160,7 @@ class ColumnPool:
 
 
 def _pool(plan: MapPlan, workers: int) -> Executor:
-    data = (plan.case.to_dict(), plan.laws)
+    data = (plan.case.to_dict(),)
     if mpi_size() > 1:
         try:
             from mpi4py.futures import MPIPoolExecutor
@@ -174,7 +173,7 @@ def _pool(plan: MapPlan, workers: int) -> Executor:
     return ProcessPoolExecutor(max(workers, 1), multiprocessing.get_context("spawn"), _start, data)
 
 
-def _start(case: dict, laws: tuple[float, ...]) -> None:
+def _start(case: dict) -> None:
     """Prepare a worker; the process that shares the columns out hears Ctrl-C and SIGTERM, and ends this one."""
     global _plan, _walk
     if multiprocessing.parent_process() is not None:
@@ -183,7 +182,7 @@ def _start(case: dict, laws: tuple[float, ...]) -> None:
         threading.Thread(target=_end_with_parent, daemon=True).start()
     prepare()
     read = Case.from_dict(case)
-    _plan = replace(MapPlan.of(read), laws=tuple(laws))
+    _plan = MapPlan.of(read)
     _walk = StabilityWalk(read)
 
 

@@ -1,22 +1,391 @@
-"""Run of the map study: finds a stability map and keeps it in a record."""
+"""Stability over two parameters: columns of cells, refined near onset, exact onset curves on top, checks of cells with
+the full pencil; their storage, and what can be read off a run or its file.
+"""
 
 from __future__ import annotations
 
-from ...observer import Observer, Observers
-from ...record.record import GrowingRecord
-from ..session import Session
-from ..stability.dimensions import add_classes
-from ..stability.walk import StabilityWalk
-from ..study import Study
-from .column import MapPlan
-from .cycles import follow_cycles
-from .result import MapResult
-from .rows import KeepColumns, keep_checks, keep_curves, known_columns, rows_to_keep, tables_of
-from .run import run_map
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import asdict, dataclass, field
+from functools import cached_property
+from typing import Any
 
-#: Cells alone, under one law: the laws differ in no class but that of the equilibria. Onsets of the other classes are
-#: located along a line, by `onset`.
-_PLAIN = {"map.curve": False, "map.refine": 0, "map.continuity": "case", "map.workers": 1}
+import numpy as np
+from matplotlib.figure import Figure
+
+from eigen.columns import DIRECT, MISSING
+
+from ...errors import SolveError
+from ...fit import outside_band
+from ...observer import Observer, Observers
+from ...record.mesh import MeshData
+from ...record.record import GrowingRecord, Record
+from ...record.table import Column, TableSpec
+from ..case import Case
+from ..result import StudyResult
+from ..session import Session
+from ..stability.dimensions import leading_class
+from ..stability.place import check_scan, describe_fixed, fixed_conditions
+from ..stability.samples import SAMPLE_TABLE, SAMPLES, Sample, keep_samples, read_samples
+from ..stability.verdict import DIVERGES, FLUTTERS, NOT_VALID, OUTCOMES, STABLE, Verdict
+from ..stability.walk import StabilityWalk
+from ..study import Study, nothing_to_resume
+from . import cycles, figures
+from .column import ColumnTask, MapColumn, MapPlan, grid_of
+from .curves import OnsetCurve, Web, doubts, linked
+from .pool import ColumnPool
+
+LAWS = {0.0: "quasi-steady", 1.0: "storage"}
+#: Quantities of cells in documents, by the names of `Sample.number`.
+_CELLS = {
+    "growth_rate": "growth_rate",
+    "frequency": "frequency",
+    "unstable_count": "unstable",
+    "unstable_count_independent": "counted",
+    "certified": "certified",
+}
+#: Largest accepted |difference| / |eigenvalue|.
+ACCEPTED = 1e-6
+
+
+@dataclass(frozen=True)
+class Check:
+    """One cell, solved directly.
+
+    Attributes
+    ----------
+    x, y : float
+    law : int
+        Number of the continuity law.
+    growth_rate, frequency : float
+        Of the full pencil, 1/s and Hz.
+    error : float
+        |difference of the leading eigenvalue| over its size.
+    unstable : int
+    agrees : bool
+        Error within `ACCEPTED` and the same number of unstable eigenvalues.
+    """
+
+    x: float
+    y: float
+    law: int
+    growth_rate: float
+    frequency: float
+    error: float
+    unstable: int
+    agrees: bool
+
+
+def check_cells(plan: MapPlan, columns: tuple[MapColumn, ...], walk: StabilityWalk, number: int) -> tuple[Check, ...]:
+    """Check cells spread over the map by a sequence that fills the plane evenly."""
+    usable = [column for column in columns if not column.failure and column.level == 0]
+    if not usable:
+        return ()
+    cells, laws = len(plan.along.values), len(plan.laws)
+    # steps of the golden section in both directions (Roberts' sequence)
+    picks = sorted(
+        (int((0.5 + 0.7548776662 * i) % 1 * len(usable)), int((0.5 + 0.5698402910 * i) % 1 * cells), i % laws)
+        for i in range(number)
+    )
+    return tuple(_check(plan, usable[i], j, law, walk) for i, j, law in picks)
+
+
+def _check(plan: MapPlan, column: MapColumn, j: int, law: int, walk: StabilityWalk) -> Check:
+    along = plan.along.values[j]
+    spectrum = walk.spectrum(plan.place(column.value, along, plan.laws[law]), 4)
+    kept = column.samples[law][j]
+    true = complex(spectrum.eigenvalues[0]) if len(spectrum) else complex(np.nan)
+    leading = complex(kept.eigenvalues[0]) if len(kept.eigenvalues) else complex(np.nan)
+    error = abs(leading - true) / max(abs(true), 1.0)
+    unstable = spectrum.unstable_count
+    agrees = error <= ACCEPTED and unstable == kept.unstable
+    x, y = (along, column.value) if plan.transposed else (column.value, along)
+    return Check(x, y, law, true.real, true.imag / (2 * np.pi), float(error), unstable, bool(agrees))
+
+
+@dataclass(frozen=True)
+class FoundMap:
+    """A stability map.
+
+    Attributes
+    ----------
+    plan : MapPlan
+    columns : tuple of MapColumn
+        In ascending order, those between the grid's included.
+    curves : tuple of OnsetCurve
+    checks : tuple of Check
+        Cells solved again with the full pencil.
+    warnings : tuple of str
+    """
+
+    plan: MapPlan
+    columns: tuple[MapColumn, ...]
+    curves: tuple[OnsetCurve, ...] = ()
+    checks: tuple[Check, ...] = ()
+    warnings: tuple[str, ...] = ()
+
+    def grid(self, name: str) -> np.ndarray:
+        """A quantity of the cells on the grid (laws, y, x); see `Sample.number`."""
+        return grid_of(self.plan, self.columns, name, range(len(self.plan.laws)))
+
+
+#: Rounds of columns put in for the onset curves.
+ROUNDS = 14
+#: Columns put in for them at most under each law: as many as the map has, or this many.
+LEAST_ROOM = 40
+
+
+@dataclass
+class _Run:
+    plan: MapPlan
+    observer: Observer
+    pool: ColumnPool
+    found: dict[tuple[float, int], MapColumn] = field(default_factory=dict)
+
+    def fill(self, wanted: Iterable[ColumnTask]) -> None:
+        """Columns that are not there yet: those an earlier run has found, and the others solved."""
+        wanted = [task for task in wanted if task.key not in self.found]
+        for column in self.pool.columns(wanted):
+            key = column.value, column.level
+            self.found[key] = column
+            if key not in self.pool.known:
+                self.observer.item(column)
+
+    def between(self, level: int) -> list[ColumnTask]:
+        """Columns to put in where the number of onsets under a law differs between neighbours."""
+        across, wanted = self.plan.across, []
+        for law in range(len(self.plan.laws)):
+            ordered = [column for column in _ordered(self.found) if column.has(law)]
+            for a, b in zip(ordered[:-1], ordered[1:]):
+                if _pattern(a, law) != _pattern(b, law) and max(a.level, b.level) == level - 1:
+                    ends = (self.plan.coordinate(across, column.value) for column in (a, b))
+                    wanted.append((0.5 * sum(ends), law))
+        return self._tasks(wanted, level)
+
+    def _tasks(self, wanted: Iterable[tuple[float, int]], level: int) -> list[ColumnTask]:
+        """Columns at places, each under the laws that ask for it, in ascending order."""
+        laws: dict[float, tuple[int, ...]] = {}
+        for place, law in wanted:
+            laws[place] = (*laws.get(place, ()), law)
+        return [ColumnTask(self.plan.value(self.plan.across, place), level, laws[place]) for place in sorted(laws)]
+
+    def trace(self) -> None:
+        """Columns that the onset curves need to be known everywhere."""
+        numbers = range(len(self.plan.laws))
+        level = max(column.level for column in self.found.values())
+        room = max(LEAST_ROOM, len(self.plan.across.values)) * len(numbers)
+        for _ in range(ROUNDS):
+            wanted = sorted((place, law) for law in numbers for place in self._web(law).wanted())[:room]
+            if not wanted:
+                return
+            room -= len(wanted)
+            level += 1
+            tasks = self._tasks(wanted, level)
+            self.observer.progress(f"onset curves, {len(tasks)} more columns")
+            self.fill(tasks)
+
+    def _web(self, law: int) -> Web:
+        return Web.of(self.plan, self.found.values(), law)
+
+
+def _pattern(column: MapColumn, law: int) -> tuple[int, ...]:
+    """Directions of the onsets along a column."""
+    return tuple(int(row[3]) for row in column.onsets if int(row[0]) == law)
+
+
+def run_map(
+    case: Case,
+    observer: Observer | None = None,
+    workers: int | None = None,
+    known: Iterable[MapColumn] = (),
+    walk: StabilityWalk | None = None,
+) -> FoundMap:
+    """A stability map of a case.
+
+    Parameters
+    ----------
+    case : Case
+    observer : Observer, optional
+        `item` is told of every finished `MapColumn`.
+    workers : int, optional
+        Processes; those of the case by default.
+    known : iterable of MapColumn
+        Columns of an interrupted run, which are not solved again: the run repeats its decisions with them, so that it
+        ends with the numbers of one that was never interrupted.
+    walk : StabilityWalk, optional
+        Of the case.
+
+    Raises
+    ------
+    CaseError
+        If the case has nothing that a parameter could change.
+    SolveError
+        If the case has no flow, or no column was found at all.
+    """
+    plan = MapPlan.of(case)
+    check_scan(case, plan.x.parameter, plan.y.parameter)
+    observer = observer or Observer()
+    walk = walk or StabilityWalk(case)
+    observer.begin("map", len(plan.across.values))
+    with ColumnPool(plan, case.map.workers if workers is None else workers, observer.warn, walk, known) as pool:
+        run = _Run(plan, observer, pool)
+        run.fill([plan.task(value) for value in plan.across.values])
+        for level in range(1, plan.refine + 1):
+            run.fill(run.between(level))
+        if all(column.failure for column in run.found.values()):
+            raise SolveError(f"No state of the map was found: {_ordered(run.found)[0].failure}")
+        if case.map.curve:
+            run.trace()
+    columns = _ordered(run.found)
+    checks = check_cells(plan, columns, walk, case.map.checks)
+    curves = linked(plan, columns)
+    warnings = list(doubts(plan, curves)) if case.map.curve else []
+    warnings += _doubts(plan, columns, checks)
+    for sentence in warnings:
+        observer.warn(sentence)
+    return FoundMap(plan, columns, curves, checks, tuple(warnings))
+
+
+def _ordered(found) -> tuple[MapColumn, ...]:
+    return tuple(sorted(found.values(), key=lambda column: column.value))
+
+
+def _doubts(plan: MapPlan, columns: Iterable[MapColumn], checks: Iterable[Check]) -> list[str]:
+    """Sentences about cells that are not certified, fail a check, or leave the band of the material data."""
+    solved, said = [c for c in columns if not c.failure], []
+    for prefix, parts in _variants(plan):
+        cells = [s for c in solved if not c.level for part in parts for s in c.samples[part]]
+        refused = sum(bool(s.refusal) for s in cells)
+        doubtful = sum(not (s.certified or s.refusal) for s in cells)
+        if refused:
+            first = next(c for c in solved if c.refusal)
+            said.append(f"{prefix}{refused} cells are not valid; the first at {first.value:.6g}: {first.refusal}")
+        if doubtful:
+            said.append(
+                f"{prefix}{doubtful} cells are uncertain: spectrum and independent count disagree, or the count is not "
+                "certain; they are called neither stable nor unstable."
+            )
+    bands = [c.band for c in solved if np.isfinite(c.band)]
+    if bands:
+        said.append(
+            f"Verdicts hold for modes up to {min(bands):.4g} Hz"
+            + (f" to {max(bands):.4g} Hz, by the column" if max(bands) > min(bands) else "")
+            + "; modes.max_frequency chooses another end."
+        )
+    for check in checks:
+        if not check.agrees:
+            said.append(
+                f"At {plan.x.parameter} = {check.x:.6g}, {plan.y.parameter} = {check.y:.6g} the full pencil "
+                f"differs by {check.error:.1e}."
+            )
+    frequencies = [s.verdict.frequency for c in solved for row in c.samples.values() for s in row]
+    outside = outside_band(plan.case, frequencies)
+    return said if outside is None else [*said, outside]
+
+
+def _variants(plan: MapPlan) -> Iterator[tuple[str, list[int]]]:
+    """Parts of the class of the equilibria, then of each other one, with the beginning of a sentence about it."""
+    laws = len(plan.laws)
+    yield "", list(range(laws))
+    for part, motion in enumerate(plan.classes[1:], laws):
+        yield f"In class {motion.name}: ", [part]
+
+
+# -- storage
+# ----
+
+COLUMNS, ONSETS = "columns", "onsets"
+_COLUMNS = (
+    Column("value", "SI", "Value of the parameter across that the cells of this column share"),
+    Column("level", "", "0 on the grid, more for columns put between its own", "i8"),
+    Column(
+        "sample_count", "", "Its rows in the table of samples, part by part; none of a gap, whose note says why", "i8"
+    ),
+    Column("onset_count", "", "Its rows in the table of onsets", "i8"),
+    Column("error", "", "Largest estimated relative error of a leading eigenvalue"),
+    Column("seconds", "s", "Processor time"),
+)
+_ONSETS = (
+    Column("law", "", "Number of the continuity law", "i8"),
+    Column("along", "SI", "Where a mode is neutral"),
+    Column("frequency", "Hz", "Its frequency"),
+    Column("direction", "", "+1 where the mode becomes unstable along the column, -1 where it ceases to be", "i8"),
+    Column("residual", "", "Growth rate over the size of the eigenvalue that the full matrices leave there"),
+)
+_GAP, _CURVES, _CHECKS = "gap", "curves", "checks"
+
+
+def tables_of(_mesh: MeshData | None) -> tuple[TableSpec, ...]:
+    """Tables of a map. Curves and checks are notes."""
+    return SAMPLE_TABLE, TableSpec(COLUMNS, _COLUMNS), TableSpec(ONSETS, _ONSETS), cycles.SPEC
+
+
+class KeepColumns(Observer):
+    """Keeps every column as soon as it is finished, and says which are gaps.
+
+    Parameters
+    ----------
+    record : GrowingRecord
+    plan : MapPlan
+    """
+
+    def __init__(self, record: GrowingRecord, plan: MapPlan):
+        self.record, self.plan = record, plan
+
+    def item(self, result: object) -> None:
+        if isinstance(result, MapColumn):
+            keep_column(self.record, result)
+            if result.failure:
+                self.record.fail(gap_sentence(self.plan, result))
+
+
+def gap_sentence(plan: MapPlan, column: MapColumn) -> str:
+    """Why there is no column."""
+    return f"{plan.across.parameter} = {column.value:.6g}: {column.failure}"
+
+
+def keep_column(record: GrowingRecord, column: MapColumn) -> None:
+    """Keep a column; its samples and onsets go first, so that its row vouches for them."""
+    samples = [sample for part in sorted(column.samples) for sample in column.samples[part]]
+    if samples:
+        keep_samples(record, samples)
+    if len(column.onsets):
+        record.extend(ONSETS, {c.name: values for c, values in zip(_ONSETS, column.onsets.T)})
+    if column.failure:
+        record.note(_GAP, value=column.value, level=column.level, text=column.failure)
+    own = {name: getattr(column, name) for name in ("value", "level", "error", "seconds")}
+    record.append(COLUMNS, own | {"sample_count": len(samples), "onset_count": len(column.onsets)})
+
+
+def read_columns(record: Record, plan: MapPlan) -> list[MapColumn]:
+    """Finished columns in the order they were finished in."""
+    reasons = {(note["value"], note["level"]): note["text"] for note in record.notes(_GAP)}
+    numbers = {(law, motion.name): part for part, (law, motion) in enumerate(plan.parts)}
+    samples = read_samples(record)
+    onsets = np.column_stack([record.column(ONSETS, column.name).astype(float) for column in _ONSETS])
+    found, first, onset = [], 0, 0
+    for row in record.table_rows(TableSpec(COLUMNS, _COLUMNS)):
+        cells: dict[int, list[Sample]] = {}
+        for sample in samples[first : first + row["sample_count"]]:
+            cells.setdefault(numbers[sample.key.continuity, sample.key.symmetry], []).append(sample)
+        first, onset = first + row.pop("sample_count"), onset + (own := row.pop("onset_count"))
+        reason = reasons.get((row["value"], row["level"]), "") if not cells else ""
+        found.append(MapColumn(samples=cells, onsets=onsets[onset - own : onset], failure=reason, **row))
+    return found
+
+
+def rows_to_keep(known: Record, case: Case) -> dict[str, int]:
+    """Rows that a map goes on from: samples, onsets and cycles of a column that was cut off before what vouches for
+    them are left out.
+
+    Raises
+    ------
+    CaseError
+        If the map is complete.
+    """
+    if known.complete:
+        raise nothing_to_resume("map", known.path)
+    samples, onsets = (int(known.column(COLUMNS, name).sum()) for name in ("sample_count", "onset_count"))
+    return {SAMPLES: samples, ONSETS: onsets, cycles.ROWS: cycles.vouched_rows(known, MapPlan.of(case))}
 
 
 def run(session: Session, record: GrowingRecord, workers: int | None = None) -> None:
@@ -29,24 +398,190 @@ def run(session: Session, record: GrowingRecord, workers: int | None = None) -> 
     """
     case, plan = session.case, MapPlan.of(session.case)
     walk = StabilityWalk(case, record, session.model)
-    found = run_map(
-        case,
-        Observers(KeepColumns(record, plan), record),
-        workers,
-        known_columns(record, case).values(),
-        walk,
-    )
-    if found.interrupted:
-        raise KeyboardInterrupt
-    keep_checks(record, found.checks)
-    keep_curves(record, found.curves)
-    add_classes(
-        record,
-        case.map.symmetry,
-        case.part,
-        lambda symmetry: run_map(case.replace(_PLAIN), Observer(), walk=walk.in_class(symmetry)),
-    )
-    follow_cycles(case, record, plan, list(found.columns), walk)
+    keep = Observers(KeepColumns(record, plan), record)
+    found = run_map(case, keep, workers, read_columns(record, plan), walk)
+    record.note(_CHECKS, checks=[asdict(check) for check in found.checks])
+    record.note(_CURVES, curves=[asdict(curve) for curve in found.curves])
+    cycles.follow_cycles(case, record, plan, list(found.columns), walk)
+
+
+class MapResult(StudyResult):
+    """Growth rate of the leading mode over two parameters.
+
+    Attributes
+    ----------
+    plan : MapPlan
+        Axes and continuity laws.
+    columns : tuple of MapColumn
+    curves : tuple of OnsetCurve
+    checks : tuple of Check
+    """
+
+    kind = "map"
+
+    @cached_property
+    def plan(self) -> MapPlan:
+        return MapPlan.of(self.case)
+
+    @cached_property
+    def columns(self) -> tuple[MapColumn, ...]:
+        return tuple(sorted(read_columns(self.record, self.plan), key=lambda column: column.value))
+
+    @cached_property
+    def curves(self) -> tuple[OnsetCurve, ...]:
+        notes = self.record.notes(_CURVES)
+        if not notes:  # the run goes on
+            return linked(self.plan, self.columns)
+        arrays = ({name: np.array(row[name], float) for name in ("x", "y", "frequency")} for row in notes[-1]["curves"])
+        return tuple(OnsetCurve(**row | own) for row, own in zip(notes[-1]["curves"], arrays))
+
+    @cached_property
+    def checks(self) -> tuple[Check, ...]:
+        return tuple(Check(**row) for note in self.record.notes(_CHECKS)[-1:] for row in note["checks"])
+
+    @property
+    def failures(self) -> tuple[str, ...]:
+        return tuple(gap_sentence(self.plan, column) for column in self.columns if column.failure)
+
+    def grid(self, name: str) -> np.ndarray:
+        """A quantity of the cells on the grid (laws, y, x); see `Sample.number`."""
+        return grid_of(self.plan, self.columns, name, range(len(self.plan.laws)))
+
+    def cycle_grid(self, name: str) -> np.ndarray:
+        """amplitude, frequency or growing of the limit cycles on the grid (laws, y, x); see
+        `dbvfiv.studies.map.cycles`.
+        """
+        return cycles.cycle_grid(self.record, self.plan, name)
+
+    @property
+    def moved(self) -> tuple[str, ...]:
+        """Parameters that are not the same all over the map."""
+        laws = ("storage",) if len(self.plan.laws) > 1 else ()
+        return (self.plan.x.parameter, self.plan.y.parameter, *laws)
+
+    def summary(self) -> dict[str, Any]:
+        pictures = [self._picture(i) for i in range(len(self.plan.laws))]
+        shared = {
+            "x": _axis(self.plan.x),
+            "y": _axis(self.plan.y),
+            "fixed": fixed_conditions(self.case, *self.moved),
+            "checks": [asdict(check) for check in self.checks],
+            "gaps": list(self.failures),
+            "warnings": list(self.warnings),
+            "interrupted": not self.complete,
+        }
+        document = shared | pictures[0] | {"classes": self.classes}
+        if len(pictures) > 1:
+            document["laws"] = pictures
+        return document
+
+    @cached_property
+    def classes(self) -> list[dict[str, Any]]:
+        """Cells in the other classes of motion, where they were asked for, (y, x) each."""
+        found = []
+        for part, motion in enumerate(self.plan.classes[1:], len(self.plan.laws)):
+            table = {key: grid_of(self.plan, self.columns, name, [part])[0].tolist() for key, name in _CELLS.items()}
+            certified = [[bool(cell) for cell in row] for row in table["certified"]]
+            found.append({"symmetry": motion.name, "motion": motion.words} | table | {"certified": certified})
+        return found
+
+    def _picture(self, law: int) -> dict[str, Any]:
+        leading = {"leading": self._leading(law)} if self.classes else {}
+        followed = cycles.summary_of(self.record, self.plan, law) if self.case.map.cycles else {}
+        mine = [curve for curve in self.curves if curve.law == law]
+        return (
+            {key: self.grid(name)[law].tolist() for key, name in _CELLS.items()}
+            | {
+                "continuity": LAWS.get(self.plan.laws[law], self.plan.laws[law]),
+                "certified": self.grid("certified")[law].astype(bool).tolist(),
+                "verdict": self._verdicts(law),
+                "onset_curves": [curve.points() for curve in mine],
+                "onset_frequencies": [curve.frequency.tolist() for curve in mine],
+                "onset_curves_exact": [bool(curve.exact) for curve in mine],
+            }
+            | leading
+            | followed
+        )
+
+    def _leading(self, law: int) -> dict[str, Any]:
+        """Growth rate, frequency and class of the most unstable motion in each cell, (y, x)."""
+        names = [motion.name for motion in self.plan.classes]
+        rates, frequencies = (
+            np.stack([self.grid(name)[law], *(np.array(note[name], float) for note in self.classes)])
+            for name in ("growth_rate", "frequency")
+        )
+        return leading_class(names, rates, frequencies)
+
+    def shortfall(self) -> str | None:
+        gaps = len(self.failures)
+        return f"{gaps} of {len(self.columns)} columns were not reached" if gaps else None
+
+    def drawers(self) -> Iterator[tuple[str, Callable[[], Figure]]]:
+        yield from figures.draw(self)
+
+    def lines(self) -> list[str]:
+        lines = [f"At {describe_fixed(self.case, *self.moved)}:"]
+        for i in range(len(self.plan.laws)):
+            lines.append(self._cells_line(i))
+            lines += [self._curve_line(curve) for curve in self.curves if curve.law == i]
+            if self.case.map.cycles:
+                lines += cycles.sentences(self.record, self.plan, i)
+        lines += [self._class_line(note) for note in self.classes]
+        if self.checks:
+            worst = max(check.error for check in self.checks)
+            agreeing = sum(check.agrees for check in self.checks)
+            lines.append(
+                f"{agreeing} of {len(self.checks)} cells solved again with the full pencil agree; largest "
+                f"difference {worst:.1e}."
+            )
+        return lines
+
+    def _cells_line(self, law: int) -> str:
+        certified, how, outcome = (self.grid(name)[law] for name in ("certified", "how", "outcome"))
+        number = {name: int((outcome == i).sum()) for i, name in enumerate(OUTCOMES)}
+        unstable, invalid = number[FLUTTERS] + number[DIVERGES], number[NOT_VALID]
+        gaps, direct = int((how == MISSING).sum()) - invalid, int((how == DIRECT).sum())
+        name = LAWS.get(self.plan.laws[law], f"blend {self.plan.laws[law]:g}")
+        return (
+            f"{name}: {how.shape[1]} x {how.shape[0]} cells, {unstable} unstable, {number[STABLE]} stable, "
+            f"{int(certified.sum())} of {how.size} certified"
+            + (f", {number[DIVERGES]} of the unstable ones diverge" if number[DIVERGES] else "")
+            + (f", {invalid} not valid" if invalid else "")
+            + (f", {direct} solved directly" if direct else "")
+            + (f", {gaps} in gaps" if gaps else "")
+            + "."
+        )
+
+    def _verdicts(self, law: int) -> list[list[dict[str, Any]]]:
+        """Verdicts on the cells of the grid, (y, x)."""
+        found = {column.value: column for column in self.columns if column.level == 0}
+        gap = Verdict.undecided("The column of this cell was not solved.").summary()
+        table = [
+            [found[across].verdict(law, i).summary() if across in found else gap for across in self.plan.across.values]
+            for i in range(len(self.plan.along.values))
+        ]
+        return [list(row) for row in zip(*table)] if self.plan.transposed else table
+
+    @staticmethod
+    def _class_line(note: dict[str, Any]) -> str:
+        unstable, certified = np.array(note["unstable_count"]), np.array(note["certified"], bool)
+        return (
+            f"class {note['symmetry']} ({note['motion']}): {int(((unstable > 0) & certified).sum())} cells unstable, "
+            f"{int(((unstable == 0) & certified).sum())} stable, {int(certified.sum())} of {unstable.size} certified."
+        )
+
+    def _curve_line(self, curve: OnsetCurve) -> str:
+        kind = "exact" if curve.exact else "not exact"
+        return (
+            f"  onset curve, {kind}, {len(curve.x)} points: {self.plan.x.parameter} "
+            f"{min(curve.x):.6g} to {max(curve.x):.6g}, "
+            f"{self.plan.y.parameter} {min(curve.y):.6g} to {max(curve.y):.6g}, "
+            f"{min(curve.frequency):.4g} to {max(curve.frequency):.4g} Hz"
+        )
+
+
+def _axis(axis) -> dict[str, Any]:
+    return {"parameter": axis.parameter, "values": list(axis.values), "log": axis.log}
 
 
 STUDY = Study("map", tables_of, run, MapResult, rows_to_keep=rows_to_keep)

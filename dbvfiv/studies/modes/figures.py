@@ -32,7 +32,7 @@ from ...errors import CaseError
 from ...model.symmetry import symmetry_named
 from ..result import StudyResult
 from ..state import State
-from .mode import Certificate, ModeShape
+from .search import Certificate, ModeShape
 
 _RATIOS = (0.02, 0.05, 0.1, 0.2, 0.4, 0.7)
 

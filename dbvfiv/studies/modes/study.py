@@ -1,172 +1,376 @@
-"""Run of the modes study: finds leading modes of a steady state and keeps them in a record."""
+"""Leading modes of one state: run, storage, what can be read off it, and fields for ParaView."""
 
 from __future__ import annotations
 
-from dataclasses import replace
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from pathlib import Path
+from typing import Any
 
 import numpy as np
-from scipy.optimize import brentq
+from matplotlib.figure import Figure
 
-from ...case.parameters import PARAMETERS, Mu
+from ...case.parameters import Mu
 from ...errors import CaseError, NotValidError, SolveError
-from ...model.state import SteadyState
-from ...model.symmetry import EQUILIBRIA, Symmetry, asks_for_equilibria, chosen_symmetries
-from ...record.record import GrowingRecord
-from ...record.states import state_row
+from ...model.symmetry import asks_for_equilibria, symmetry_named
+from ...record.mesh import MeshData, WholeValve
+from ...record.record import GrowingRecord, Record
+from ...record.states import state_row, state_table
+from ...record.table import TableSpec
+from ...record.vtkhdf import Step, motion
 from ..case import Case
-from ..session import Session
-from ..stability.dimensions import LAW, STORAGE, other_law, require_two_laws
-from ..stability.place import condition_of
-from ..stability.verdict import FLUTTERS, STABLE, Verdict, oscillates
+from ..result import StudyResult
+from ..session import Session, describe_surroundings
+from ..stability.dimensions import Variant, compare_states, own_variant, variants
+from ..stability.verdict import Verdict
 from ..stability.walk import StabilityWalk
-from ..study import Study
-from .mode import CURVE, Certificate, law_note, rows_of
-from .result import COUNT, COUNTED, MODES, REFUSAL, STATE, ModesResult, tables_of
-from .run import ModesOptions, run_modes
+from ..state import State, states_of
+from ..study import Study, nothing_to_resume
+from . import figures
+from .figures import animate_mode
+from .search import CURVE, MODE, Certificate, FoundModes, ModeShape, ModesOptions, critical_damping_factor, run_modes
 
-#: Factors asked, from that of the case outwards; below a twentieth a wall is as good as undamped.
-LOWER, HIGHER = np.geomspace(1.0, 0.05, 9), np.geomspace(1.0, 10.0, 7)
-#: Relative accuracy of the factor.
-ACCURACY = 1e-4
+STATE, MODES, COUNT = "state", "modes", "count"
+#: Kinds of notes: on a variant whose rows are all there, and why the constants of the rubber do not hold at the state.
+_FOUND, _REFUSAL = "certificate", "not valid"
+HEAD = (
+    "  mode   growth rate    frequency   damping ratio   residual",
+    "                 1/s           Hz",
+)
+
+
+def tables_of(mesh: MeshData) -> tuple[TableSpec, TableSpec, TableSpec]:
+    """Tables of a result on a mesh: the state, its modes, and the curve of the independent count."""
+    stations = len(mesh.z)
+    row_shapes = {"shape": mesh.nodal_shape, "area": (stations,), "pressure": (stations,)}
+    return state_table(STATE, mesh), TableSpec(MODES, MODE, row_shapes, chunk=8), TableSpec(COUNT, CURVE)
 
 
 def run(session: Session, record: GrowingRecord) -> None:
-    """Leading modes of the steady state at drive.pressure, under both continuity laws where that is asked for."""
-    case = session.case
-    both = case.modes.continuity == "both"
-    if both:
-        require_two_laws(case, "modes", "modes.in_vacuo leaves the fluid out" if case.modes.in_vacuo else "")
-        _require_one_class(case)
-    if record.notes(REFUSAL):
+    """Leading modes of the steady state at drive.pressure, in every variant asked for."""
+    case, model, options = session.case, session.model, ModesOptions.of(session.case)
+    asked = variants(case, "modes")
+    missing = [variant for variant in asked if variant not in _notes(record)]
+    if record.notes(_REFUSAL) or not missing:
         return
-    done = {note.get("symmetry", EQUILIBRIA) for note in record.notes("certificate")}
-    chosen = chosen_symmetries(case.modes.symmetry, case.part)
-    missing = [symmetry for symmetry in chosen if symmetry.name not in done]
-    further = both and not record.notes(LAW)
-    if not (missing or further):
-        return
-    state = session.equilibrium(record)
-    try:
-        for symmetry in missing:
-            _keep(session, record, state, symmetry)
-    except NotValidError as error:
-        if not record.rows(STATE):
-            record.append(STATE, state_row(session.model, state))
-        record.note(REFUSAL, text=str(error))
-        return
-    if further:
-        law = other_law(case)
-        mu = Mu.of(session.model.case).at(storage=float(law == STORAGE))
-        found = run_modes(session.model, state, mu, options=ModesOptions.of(case), observer=record)
-        record.note(LAW, **law_note(found, law))
+    state, place = session.equilibrium(record), Mu.of(model.case)
+    if not record.rows(STATE):
+        record.append(STATE, state_row(model, state))
+    walk = StabilityWalk(model.case, model=model)
+    walk.give(place, state)
+    record.begin("modes", len(missing))
+    for variant in missing:
+        here, own = place.at(storage=variant.storage), walk.in_class(variant.motion)
+        try:
+            found = run_modes(model, state, here, options, record, variant.motion, own)
+        except NotValidError as error:
+            record.note(_REFUSAL, text=str(error))
+            return
+        if variant == own_variant(case) and not options.in_vacuo:
+            record.progress("critical damping factor")
+            try:
+                factor = critical_damping_factor(own, here, found.verdict)
+            except SolveError:
+                factor = np.nan
+            found = replace(found, verdict=replace(found.verdict, critical_damping_factor=factor))
+        _keep(record, variant, found)
 
 
-def _require_one_class(case: Case) -> None:
-    """Refuse to compare laws where they do not differ.
+def _keep(record: GrowingRecord, variant: Variant, found: FoundModes) -> None:
+    """Keep what was found in a variant; its note vouches for its rows."""
+    for mode in found.modes:
+        record.append(MODES, vars(mode) | variant.row)
+    curve = {name: getattr(found.certificate, name) for name in ("frequency", "phase")}
+    own = {name: np.full(len(found.certificate.phase), value) for name, value in variant.row.items()}
+    record.extend(COUNT, curve | own)
+    for sentence in found.notes:
+        if sentence not in {note["text"] for note in record.notes("remark")}:
+            record.note("remark", text=sentence)
+    verdict = found.verdict.summary()
+    record.note(_FOUND, variant=list(variant), certificate=found.certificate.note(), verdict=verdict)
+
+
+def _notes(record: Record) -> dict[Variant, dict[str, Any]]:
+    return {Variant(*note["variant"]): note for note in record.notes(_FOUND)}
+
+
+def _rows(record: Record, table: str, variant: Variant) -> np.ndarray:
+    """Numbers of the rows of a variant."""
+    same = [record.column(table, name) == value for name, value in variant.row.items()]
+    return np.flatnonzero(same[0] & same[1])
+
+
+def rows_to_keep(known: Record, case: Case) -> dict[str, int]:
+    """Rows of the variants that were found; of one that was cut off the rows are found again.
 
     Raises
     ------
     CaseError
+        If the run is complete.
     """
-    if not asks_for_equilibria(case.modes.symmetry):
-        raise CaseError(
-            f"modes.continuity is given as 'both' with modes.symmetry = {case.modes.symmetry!r}, but the laws differ "
-            f"in class {EQUILIBRIA} alone, since no other motion changes areas; modes.symmetry must be {EQUILIBRIA!r} "
-            "then.",
-            key="modes.continuity",
-        )
+    if known.complete:
+        raise nothing_to_resume("modes", known.path)
+    found = _notes(known)
+    return {table: sum(len(_rows(known, table, variant)) for variant in found) for table in (MODES, COUNT)}
 
 
-def _keep(session: Session, record: GrowingRecord, state: SteadyState, symmetry: Symmetry) -> None:
-    """Modes of a class under the case's own law; rows that an interrupted attempt kept of it stay."""
-    model = session.model
-    found = run_modes(model, state, options=ModesOptions.of(session.case), observer=record, symmetry=symmetry)
-    before = record.notes("certificate")
-    modes, points = (sum(note.get(name, record.rows(table)) for note in before) for name, table in COUNTED)
-    if not record.rows(STATE):
-        record.append(STATE, state_row(model, state))
-    rows = rows_of(found)
-    for row in rows[record.rows(MODES) - modes :]:
-        record.append(MODES, row)
-    said = {note["text"] for note in record.notes("remark")}
-    for sentence in found.notes:
-        if sentence not in said:
-            record.note("remark", text=sentence)
-    certificate = Certificate.of(found)
-    if record.rows(COUNT) == points:
-        record.extend(COUNT, {column.name: getattr(certificate, column.name) for column in CURVE})
-    verdict = found.verdict
-    if symmetry.of_equilibria and not found.in_vacuo:
-        record.progress("critical damping factor")
-        verdict = replace(verdict, critical_damping_factor=_critical_factor(session, state, verdict))
-    record.note(
-        "certificate",
-        **certificate.note(),
-        verdict=verdict.summary(),
-        symmetry=symmetry.name,
-        modes=len(rows),
-        points=len(certificate.frequency),
-    )
+@dataclass(frozen=True)
+class _ModeSteps(Sequence):
+    """Modes as steps, made one at a time; "time" is the number of the mode."""
+
+    result: StudyResult
+    valve: WholeValve
+
+    def __len__(self) -> int:
+        return len(self.result.modes)
+
+    def __getitem__(self, number):
+        mode, valve, mesh = self.result.modes[number], self.valve, self.result.mesh
+        shape, parity = mode.shape[:, :3], symmetry_named(mode.symmetry).parity(valve.sign)[:, None]
+        points = motion(mesh, valve, self.result.state.nodal) | {
+            "mode_real": valve.vectors(shape.real) * parity,
+            "mode_imag": valve.vectors(shape.imag) * parity,
+            "mode_amplitude": mode.amplitude[valve.node],
+        }
+        ones = np.ones(len(valve.quads))
+        cells = {
+            "thickness": valve.cells(mesh.thickness),
+            "growth_rate": mode.growth_rate * ones,
+            "frequency": mode.frequency * ones,
+        }
+        return Step(float(mode.number), points, cells)
 
 
-def _critical_factor(session: Session, state: SteadyState, verdict: Verdict) -> float:
-    """Factor on the damping of the wall at which flutter begins; NaN where the search for it fails."""
-    place = Mu.of(session.case)
-    walk = StabilityWalk(session.case, model=session.model)
-    walk.give(place, state.q)
-    try:
-        return critical_damping_factor(walk, place, verdict)
-    except SolveError:
-        return np.nan
+@dataclass(frozen=True)
+class _CycleSteps(Sequence):
+    """Phases of one cycle as steps, the first repeated at the end; "time" is time in s, or the share of a cycle where
+    nothing oscillates.
+    """
+
+    result: StudyResult
+    valve: WholeValve
+    mode: ModeShape
+    phases: int
+
+    def __len__(self) -> int:
+        return self.phases + 1
+
+    def __getitem__(self, number):
+        share = range(self.phases + 1)[number] / self.phases
+        mode, state, mesh = self.mode, self.result.state, self.result.mesh
+        moved = mode.at_phase(2 * np.pi * share) * mode.drawn_amplitude(state)
+        parity = symmetry_named(mode.symmetry).parity(self.valve.sign)[:, None]
+        points = motion(mesh, self.valve, state.nodal + moved)
+        if np.any(parity < 0):
+            opposite = motion(mesh, self.valve, state.nodal - moved)
+            points = {name: np.where(parity < 0, opposite[name], field) for name, field in points.items()}
+        points |= {"oscillation": self.valve.vectors(moved[:, :3]) * parity}
+        value = share / mode.frequency if mode.frequency > 0 else share
+        return Step(value, points, {"thickness": self.valve.cells(mesh.thickness)})
 
 
-def critical_damping_factor(walk: StabilityWalk, place: Mu, verdict: Verdict) -> float:
-    """Factor on the loss factors, or on beta, at which flutter begins, next to 1.
+class ModesResult(StudyResult):
+    """Leading modes, by falling growth rate.
 
-    It lies below 1 where the state is stable and above where it flutters.
-
-    Parameters
+    Attributes
     ----------
-    walk : StabilityWalk
-    place : Mu
-    verdict : Verdict
-        On the place.
+    modes : tuple of ModeShape
+    state : State
+        The equilibrium they belong to.
+    certificate : Certificate or None
+    stable : bool or None
+    notes : tuple of str
+        What the search and its certificate have to say.
 
-    Returns
-    -------
-    float
-        NaN where the wall has no such damping, the verdict is another, or no factor in reach makes the difference.
-
-    Raises
-    ------
-    SolveError
-        If there is no steady state.
+    Examples
+    --------
+    >>> modes = dbvfiv.load().steady(pressure="6 kPa").modes(density=10)    # doctest: +SKIP
+    >>> modes.modes[0].growth_rate, modes.modes[0].frequency, modes.stable  # doctest: +SKIP
     """
-    name = "loss_factor" if place.loss_factor > 0 else "beta"
-    own = place[name]
-    if own <= 0 or verdict.outcome not in (STABLE, FLUTTERS):
-        return np.nan
-    factors = LOWER if verdict.outcome == STABLE else HIGHER
-    factors = factors[own * factors <= PARAMETERS[name].high]
-    places = [place.at(**{name: own * factor}) for factor in factors]
-    column = walk.column(places, len(places), edges=True)
 
-    def growth(values) -> float:
-        values = np.asarray(values)
-        modes = values[oscillates(values)]
-        return float(modes.real.max()) if modes.size else np.nan
+    kind = "modes"
 
-    def at(factor: float) -> float:
-        return growth(column.eigenvalues(condition_of(place.at(**{name: own * factor}))))
+    @cached_property
+    def found(self) -> dict[Variant, FoundModes]:
+        """Modes of each variant that was searched."""
+        (_, table, _) = tables_of(self.mesh)
+        rows, found = self.record.table_rows(table), {}
+        for variant, note in _notes(self.record).items():
+            own = ({k: v for k, v in rows[i].items() if k != "continuity"} for i in _rows(self.record, MODES, variant))
+            shapes = (ModeShape(number=n, **row | {"symmetry": variant.symmetry}) for n, row in enumerate(own, 1))
+            points = _rows(self.record, COUNT, variant)
+            curve = {name: self.record.column(COUNT, name)[points] for name in ("frequency", "phase")}
+            certificate = Certificate(**note["certificate"], **curve)
+            found[variant] = FoundModes(tuple(shapes), certificate, Verdict.read(note["verdict"]))
+        return found
 
-    rates = [growth(row) for row in column.leading]
-    for a, b, low, high in zip(factors[:-1], factors[1:], rates[:-1], rates[1:]):
-        if not (np.isfinite(low) and np.isfinite(high)):
-            return np.nan
-        if low * high <= 0:
-            found = brentq(at, min(a, b), max(a, b), rtol=ACCURACY) if column.eigenvalues else np.nan
-            return float(f"{found:.8g}")  # rounding of factorisations would part a resumed run from a whole one
-    return np.nan
+    @cached_property
+    def _classes(self) -> dict[str, FoundModes]:
+        """Modes of each class under the flow model of the case, by its name."""
+        law = self.case.fluid.continuity
+        return {variant.symmetry: found for variant, found in self.found.items() if variant.continuity == law}
+
+    @cached_property
+    def modes(self) -> tuple[ModeShape, ...]:
+        every = [mode for found in self._classes.values() for mode in found.modes]
+        if len(self._classes) > 1:
+            every.sort(key=lambda mode: (-mode.growth_rate, mode.angular_frequency))
+        return tuple(replace(mode, number=n) for n, mode in enumerate(every, 1))
+
+    @property
+    def certificates(self) -> dict[str, Certificate]:
+        """One for each class of motion that was searched, by its name."""
+        return {name: found.certificate for name, found in self._classes.items()}
+
+    @cached_property
+    def certificate(self) -> Certificate | None:
+        """Certificate of all classes searched; None if the run ended before it had one."""
+        return Certificate.joined(self.certificates) if self.certificates else None
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        return tuple(note["text"] for note in self.record.notes("remark"))
+
+    @cached_property
+    def verdict(self) -> Verdict:
+        """Stability of the state in all symmetry classes that were searched."""
+        refusals = self.record.notes(_REFUSAL)
+        if refusals:
+            return Verdict.not_valid(refusals[-1]["text"])
+        if not self._classes:
+            return Verdict.undecided("The run ended before its modes were found.")
+        return Verdict.joined({name: found.verdict for name, found in self._classes.items()})
+
+    @property
+    def stable(self) -> bool | None:
+        return self.verdict.stable
+
+    @property
+    def sentence(self) -> str:
+        """The verdict in a sentence for people, which names the continuity law and what is outside."""
+        return self.verdict.sentence(self.law)
+
+    @property
+    def law(self) -> str:
+        """Conditions of a verdict, in words: continuity law and fluid outside; in vacuo the latter alone."""
+        case = self.case
+        return case.outside.words if case.modes.in_vacuo or not case.continuity else f"under {case.continuity}"
+
+    @cached_property
+    def other_law(self) -> tuple[str, FoundModes] | None:
+        """The other continuity law, and the modes of the same state under it; None where that was not asked for."""
+        law = self.case.fluid.continuity
+        return next(((v.continuity, found) for v, found in self.found.items() if v.continuity != law), None)
+
+    @property
+    def comparison(self) -> str | None:
+        """One sentence on what both laws say; None where one was asked."""
+        if self.other_law is None:
+            return None
+        law, found = self.other_law
+        return compare_states(self.case.fluid.continuity, self.stable, law, found.stable)
+
+    @cached_property
+    def state(self) -> State:
+        """The equilibrium, with its layers and figures."""
+        return states_of(self, STATE)[0]
+
+    def mode(self, number: int) -> ModeShape:
+        """A mode by its number, from 1.
+
+        Raises
+        ------
+        CaseError
+        """
+        if not 1 <= number <= len(self.modes):
+            raise CaseError(
+                f"There is no mode {number} in the {self.kind} result of {self.header.name!r}; it has "
+                f"{len(self.modes)}."
+            )
+        return self.modes[number - 1]
+
+    def summary(self) -> dict[str, Any]:
+        if self.certificate is None:
+            surroundings = describe_surroundings(self.case)
+            return {
+                "state": self.state.summary() | surroundings if self.record.rows(STATE) else None,
+                "modes": [],
+                "unstable_count": None,
+                "unstable_count_independent": None,
+                "stable": None,
+                "verdict": self.verdict.summary(),
+                "warnings": list(self.warnings),
+            }
+        both = {}
+        if self.other_law:
+            law, found = self.other_law
+            more = {"modes": [mode.summary() for mode in found.modes], "verdict": found.verdict.summary()}
+            both = {"other_law": {"continuity": law} | found.summary() | more, "comparison": self.comparison}
+        return {
+            "state": self.state.summary() | describe_surroundings(self.case) | {"in_vacuo": self.case.modes.in_vacuo},
+            "modes": [mode.summary() for mode in self.modes],
+            "unstable_count": self.certificate.unstable_count,
+            "unstable_count_independent": self.certificate.unstable_count_independent,
+            "stable": self.stable,
+            "verdict": self.verdict.summary(),
+            "certificate": self.certificate.summary(),
+            "classes": [
+                {"symmetry": name, "motion": symmetry_named(name).words} | found.summary()
+                for name, found in self._classes.items()
+            ],
+            "notes": list(self.notes),
+            "warnings": list(self.warnings),
+        } | both
+
+    def lines(self) -> list[str]:
+        if self.certificate is None:
+            return [self.sentence]
+        rows = [
+            f"{m.number:6d}{m.growth_rate:14.4f}{m.frequency:13.4f}{m.damping_ratio:16.4f}{m.residual:11.1e}"
+            for m in self.modes
+        ]
+        head, notes = HEAD, [f"Note: {note}" for note in self.notes]
+        if not asks_for_equilibria(self.case.modes.symmetry):
+            head = (f"{HEAD[0]}   class", HEAD[1])
+            rows = [f"{row}{mode.symmetry:>8}" for row, mode in zip(rows, self.modes)]
+            words = ", ".join(f"{name}: {symmetry_named(name).words}" for name in self.certificates)
+            notes = [f"Classes: {words}.", *notes]
+        if self.other_law is None:
+            return [*head, *rows, "", self.sentence, *notes]
+        law, other = self.other_law
+        table = side_by_side(self.case.fluid.continuity, self.modes, law, other.modes)
+        sentence = other.verdict.sentence(f"under {law} continuity {self.case.outside.words}".rstrip())
+        return [*table, "", self.sentence, sentence, self.comparison, *notes]
+
+    def steps(self, valve: WholeValve, mode: int | None = None, phases: int = 24) -> Sequence[Step]:
+        """The modes one after the other, or one cycle of one of them."""
+        return _ModeSteps(self, valve) if mode is None else _CycleSteps(self, valve, self.mode(mode), phases)
+
+    def drawers(self, mode: int | None = None) -> Iterator[tuple[str, Callable[[], Figure]]]:
+        """Eigenvalues, shapes, centre lines and the independent count; of one mode alone if it is named."""
+        if self.certificate is None:
+            return
+        yield from figures.draw(self, mode)
+
+    def animate(self, path: str | Path, mode: int = 1, frames: int = 24) -> Path:
+        """Write a GIF of one cycle of a mode."""
+        return animate_mode(self, self.mode(mode), path, frames)
 
 
-STUDY = Study("modes", tables_of, run, ModesResult)
+def side_by_side(own: str, modes: Sequence[ModeShape], law: str, others: Sequence[ModeShape]) -> list[str]:
+    """Table of the modes under both laws, each by falling growth rate."""
+    lines = [
+        f"{'':6}{own:>40}{law:>40}",
+        f"{'mode':>6}" + 2 * f"{'1/s':>14}{'Hz':>13}{'damping':>13}",
+    ]
+    for i in range(max(len(modes), len(others))):
+        lines.append(f"{i + 1:6d}" + "".join(_cells(found[i : i + 1]) for found in (modes, others)))
+    return lines
+
+
+def _cells(modes: Sequence[ModeShape]) -> str:
+    return "".join(f"{m.growth_rate:14.4f}{m.frequency:13.4f}{m.damping_ratio:13.4f}" for m in modes) or " " * 40
+
+
+STUDY = Study("modes", tables_of, run, ModesResult, rows_to_keep=rows_to_keep)

@@ -1,19 +1,21 @@
-"""Samples and onsets along a parameter line, and the stretches between them that are known to be stable or unstable."""
+"""Onsets found along a parameter line, and the stretches between them that are known to be stable or unstable."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ...model.symmetry import EQUILIBRIA
-from ..case import Case
-from ..stability.crossings import WATCHED
+from ..stability.dimensions import Variant
+from ..stability.samples import WATCHED, Sample
 from ..stability.verdict import Verdict
-from .point import OnsetPoint, OnsetSample
+
+if TYPE_CHECKING:
+    from .search import OnsetPoint
 
 Interval = tuple[float, float]
 
@@ -23,19 +25,26 @@ BESIDE = 1e-7
 _SLIVER = 1e-6
 
 
-class StabilityLine:
-    """Numbers of a scan, which whoever derives gives as `samples` and `edges`.
+@dataclass(frozen=True)
+class FoundOnsets:
+    """Onsets along one parameter in one variant, and the scan that found them.
 
     Attributes
     ----------
-    samples : tuple of OnsetSample
+    variant : Variant
+        Flow model and symmetry class.
+    samples : tuple of Sample
         In ascending order of the parameter, those of narrow tongues included.
-    edges : tuple of float
-        Onsets at which the state changes between stable and unstable.
+    points : tuple of OnsetPoint
+        In ascending order of the parameter.
+    failures, warnings : tuples of str
     """
 
-    samples: tuple[OnsetSample, ...]
-    edges: tuple[float, ...]
+    variant: Variant
+    samples: tuple[Sample, ...]
+    points: tuple[OnsetPoint, ...]
+    failures: tuple[str, ...] = ()
+    warnings: tuple[str, ...] = ()
 
     @cached_property
     def values(self) -> np.ndarray:
@@ -46,7 +55,8 @@ class StabilityLine:
     def _modes(self) -> np.ndarray:
         table = np.full((len(self.samples), WATCHED), complex(np.nan, np.nan))
         for row, sample in zip(table, self.samples):
-            row[: len(sample.eigenvalues)] = sample.eigenvalues
+            kept = sample.eigenvalues[:WATCHED]
+            row[: len(kept)] = kept
         return table
 
     @property
@@ -62,29 +72,33 @@ class StabilityLine:
     @cached_property
     def certified(self) -> np.ndarray:
         """(s,) bool, whether an independent count of the unstable modes agrees; nothing is claimed beside others."""
-        return np.array([sample.certified for sample in self.samples], bool)
+        return np.array([sample.certified or False for sample in self.samples], bool)
 
     @property
     def verdicts(self) -> tuple[Verdict, ...]:
-        """Verdicts on the values of the scan, in one symmetry class."""
+        """Verdicts on the values of the scan."""
         return tuple(sample.verdict for sample in self.samples)
+
+    def _known(self, unstable: bool) -> list[Interval]:
+        edges = [point.value for point in self.points if point.edge]
+        return known_intervals(self.values, self.growth_rates[:, 0], self.certified, edges, unstable)
 
     @property
     def unstable_intervals(self) -> list[Interval]:
         """Intervals of the scanned range in which the state is known to be unstable."""
-        return known_intervals(self.values, self.growth_rates[:, 0], self.certified, self.edges, True)
+        return self._known(True)
 
     @property
     def stable_intervals(self) -> list[Interval]:
         """Intervals of the scanned range in which the state is known to be stable."""
-        return known_intervals(self.values, self.growth_rates[:, 0], self.certified, self.edges, False)
+        return self._known(False)
 
     @property
     def uncertain_intervals(self) -> list[Interval]:
         """Intervals of the scanned range in which neither stability nor instability is claimed."""
         return uncertain_intervals(self.values, self.certified)
 
-    def scan_summary(self) -> dict[str, Any]:
+    def scan(self) -> dict[str, Any]:
         """Plain numbers of the scan for JSON."""
         return {
             "values": self.values.tolist(),
@@ -94,48 +108,20 @@ class StabilityLine:
             "verdict": [verdict.summary() for verdict in self.verdicts],
         }
 
-
-@dataclass(frozen=True)
-class FoundOnsets(StabilityLine):
-    """Onsets along one parameter, and the scan that found them.
-
-    Attributes
-    ----------
-    case : Case
-    symmetry : str
-        Class of the motions.
-    samples : tuple of OnsetSample
-    points : tuple of OnsetPoint
-        In ascending order of the parameter.
-    failures, warnings : tuples of str
-    interrupted : bool
-    """
-
-    case: Case
-    symmetry: str
-    samples: tuple[OnsetSample, ...]
-    points: tuple[OnsetPoint, ...]
-    failures: tuple[str, ...] = ()
-    warnings: tuple[str, ...] = ()
-    interrupted: bool = False
-
-    @property
-    def edges(self) -> tuple[float, ...]:
-        return tuple(point.value for point in self.points if point.edge)
-
-    def note(self) -> dict[str, Any]:
-        """Note that a record keeps of another symmetry class or of the other continuity law."""
-        own = self.symmetry == EQUILIBRIA
-        named = {} if own else {"symmetry": self.symmetry}
-        further = {} if own else {"uncertain": [list(stretch) for stretch in self.uncertain_intervals]}
-        return {
+    def summary(self) -> dict[str, Any]:
+        """Plain numbers of a variant besides that of the case, for JSON."""
+        motion, own = self.variant.motion, {"continuity": self.variant.continuity}
+        named = {} if motion.of_equilibria else {"symmetry": motion.name}
+        if named:
+            own = named | {"motion": motion.words, "uncertain": [list(part) for part in self.uncertain_intervals]}
+        return own | {
             "points": [point.summary() | named for point in self.points],
-            "scan": self.scan_summary(),
+            "scan": self.scan(),
             "stable": [list(stretch) for stretch in self.stable_intervals],
             "unstable": [list(stretch) for stretch in self.unstable_intervals],
             "failures": list(self.failures),
             "warnings": list(self.warnings),
-        } | further
+        }
 
 
 def known_intervals(
@@ -219,7 +205,7 @@ def disagreements(
     own : str
         The case's law, with its `stable` and `unstable` stretches.
     other : dict
-        Note on the other law, see `FoundOnsets.note`.
+        Summary of the other law, see `FoundOnsets.summary`.
     """
     found = [(*part, own) for part in common_stretches([stable, other["unstable"]])]
     found += [(*part, other["continuity"]) for part in common_stretches([unstable, other["stable"]])]
@@ -243,7 +229,7 @@ def merge_points(
     own : iterable of dict
         Points of the class of the equilibria, with the stretches `unstable` in which that is unstable.
     classes : sequence of dict
-        Notes on the others, see `FoundOnsets.note`.
+        Summaries of the others, see `FoundOnsets.summary`.
     name : str
         Of the class of the equilibria.
     """

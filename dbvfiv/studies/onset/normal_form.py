@@ -2,36 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 
-from continuation import ContinuationError
 from continuation.normal_form import hopf_normal_form, hopf_normal_form_of
 
 from ...case.parameters import DESIGN, PARAMETERS, Mu
-from ...errors import SolveError
 from ...model.memory_forms import ValveMemoryForms
 from ...model.system import ValveSystem
 from ..case import Case
 from ..stability.place import rebuilder
 from ..stability.walk import StabilityWalk
-from .point import OnsetPoint
-
-#: What the note of a point begins with where its normal form was not found.
-MISSING = "No normal form:"
-
-
-def described(point: OnsetPoint, case: Case, walk: StabilityWalk, mode) -> OnsetPoint:
-    """A point with its criticality, by the multilinear forms of the coupled residual; with the reason in its note where
-    there is none.
-    """
-    try:
-        form = normal_form(case, walk, point.place, mode, point.parameter)
-    except (ContinuationError, SolveError, ArithmeticError, ValueError) as error:
-        return replace(point, note=f"{point.note} {MISSING} {error}".strip())
-    speed = form.crossing.real if form.crossing is not None else None
-    return replace(point, criticality=form.criticality, first_lyapunov_coefficient=form.l1, crossing_speed=speed)
 
 
 def system_of(case: Case, walk: StabilityWalk, place: Mu) -> ValveSystem:

@@ -1,36 +1,150 @@
 """Search for the onsets at which a valve loses or regains stability along one parameter: scan, location, confirmation
-on both sides, and the uncertainty that the mesh leaves, from a second, coarser one.
+on both sides, kind, and the uncertainty that the mesh leaves, from a second, coarser one.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from dataclasses import dataclass, replace
+from collections.abc import Iterable, Mapping
+from dataclasses import asdict, dataclass, fields, replace
+from typing import Any
 
 import numpy as np
 
-from eigen import Certificate
+from continuation import ContinuationError
 
 from ...case.parameters import Mu
-from ...errors import CaseError, NotValidError, SolveError
+from ...errors import SolveError
 from ...fit import outside_band
-from ...model.symmetry import EQUILIBRIA, symmetry_named
 from ...observer import Observer
 from ..case import Case
-from ..stability.crossings import WATCHED, Crossing, Sample, Scan, locate
-from ..stability.place import check_scan, condition_of, is_surrounding
-from ..stability.verdict import Verdict, not_valid_at
+from ..stability.dimensions import Variant, own_variant
+from ..stability.line import Crossing, ParameterLine
+from ..stability.place import check_scan
+from ..stability.samples import Sample, SampleKey
+from ..stability.verdict import not_valid_at
 from ..stability.walk import StabilityWalk
 from .line import FoundOnsets
-from .normal_form import MISSING, described
-from .point import COARSE, FINE, OnsetPoint, OnsetSample, Side
+from .normal_form import normal_form
 
+#: Meshes of a run: that of the case, and the coarser one for the uncertainty.
+FINE, COARSE = 0, 1
 #: Relative distance from an onset at which it is confirmed on both sides.
 ASIDE = 2e-3
 #: Largest relative difference of a mode on the small model and with the full matrices.
 SAME = 1e-3
 #: Values of a scan at which leading vectors are taken.
 SNAPSHOTS = 6
+#: What the note of a point begins with where its normal form was not found.
+MISSING = "No normal form:"
+
+
+@dataclass(frozen=True)
+class Side:
+    """Stability at a parameter value a little beside an onset, by the full model.
+
+    Attributes
+    ----------
+    value : float
+    growth_rate, frequency : float, 1/s, Hz
+        Of the crossing mode.
+    leading_growth_rate : float, 1/s
+        Of the leading mode.
+    unstable_count, unstable_count_independent : int
+        Unstable eigenvalues by the spectrum and by the argument principle.
+    """
+
+    value: float
+    growth_rate: float
+    frequency: float
+    leading_growth_rate: float
+    unstable_count: int
+    unstable_count_independent: int
+
+    @classmethod
+    def of(cls, sample: Sample, near: complex) -> Side:
+        """From a sample, with the mode next to an eigenvalue."""
+        values = sample.eigenvalues
+        mode = complex(values[int(np.argmin(np.abs(values - near)))])
+        counts = sample.unstable, sample.counted
+        return cls(sample.value, mode.real, mode.imag / (2 * np.pi), float(values[0].real), *counts)
+
+    @property
+    def eigenvalue(self) -> complex:
+        """Eigenvalue of the crossing mode, 1/s."""
+        return complex(self.growth_rate, 2 * np.pi * self.frequency)
+
+
+@dataclass(frozen=True)
+class OnsetPoint:
+    """One crossing of the imaginary axis.
+
+    Attributes
+    ----------
+    parameter : str
+    value : float
+    frequency : float, Hz
+        0 for a real eigenvalue (divergence).
+    growth_rate : float, 1/s
+        Left over at the value: how well it is located.
+    gains : bool
+        True if the mode becomes unstable as the parameter grows.
+    edge : bool
+        True if no other mode is unstable there, so that the state itself changes between stable and unstable.
+    below, above : Side
+        Direct eigenvalues on both sides.
+    confirmed : bool
+        Both sides agree with the crossing, and both counts agree on each side.
+    bracket : (2,) tuple of float
+        Neighbouring values of the scan that it lies between.
+    ahead : int
+        Modes that grow faster there.
+    criticality : str or None
+        "super", "sub" or "degenerate"; None for a real eigenvalue or where it was not asked for.
+    first_lyapunov_coefficient : float or None
+        Scaled for eigenvectors of unit norm in (q, v, U), 1/s; only its sign carries over to other scalings.
+    crossing_speed : float or None
+        Derivative of the growth rate with respect to the parameter.
+    uncertainty : float or None
+        By Richardson's rule from a second mesh, in units of the parameter.
+    coarse_value : float or None
+        The onset on the second mesh.
+    note : str
+    """
+
+    parameter: str
+    value: float
+    frequency: float
+    growth_rate: float
+    gains: bool
+    edge: bool
+    below: Side
+    above: Side
+    confirmed: bool
+    bracket: tuple[float, float]
+    ahead: int = 0
+    criticality: str | None = None
+    first_lyapunov_coefficient: float | None = None
+    crossing_speed: float | None = None
+    uncertainty: float | None = None
+    coarse_value: float | None = None
+    note: str = ""
+
+    @property
+    def key(self) -> tuple[float, float, int]:
+        """Key that identifies the crossing among those of the same scan."""
+        return (*self.bracket, self.ahead)
+
+    def summary(self) -> dict[str, Any]:
+        """Plain SI numbers for JSON; its kind is "Hopf" or "divergence"."""
+        own = asdict(self) | {"bracket": list(self.bracket), "note": self.note or None}
+        return own | {"kind": "Hopf" if self.frequency > 0 else "divergence"}
+
+    @classmethod
+    def read(cls, summary: Mapping[str, Any]) -> OnsetPoint:
+        """The point that `summary` gave."""
+        given = {field.name: summary[field.name] for field in fields(cls)}
+        sides = {name: Side(**summary[name]) for name in ("below", "above")}
+        return cls(**given | sides | {"bracket": tuple(summary["bracket"]), "note": summary["note"] or ""})
 
 
 @dataclass(frozen=True)
@@ -49,8 +163,8 @@ class OnsetOptions:
     normal_form : bool
     coarse_mesh : float
         Elements of the second mesh over those of the first; 0 for no uncertainty.
-    symmetry : str
-        Class of the motions, see `dbvfiv.model.symmetry`.
+    variant : Variant, optional
+        Flow model and symmetry class; those of the case's equilibria by default.
     """
 
     parameter: str
@@ -59,15 +173,14 @@ class OnsetOptions:
     tolerance: float = 1e-9
     normal_form: bool = True
     coarse_mesh: float = 0.5
-    symmetry: str = EQUILIBRIA
+    variant: Variant | None = None
 
     @classmethod
-    def of(cls, case: Case) -> OnsetOptions:
-        """Options of a case file."""
-        axis = case.onset.axis
-        return cls(
-            axis.parameter, axis.values, axis.log, case.onset.tolerance, case.onset.normal_form, case.onset.coarse_mesh
-        )
+    def of(cls, case: Case, variant: Variant | None = None) -> OnsetOptions:
+        """Options of a case file; cycles that leave the symmetry have normal forms of their own, not looked for."""
+        keys, axis = case.onset, case.onset.axis
+        form = keys.normal_form and (variant is None or variant.motion.of_equilibria)
+        return cls(axis.parameter, axis.values, axis.log, keys.tolerance, form, keys.coarse_mesh, variant)
 
 
 class OnsetSearch:
@@ -81,11 +194,11 @@ class OnsetSearch:
     case : Case
     options : OnsetOptions
     observer : Observer, optional
-        `item` is told of every `OnsetSample` and `OnsetPoint`; of a point again when more is known about it.
+        `item` is told of every `Sample` and `OnsetPoint`; of a point again when more is known about it.
     walk : StabilityWalk, optional
     place : Mu, optional
         The other parameters; those of the case by default.
-    known : iterable of OnsetSample and OnsetPoint
+    known : iterable of Sample and OnsetPoint
         What is not to be solved again; a later point takes the place of an earlier one. Samples of other meshes are
         left aside.
     mesh : int
@@ -99,81 +212,37 @@ class OnsetSearch:
         observer: Observer | None = None,
         walk: StabilityWalk | None = None,
         place: Mu | None = None,
-        known: Iterable[OnsetSample | OnsetPoint] = (),
+        known: Iterable[Sample | OnsetPoint] = (),
         mesh: int = FINE,
     ):
-        self.case, self.options, self.mesh = case, options, mesh
-        self.observer = observer or Observer()
-        self.walk = walk or StabilityWalk(case, self.observer, symmetry=symmetry_named(options.symmetry))
-        self.base = place or Mu.of(case)
-        known = list(known)
-        self._samples = {item.value: item for item in known if isinstance(item, OnsetSample) and item.mesh == mesh}
+        self.case, self.options, self.observer = case, options, observer or Observer()
+        variant = options.variant or own_variant(case)
+        self.walk = walk or StabilityWalk(case, self.observer, symmetry=variant.motion)
+        base, known = place or Mu.of(case), list(known)
+        if options.variant is not None and options.parameter != "storage":
+            base = base.at(storage=variant.storage)
+        ends = np.array(options.values)
+        taken = ends[np.unique(np.linspace(0, len(ends) - 1, SNAPSHOTS).astype(int))]
+        key = SampleKey(variant.storage, variant.symmetry, mesh)
+        samples = [item for item in known if isinstance(item, Sample)]
+        asked = options.parameter, taken, options.log
+        self.line = ParameterLine(
+            self.walk, base, *asked, snapshots=len(taken), key=key, known=samples, tell=self._found
+        )
+        self.scan = self.line.scan
         self._known = {item.key: item for item in known if isinstance(item, OnsetPoint)}
         self.points: dict[tuple, OnsetPoint] = {}
-        self.scan = Scan(self._scanned, options.log, inside=self._inside)
-        self._column = None
 
     def place(self, value: float) -> Mu:
-        return self.base.at(**{self.options.parameter: value})
+        """Parameter point at a value."""
+        return self.line.place(value)
 
-    # -- samples
-    # ----
-
-    def _sample(self, value: float) -> OnsetSample:
-        if value not in self._samples:
-            self._samples[value] = self._solved(value)
-            self.observer.item(self._samples[value])
-        elif not self._samples[value].failure:
-            self.walk.recall(self.place(value))
-        return self._samples[value]
-
-    def _scanned(self, value: float) -> Sample:
-        known = self._sample(value)
-        if known.failure:
-            raise SolveError(known.failure)
-        return Sample(value, known.eigenvalues, known.certified)
-
-    def _inside(self, value: float) -> Sample:
-        """A sample on the way to a crossing. Where the wall relaxes the count costs most by far, and next to a neutral
-        mode it is of no use, so it is left out there and the sample is not kept.
-        """
-        eigenvalues = None if self._column is None else self._column.eigenvalues
-        if eigenvalues is None or value in self._samples or not condition_of(self.place(value)).loss:
-            return self._scanned(value)
-        return Sample(value, eigenvalues(condition_of(self.place(value)))[:WATCHED])
-
-    def _solved(self, value: float) -> OnsetSample:
-        place = self.place(value)
-        try:
-            cell = self._cell(place)
-            verdict = self.walk.verdicts([place], cell)[0]
-        except NotValidError as error:
-            refused = Verdict.not_valid(str(error))
-            return OnsetSample(value, np.zeros(0, complex), self.mesh, str(error), verdict=refused)
-        except (SolveError, CaseError) as error:
-            return OnsetSample(value, np.zeros(0, complex), self.mesh, str(error))
-        found = cell.leading[0]
-        if len(found):
-            said = "" if verdict.certain else ", uncertain"
-            self.observer.progress(f"{self.options.parameter} = {value:.6g}: {found[0].real:.4g} 1/s{said}")
-        # as many as the scan looks at, so that a file holds all that matters
-        certified = cell.certificate(0).agrees
-        return OnsetSample(value, np.asarray(found)[:WATCHED], self.mesh, certified=certified, verdict=verdict)
-
-    def _cell(self, place: Mu):
-        """Leading eigenvalues and their certificate: on a small model where the steady state stays the same, with the
-        full pencil elsewhere.
-        """
-        if not is_surrounding(self.case, self.options.parameter):
-            return self.walk.column([place])
-        self.walk.require_valid(place)
-        if self._column is None:
-            ends = np.array(self.options.values)
-            taken = ends[np.unique(np.linspace(0, len(ends) - 1, SNAPSHOTS).astype(int))]
-            self._column = self.walk.column([self.place(v) for v in taken], len(taken))
-        if self._column.cell is None:
-            return self.walk.column([place])
-        return self._column.cell(condition_of(place))
+    def _found(self, sample: Sample) -> None:
+        self.observer.item(sample)
+        if len(sample.eigenvalues):
+            said = "" if sample.verdict.certain else ", uncertain"
+            rate = sample.eigenvalues[0].real
+            self.observer.progress(f"{self.options.parameter} = {sample.value:.6g}: {rate:.4g} 1/s{said}")
 
     def uncertainties(self) -> list[str]:
         """Sentences about what is not known: stretches of the scan without a certificate, and a band that was searched
@@ -190,20 +259,17 @@ class OnsetSearch:
                 f"Between {name} = {low:.6g} and {high:.6g} spectrum and independent count do not agree everywhere, so "
                 "nothing is claimed there."
             )
-        bands = [s.verdict.band for s in self._samples.values() if np.isfinite(s.verdict.band)]
+        bands = [s.verdict.band for s in self.line.samples.values() if np.isfinite(s.verdict.band)]
         if bands:
             said.append(f"Verdicts hold for modes up to {min(bands):.4g} Hz; modes.max_frequency chooses another end.")
         return said
 
     @property
-    def asked(self) -> list[OnsetSample]:
+    def asked(self) -> list[Sample]:
         """Samples of the scan in ascending order, with those at which the constants of the rubber do not hold."""
-        known = {s.value: s for s in self._samples.values() if not s.failure or not s.verdict.holds}
-        known = {value: s for value, s in known.items() if value in self.scan.samples or value in self.scan.failures}
+        scanned = {*self.scan.samples, *self.scan.failures}
+        known = {value: s for value, s in self.line.samples.items() if value in scanned and not s.failure}
         return [known[value] for value in sorted(known)]
-
-    # -- points
-    # ----
 
     def point(self, crossing: Crossing) -> OnsetPoint:
         """Locate, confirm and describe one crossing.
@@ -218,14 +284,15 @@ class OnsetSearch:
             point, mode = self._located(crossing)
             self._keep(point)
         else:
-            locate(self.scan, crossing, self.options.tolerance)  # only repeats known samples, which belong to the scan
+            self.line.bracket(crossing, self.options.tolerance)  # repeats known samples, which belong to the scan
             for value in (point.value, point.below.value, point.above.value):
                 self.walk.recall(self.place(value))
         if self.options.normal_form and point.frequency > 0 and point.criticality is None and MISSING not in point.note:
             self.observer.progress(f"normal form at {point.value:.6g}")
             self.points[key] = point  # an interruption does not take away what is known
-            mode = self.critical(point.place, 2j * np.pi * point.frequency) if mode is None else mode
-            point = described(point, self.case, self.walk, mode)
+            place = self.place(point.value)
+            mode = self.critical(place, 2j * np.pi * point.frequency) if mode is None else mode
+            point = self._classified(point, place, mode)
             self._keep(point)
         self.points[key] = point
         return point
@@ -234,58 +301,43 @@ class OnsetSearch:
         self.points[point.key] = point
         self.observer.item(point)
 
+    def _classified(self, point: OnsetPoint, place: Mu, mode) -> OnsetPoint:
+        """A point with its criticality; with the reason in its note where there is none."""
+        try:
+            form = normal_form(self.case, self.walk, place, mode, point.parameter)
+        except (ContinuationError, SolveError, ArithmeticError, ValueError) as error:
+            return replace(point, note=f"{point.note} {MISSING} {error}".strip())
+        speed = form.crossing.real if form.crossing is not None else None
+        return replace(point, criticality=form.criticality, first_lyapunov_coefficient=form.l1, crossing_speed=speed)
+
     def _located(self, crossing: Crossing):
-        parameter = self.options.parameter
-        value = locate(self.scan, crossing, self.options.tolerance)
-        expected = complex(self.scan.within(value).eigenvalues[crossing.index])
-        if is_surrounding(self.case, parameter):
-            value = self._polished(value, crossing, expected)
-        place = self.place(value)
-        mode = self.critical(place, expected)
-        eigenvalue = complex(mode.eigenvalue)
-        gains = crossing.high.unstable > crossing.low.unstable
-        width = ASIDE * abs(value) if value else ASIDE * (self.options.values[-1] - self.options.values[0])
-        (below, one), (above, two) = (self._side(v, eigenvalue) for v in (value - width, value + width))
-        confirmed, note = _confirmed(below, above, gains, one.agrees and two.agrees, max(one.line, two.line))
-        edge = min(below.unstable, above.unstable) == 0
-        bracket = (crossing.low.value, crossing.high.value)
-        frequency = abs(eigenvalue.imag) / (2 * np.pi)
+        values = self.options.values
+        found = self.line.locate(crossing, self.options.tolerance)
+        mode = self.critical(self.place(found.value), found.eigenvalue)
+        eigenvalue, value = complex(mode.eigenvalue), found.value
+        width = ASIDE * abs(value) if value else ASIDE * (values[-1] - values[0])
+        sides = [self._beside(v) for v in (value - width, value + width)]
+        below, above = (Side.of(sample, eigenvalue) for sample in sides)
+        certified, line = all(s.certified for s in sides), max(s.line for s in sides)
+        confirmed, note = _confirmed(below, above, crossing.gains, certified, line)
         return OnsetPoint(
-            parameter,
+            self.options.parameter,
             value,
-            frequency,
+            abs(eigenvalue.imag) / (2 * np.pi),
             eigenvalue.real,
-            gains,
-            edge,
+            crossing.gains,
+            min(below.unstable_count, above.unstable_count) == 0,
             below,
             above,
             confirmed,
-            place,
-            bracket,
+            (crossing.low.value, crossing.high.value),
             crossing.index,
             note=note,
         ), mode
 
-    def _polished(self, value: float, crossing: Crossing, expected: complex) -> float:
-        """Secant steps with the full pencil from the root on the small model."""
-        scale = max(abs(crossing.low.value), abs(crossing.high.value))
-
-        def growth(v):
-            return float(self.critical(self.place(v), expected).eigenvalue.real)
-
-        a, fa = value, growth(value)
-        b = value + 1e-6 * scale
-        for _ in range(6):
-            fb = growth(b)
-            if fb == fa or abs(b - a) <= 0.1 * self.options.tolerance * scale:
-                break
-            c = b - fb * (b - a) / (fb - fa)
-            if not crossing.low.value <= c <= crossing.high.value:
-                break
-            a, fa, b = b, fb, c
-            if abs(b - a) <= self.options.tolerance * scale:
-                break
-        return float(b if crossing.low.value <= b <= crossing.high.value else value)
+    def _beside(self, value: float) -> Sample:
+        """Sample of the full model."""
+        return Sample.of(value, self.walk.column([self.place(value)]), 0, np.inf)
 
     def critical(self, place: Mu, eigenvalue: complex):
         """The mode of the full pencil at a place that an eigenvalue found otherwise belongs to.
@@ -304,33 +356,27 @@ class OnsetSearch:
             )
         return spectrum.mode(int(np.argmin(apart)))
 
-    def _side(self, value: float, eigenvalue: complex) -> tuple[Side, Certificate]:
-        """Stability at a value by the full model, and the certificate of its eigenvalue count."""
-        cell = self.walk.column([self.place(value)])
-        values, certificate = cell.leading[0], cell.certificate(0)
-        crossing = complex(values[int(np.argmin(np.abs(values - eigenvalue)))])
-        frequency = crossing.imag / (2 * np.pi)
-        leading = float(values[0].real)
-        side = Side(value, crossing.real, frequency, leading, certificate.unstable, certificate.counted)
-        return side, certificate
-
 
 def _confirmed(below: Side, above: Side, gains: bool, certified: bool, line: float) -> tuple[bool, str]:
     for side in (below, above):
-        if side.unstable != side.counted:
+        if side.unstable_count != side.unstable_count_independent:
             return (
                 False,
                 (
-                    f"at {side.value:.6g} the spectrum lists {side.unstable} unstable eigenvalues and the "
-                    f"independent count finds {side.counted}."
+                    f"at {side.value:.6g} the spectrum lists {side.unstable_count} unstable eigenvalues and the "
+                    f"independent count finds {side.unstable_count_independent}."
                 ),
             )
     if not certified:
         return False, "the independent count beside it is uncertain."
     first, second = (below, above) if gains else (above, below)
-    if first.eigenvalue.real < 0 < second.eigenvalue.real and first.unstable == second.unstable and line > 0:
+    if (
+        first.eigenvalue.real < 0 < second.eigenvalue.real
+        and first.unstable_count == second.unstable_count
+        and line > 0
+    ):
         return False, f"the independent count looks right of {line:.4g} 1/s only, where an undamped wall ends."
-    if not (first.eigenvalue.real < 0 < second.eigenvalue.real and first.unstable < second.unstable):
+    if not (first.eigenvalue.real < 0 < second.eigenvalue.real and first.unstable_count < second.unstable_count):
         return (
             False,
             f"the eigenvalues {below.eigenvalue:.5g} and {above.eigenvalue:.5g} 1/s on both sides do not show it.",
@@ -367,7 +413,7 @@ def with_uncertainty(
     ----------
     observer : Observer
         Told of the samples on that mesh, and again of each point.
-    known : iterable of OnsetSample and OnsetPoint
+    known : iterable of Sample and OnsetPoint
         Of an interrupted run.
     """
     coarse, ratio = coarse_case(case, options.coarse_mesh)
@@ -380,12 +426,11 @@ def with_uncertainty(
     found = []
     for crossing in search.scan.run(options.values):
         try:
-            value = locate(search.scan, crossing, LOCATED)
-            expected = complex(search.scan.within(value).eigenvalues[crossing.index])
+            value, expected = search.line.bracket(crossing, LOCATED)
             eigenvalue = search.critical(search.place(value), expected).eigenvalue
         except SolveError:
             continue
-        found.append((value, abs(eigenvalue.imag) / (2 * np.pi), crossing.high.unstable > crossing.low.unstable))
+        found.append((value, abs(eigenvalue.imag) / (2 * np.pi), crossing.gains))
     done = []
     for point in points:
         alike = [
@@ -407,7 +452,7 @@ def run_onset(
     case: Case,
     options: OnsetOptions | None = None,
     observer: Observer | None = None,
-    known: Iterable[OnsetSample | OnsetPoint] = (),
+    known: Iterable[Sample | OnsetPoint] = (),
     walk: StabilityWalk | None = None,
 ) -> FoundOnsets:
     """All onsets of a case along one parameter.
@@ -418,9 +463,9 @@ def run_onset(
     options : OnsetOptions, optional
         Those of the case by default.
     observer : Observer, optional
-        `item` is told of every `OnsetSample` and `OnsetPoint` as it is found, and of a point again when more is known
-        about it.
-    known : iterable of OnsetSample and OnsetPoint
+        `item` is told of every `Sample` and `OnsetPoint` as it is found, and of a point again when more is known about
+        it.
+    known : iterable of Sample and OnsetPoint
         What an interrupted run had found, in its order; it is not solved again.
     walk : StabilityWalk, optional
         Of a case that differs in load, surroundings and `onset` alone, for steady states it knows.
@@ -434,47 +479,32 @@ def run_onset(
     """
     options = options or OnsetOptions.of(case)
     check_scan(case, options.parameter)
-    observer = observer or Observer()
-    known = list(known)
-    observer.begin("onset", None)
-    failures: list[str] = []
-    warnings: list[str] = []
+    observer, known = observer or Observer(), list(known)
     search = OnsetSearch(case, options, observer, walk, known=known)
-    points: list[OnsetPoint] = []
-    interrupted = False
-    try:
-        crossings = search.scan.run(options.values)
-        unsound = {s.value: s.failure for s in search.asked if not s.verdict.holds}
-        failures += [why for value, why in search.scan.failures.items() if value not in unsound]
-        if unsound:
-            warnings.append(not_valid_at(options.parameter, unsound))
-        if not (search.scan.samples or unsound):
-            raise SolveError(
-                f"No state of the scan over {options.parameter} was found: "
-                f"{failures[0] if failures else 'the range is empty.'}"
-            )
-        for crossing in crossings:
-            observer.progress(f"onset between {crossing.low.value:.6g} and {crossing.high.value:.6g}")
-            try:
-                search.point(crossing)
-            except SolveError as error:
-                failures.append(str(error))
-        warnings += search.uncertainties()
-        points = list(search.points.values())
-        if points and options.coarse_mesh > 0:
-            points = with_uncertainty(case, options, points, observer, warnings, known)
-    except KeyboardInterrupt:
-        interrupted = True
-        points = points or list(search.points.values())
+    crossings = search.scan.run(options.values)
+    unsound = {s.value: s.refusal for s in search.asked if s.refusal}
+    failures = [why for value, why in search.scan.failures.items() if value not in unsound]
+    warnings = [not_valid_at(options.parameter, unsound)] if unsound else []
+    if not (search.scan.samples or unsound):
+        raise SolveError(
+            f"No state of the scan over {options.parameter} was found: "
+            f"{failures[0] if failures else 'the range is empty.'}"
+        )
+    for crossing in crossings:
+        observer.progress(f"onset between {crossing.low.value:.6g} and {crossing.high.value:.6g}")
+        try:
+            search.point(crossing)
+        except SolveError as error:
+            failures.append(str(error))
+    warnings += search.uncertainties()
+    points = list(search.points.values())
+    if points and options.coarse_mesh > 0:
+        points = with_uncertainty(case, options, points, observer, warnings, known)
     for p in points:
         if not p.confirmed:
             warnings.append(f"The onset at {options.parameter} = {p.value:.6g} is not confirmed: {p.note}")
     outside = outside_band(case, [p.frequency for p in points])
     warnings += [] if outside is None else [outside]
-    for sentence in warnings:
-        observer.warn(sentence)
-    observer.end(interrupted)
-    points = sorted(points, key=lambda p: p.value)
-    return FoundOnsets(
-        case, options.symmetry, tuple(search.asked), tuple(points), tuple(failures), tuple(warnings), interrupted
-    )
+    points = tuple(sorted(points, key=lambda p: p.value))
+    variant = options.variant or own_variant(case)
+    return FoundOnsets(variant, tuple(search.asked), points, tuple(failures), tuple(warnings))

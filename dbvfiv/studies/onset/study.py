@@ -1,71 +1,311 @@
-"""Run of the onset study: finds onsets along one parameter and keeps them in a record."""
+"""Onsets along one parameter: run, storage, and what can be read off a run or its file."""
 
 from __future__ import annotations
 
-from dataclasses import replace
+import math
+from collections.abc import Callable, Iterator
+from functools import cached_property
+from typing import Any
 
-from ...errors import CaseError
-from ...model.symmetry import Symmetry
-from ...observer import Observers
-from ...record.record import GrowingRecord
-from ..case import Case
+import numpy as np
+from matplotlib.figure import Figure
+
+from ...case.parameters import PARAMETERS
+from ...observer import Observer
+from ...record.mesh import MeshData
+from ...record.record import GrowingRecord, Record
+from ...record.table import TableSpec
+from ..result import StudyResult
 from ..session import Session
-from ..stability.dimensions import LAW, add_classes, other_law, require_two_laws
+from ..stability.dimensions import Variant, compare_ranges, leading_class, own_variant, variants
+from ..stability.place import describe_fixed, fixed_conditions
+from ..stability.samples import SAMPLE_TABLE, Sample, keep_samples, read_samples
+from ..stability.verdict import DIVERGES, FLUTTERS, NOT_VALID, STABLE, UNDECIDED, Verdict, lowered
 from ..stability.walk import StabilityWalk
 from ..study import Study
-from .line import FoundOnsets
-from .point import KeepItems, known_items, tables_of
-from .result import OnsetResult
-from .search import OnsetOptions, run_onset
+from . import figures
+from .line import FoundOnsets, Interval, common_stretches, disagreements, joined_stretches, merge_points
+from .search import FINE, OnsetOptions, OnsetPoint, run_onset
+
+CRITICALITY = {"super": "supercritical", "sub": "subcritical"}
+#: Kinds of notes: on a point, and on a variant that was searched to its end.
+_POINT, _DONE = "point", "searched"
+
+
+def tables_of(_mesh: MeshData) -> tuple[TableSpec]:
+    """Tables of an onset result. Points are notes: what more is known about one is noted again."""
+    return (SAMPLE_TABLE,)
+
+
+class _Keeper(Observer):
+    """Keeps every sample and point of a variant as soon as it is found."""
+
+    def __init__(self, record: GrowingRecord, variant: Variant):
+        self.record, self.variant = record, variant
+
+    def item(self, result: Sample | OnsetPoint) -> None:
+        if isinstance(result, Sample):
+            keep_samples(self.record, [result])
+        else:
+            self.record.note(_POINT, variant=list(self.variant), **result.summary())
+        self.record.item(result)
+
+    def progress(self, text: str) -> None:
+        self.record.progress(text)
 
 
 def run(session: Session, record: GrowingRecord) -> None:
-    """Onsets along `onset.over` of the case, under both continuity laws where that is asked for; every sample and point
-    of its own law is kept as it is found.
+    """Onsets along `onset.over` of the case in every variant; each sample and point is kept as it is found."""
+    case, asked = session.case, variants(session.case, "onset")
+    record.begin("onset", None)
+    walk = StabilityWalk(case, record, session.model)
+    for variant in asked:
+        found = read_onsets(record, variant)
+        if found is None:
+            prefix = variant.prefix(asked[0])
+            record.progress(f"{prefix}{variant.motion.words}" if prefix else "scan")
+            known = [*read_samples(record), *_points(record, variant)]
+            own = walk if variant.motion == walk.symmetry else walk.in_class(variant.motion)
+            found = run_onset(case, OnsetOptions.of(case, variant), _Keeper(record, variant), known, own)
+            record.note(_DONE, variant=list(variant), failures=list(found.failures), warnings=list(found.warnings))
+        for sentence in found.failures:
+            record.fail(f"{variant.prefix(asked[0])}{sentence}")
+        for sentence in found.warnings:
+            record.warn(f"{variant.prefix(asked[0])}{sentence}")
+
+
+def _points(record: Record, variant: Variant) -> list[OnsetPoint]:
+    """Latest state of each onset of a variant, in ascending order of the parameter."""
+    notes = [note for note in record.notes(_POINT) if Variant(*note["variant"]) == variant]
+    latest = {(*note["bracket"], note["ahead"]): OnsetPoint.read(note) for note in notes}
+    return sorted(latest.values(), key=lambda point: point.value)
+
+
+def read_onsets(record: Record, variant: Variant, partly: bool = False) -> FoundOnsets | None:
+    """Onsets of a variant; None where it was not searched to its end, unless they are wanted `partly` too."""
+    done = [note for note in record.notes(_DONE) if Variant(*note["variant"]) == variant]
+    if not (done or partly):
+        return None
+    key = (variant.storage, variant.symmetry, FINE)
+    samples = {s.value: s for s in read_samples(record) if s.key[:3] == key and not s.failure}
+    said = [tuple(done[-1][name]) if done else () for name in ("failures", "warnings")]
+    return FoundOnsets(variant, tuple(samples[v] for v in sorted(samples)), tuple(_points(record, variant)), *said)
+
+
+class OnsetResult(StudyResult):
+    """Onsets in ascending order of the parameter, and the scan that found them.
+
+    Attributes
+    ----------
+    parameter : str
+    points : tuple of dict
+        One for each onset, see `dbvfiv.studies.onset.search.OnsetPoint.summary`; None where something is not known.
+
+    Examples
+    --------
+    >>> found = dbvfiv.load().onset("density", pressure="6 kPa")            # doctest: +SKIP
+    >>> [(point["value"], point["frequency"]) for point in found.points]    # doctest: +SKIP
     """
-    both = session.case.onset.continuity == "both"
-    if both:
-        _require_two_laws(session.case)
-    walk = StabilityWalk(session.case, record, session.model)
-    found = run_onset(
-        session.case,
-        observer=Observers(KeepItems(record), record),
-        known=known_items(record, session.case),
-        walk=walk,
-    )
-    for sentence in found.failures:
-        record.fail(sentence)
-    if found.interrupted:
-        raise KeyboardInterrupt
 
-    def find(symmetry: Symmetry) -> FoundOnsets:
-        # cycles that leave the symmetry have normal forms of their own, which are not looked for
-        options = replace(OnsetOptions.of(session.case), normal_form=False, symmetry=symmetry.name)
-        return run_onset(session.case, options, walk=walk.in_class(symmetry))
+    kind = "onset"
 
-    add_classes(record, session.case.onset.symmetry, session.case.part, find)
-    if both and not record.notes(LAW):
-        record.progress("the other continuity law")
-        other = session.replace({"fluid.continuity": other_law(session.case)})
-        found = run_onset(other.case, walk=StabilityWalk(other.case, record, other.model))
-        if found.interrupted:
-            raise KeyboardInterrupt
-        record.note(LAW, continuity=other.case.fluid.continuity, **found.note())
+    @property
+    def parameter(self) -> str:
+        return self.case.onset.axis.parameter
 
+    @cached_property
+    def variants(self) -> dict[Variant, FoundOnsets]:
+        """Onsets of each variant, that of the case first; of the others those that were searched to their end."""
+        own = own_variant(self.case)
+        found = {own: read_onsets(self.record, own, partly=True)}
+        others = (variant for variant in variants(self.case, "onset") if variant != own)
+        return found | {v: onsets for v in others if (onsets := read_onsets(self.record, v)) is not None}
 
-def _require_two_laws(case: Case) -> None:
-    """Refuse to compare laws along their own blend, and without any at work.
+    @property
+    def own(self) -> FoundOnsets:
+        """Onsets of the variant of the case."""
+        return next(iter(self.variants.values()))
 
-    Raises
-    ------
-    CaseError
-    """
-    require_two_laws(case, "onset")
-    if case.onset.axis.parameter == "storage":
-        raise CaseError(
-            "onset.continuity is given as 'both', but onset.over moves the continuity law itself; it must be 'case' "
-            "then.",
-            key="onset.continuity",
+    @cached_property
+    def _classes(self) -> list[FoundOnsets]:
+        return [found for variant, found in self.variants.items() if not variant.motion.of_equilibria]
+
+    @property
+    def classes(self) -> list[dict[str, Any]]:
+        """Onsets in the other symmetry classes, where they were asked for; see `FoundOnsets.summary`."""
+        return [{k: v for k, v in found.summary().items() if k != "continuity"} for found in self._classes]
+
+    @cached_property
+    def other_law(self) -> dict[str, Any] | None:
+        """Onsets under the other continuity law, where that was asked for; see `FoundOnsets.summary`."""
+        law = self.case.fluid.continuity
+        return next((found.summary() for variant, found in self.variants.items() if variant.continuity != law), None)
+
+    @cached_property
+    def points(self) -> tuple[dict[str, Any], ...]:
+        own, points = self.own, [point.summary() for point in self.own.points]
+        return tuple(merge_points(points, own.unstable_intervals, self.classes, self._own))
+
+    @property
+    def values(self) -> np.ndarray:
+        """(s,) values of the scan, SI."""
+        return self.own.values
+
+    @property
+    def growth_rates(self) -> np.ndarray:
+        """(s, 4) growth rates of the leading modes there, 1/s; NaN where there are fewer."""
+        return self.own.growth_rates
+
+    @property
+    def frequencies(self) -> np.ndarray:
+        """(s, 4) frequencies of the leading modes there, Hz."""
+        return self.own.frequencies
+
+    @property
+    def certified(self) -> np.ndarray:
+        """(s,) bool, whether an independent count agrees."""
+        return self.own.certified
+
+    @property
+    def verdicts(self) -> tuple[Verdict, ...]:
+        """Verdicts on the values of the scan in the class of the equilibria."""
+        return self.own.verdicts
+
+    @cached_property
+    def leading(self) -> dict[str, Any]:
+        """Growth rate, frequency and class of the most unstable motion at the values that all classes were asked at."""
+        scans = {found.variant.symmetry: found.scan() for found in (self.own, *self._classes)}
+        values = sorted(set.intersection(*(set(scan["values"]) for scan in scans.values())))
+        rows = [[scan["values"].index(value) for value in values] for scan in scans.values()]
+        rates, frequencies, certified = (
+            np.array([[scan[name][i] for i in at] for scan, at in zip(scans.values(), rows)], kind)
+            for name, kind in (("growth_rate", float), ("frequency", float), ("certified", bool))
+        )
+        found = leading_class(list(scans), rates, frequencies)
+        found["symmetry"] = [name or self._own for name in found["symmetry"]]
+        return {"values": values} | found | {"certified": certified.all(axis=0).tolist()}
+
+    def _intervals(self, join: Callable, name: str) -> list[Interval]:
+        parts = [getattr(found, name) for found in (self.own, *self._classes)]
+        return join(parts) if self._classes else parts[0]
+
+    @property
+    def unstable_intervals(self) -> list[Interval]:
+        """Intervals of the scanned range in which the state is known to be unstable in a symmetry class asked for."""
+        return self._intervals(joined_stretches, "unstable_intervals")
+
+    @property
+    def stable_intervals(self) -> list[Interval]:
+        """Intervals of the scanned range in which the state is known to be stable in all classes asked for."""
+        return self._intervals(common_stretches, "stable_intervals")
+
+    @property
+    def uncertain_intervals(self) -> list[Interval]:
+        """Intervals of the scanned range in which neither stability nor instability is claimed."""
+        return self._intervals(joined_stretches, "uncertain_intervals")
+
+    @property
+    def disagreements(self) -> list[tuple[float, float, str]]:
+        """Stretches of the range in which the two laws disagree, and the one that is stable there."""
+        if self.other_law is None:
+            return []
+        own, law = self.own, self.case.fluid.continuity
+        return disagreements(law, own.stable_intervals, own.unstable_intervals, self.other_law)
+
+    @property
+    def comparison(self) -> str | None:
+        """One sentence on what both laws say; None where one was asked."""
+        if self.other_law is None:
+            return None
+        row = PARAMETERS[self.parameter]
+        return compare_ranges(self.parameter, self.disagreements, row.shown_unit, row.scale)
+
+    def summary(self) -> dict[str, Any]:
+        compared = {"other_law": self.other_law, "comparison": self.comparison, "disagreements": self.disagreements}
+        return {
+            "parameter": self.parameter,
+            "points": list(self.points),
+            "scan": self.own.scan(),
+            "leading": self.leading,
+            "classes": self.classes,
+            "fixed": fixed_conditions(self.case, self.parameter),
+            "failures": list(self.failures),
+            "warnings": list(self.warnings),
+            "interrupted": not self.complete,
+        } | (compared if self.other_law else {})
+
+    def shortfall(self) -> str | None:
+        failed = len(self.failures)
+        return f"Parts of the range were not reached: {failed} states failed" if failed else None
+
+    def drawers(self) -> Iterator[tuple[str, Callable[[], Figure]]]:
+        yield from figures.draw(self)
+
+    def lines(self) -> list[str]:
+        fixed = f"At {describe_fixed(self.case, self.parameter)}:"
+        if self.other_law is not None:
+            return [*self._table(fixed, self.points), *self._other_lines(), self.comparison]
+        return self._table(fixed, self.points)
+
+    def _table(self, fixed: str, points) -> list[str]:
+        if not points:
+            return [fixed, self._without_onset()]
+        unit = PARAMETERS[self.parameter].shown_unit
+        head = (
+            f"{self.parameter + (f', {unit}' if unit else ''):>16} {'+-':>9} {'Hz':>8}  "
+            f"{'':<28}{'below, 1/s':>11}{'above, 1/s':>11}"
+        )
+        head += "  class" if self.classes else ""
+        return [fixed, head, *(self._line(point) for point in points)]
+
+    def _other_lines(self) -> list[str]:
+        other = self.other_law
+        fixed = f"Under {other['continuity']} continuity:"
+        if other["points"]:
+            return self._table(fixed, other["points"])
+        outcomes = {verdict["outcome"] for verdict in other["scan"].get("verdict", ())}
+        sure = outcomes and (outcomes == {STABLE} or outcomes <= {FLUTTERS, DIVERGES})
+        said = f"No onset: the valve is {'stable' if outcomes == {STABLE} else 'unstable'} over the range."
+        return [fixed, said if sure else "No onset was found, and none is ruled out: some values lack a certificate."]
+
+    @property
+    def _own(self) -> str:
+        """Class of the equilibria."""
+        return self.own.variant.symmetry
+
+    def _without_onset(self) -> str:
+        row = PARAMETERS[self.parameter]
+        low, high = (self.values[[0, -1]] / row.scale) if len(self.values) else (math.nan, math.nan)
+        scanned = f"from {low:.6g} to {high:.6g} {row.shown_unit}".rstrip()
+        if not self.complete:
+            return f"No onset has been located yet: the search ended early, after {len(self.values)} values {scanned}."
+        sure, outcomes = sum(self.leading["certified"]), [verdict.outcome for verdict in self.verdicts]
+        invalid = outcomes.count(NOT_VALID)
+        if outcomes and invalid == len(outcomes):
+            return f"Not valid {scanned}: {lowered(self.verdicts[0].reason)}"
+        if not all(self.leading["certified"]) or len(set(outcomes)) != 1 or UNDECIDED in outcomes:
+            but = f" {invalid} of them are not valid: the constants of the rubber do not hold." if invalid else ""
+            return (
+                f"No onset was found, and none is ruled out: {sure} of {len(self.values)} values {scanned} carry a "
+                f"certificate.{but}"
+            )
+        state = "unstable" if self.leading["growth_rate"][0] > 0 else "stable"
+        band = min(verdict.band for verdict in self.verdicts)
+        scanned += f" for modes up to {band:.4g} Hz" if np.isfinite(band) else ""
+        which = f" in classes {', '.join([self._own, *(c['symmetry'] for c in self.classes)])}" if self.classes else ""
+        return f"No onset: the valve is {state} {scanned}{which}."
+
+    def _line(self, point: dict[str, Any]) -> str:
+        scale = PARAMETERS[self.parameter].scale
+        becomes = "unstable above" if point["gains"] else "stable above"
+        which = CRITICALITY.get(point["criticality"], point["criticality"])
+        words = becomes + (f", {which}" if which else "") if point["edge"] else f"a further mode {becomes}"
+        spread = " " * 9 if point["uncertainty"] is None else f"{point['uncertainty'] / scale:9.2g}"
+        below, above = (point[side]["growth_rate"] for side in ("below", "above"))
+        mark = "" if point["confirmed"] else "  not confirmed"
+        return (
+            f"{point['value'] / scale:16.8g} {spread} {point['frequency']:8.3f}  "
+            f"{words:<28}{below:11.4g}{above:11.4g}{mark}" + (f"  {point['symmetry']}" if self.classes else "")
         )
 
 

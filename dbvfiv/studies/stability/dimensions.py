@@ -1,74 +1,131 @@
-"""Dimensions of a study besides its parameters: symmetry class and continuity law.
+"""Dimensions of a study besides its parameters: flow model and symmetry class.
 
-A study computes the class of the equilibria under the law of the case first. What it finds in another class or under
-the other law is one note of its record each, made by the same search.
+A study asks for variants, the class of the equilibria under the flow model of the case first. It finds the same in each
+of them, by the same function, and keeps it in the same tables, whose rows and notes name the variant.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
-from typing import Any
+from collections.abc import Iterable, Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from ...case.part import Part
 from ...errors import CaseError
-from ...model.symmetry import Symmetry, chosen_symmetries
-from ...record.record import GrowingRecord, Record
+from ...model.symmetry import (
+    HALF_SYMMETRIES,
+    SYMMETRIES,
+    Symmetry,
+    asks_for_equilibria,
+    chosen_symmetries,
+    equilibria_of,
+    symmetry_named,
+)
+from ...record.table import Column
 from ..case import Case
 
-#: Kinds of the notes that hold what was found: one for each class, one for the other law.
-CLASS, LAW = "class", "other law"
 QUASI_STEADY, STORAGE = "quasi-steady", "storage"
 _WHY = (
     "storage conserves volume under moving walls (what they displace has to go somewhere) and agrees with the water "
     "tunnel of the thesis, in which water was stable from 2 to 50 kPa, so a prediction should rest on it; quasi-steady "
     "reproduces the thesis's own calculations"
 )
+#: Classes of motion by their numbers in tables.
+CLASS_NAMES = (*SYMMETRIES, *HALF_SYMMETRIES)
+#: Columns that name the variant of a row.
+VARIANT = (
+    Column("continuity", "", "Blend of the flow models, 0 quasi-steady, 1 storage"),
+    Column("symmetry", "", f"Class of motion: {', '.join(f'{i} {name}' for i, name in enumerate(CLASS_NAMES))}", "i8"),
+)
 _WORDS = {True: "stable", False: "unstable", None: "undecided"}
 
 
-def add_classes(record: GrowingRecord, chosen: str, part: Part, find: Callable[[Symmetry], Any]) -> None:
-    """Repeat a search in the other symmetry classes that a study asks for and that its record has not yet.
+class Variant(NamedTuple):
+    """One flow model and one symmetry class.
 
-    Parameters
+    Attributes
     ----------
-    record : GrowingRecord
-    chosen : str
-        A class, or "all".
-    part : Part
-        Computed part of the valve.
-    find : callable
-        From a class to what is found in it, with `failures`, `warnings`, `interrupted` and ``note()``.
+    continuity : str
+    symmetry : str
+        Name of the class, see `dbvfiv.model.symmetry`.
     """
-    done = {note["symmetry"] for note in record.notes(CLASS)}
-    for symmetry in chosen_symmetries(chosen, part):
-        if symmetry.of_equilibria or symmetry.name in done:
-            continue
-        record.progress(f"class {symmetry.name}: {symmetry.words}")
-        found = find(symmetry)
-        for sentence in found.failures:
-            record.fail(f"In class {symmetry.name}: {sentence}")
-        for sentence in found.warnings:
-            record.warn(f"In class {symmetry.name}: {sentence}")
-        if found.interrupted:
-            raise KeyboardInterrupt
-        record.note(CLASS, symmetry=symmetry.name, motion=symmetry.words, **found.note())
+
+    continuity: str
+    symmetry: str
+
+    @property
+    def storage(self) -> float:
+        """Blend of the flow models, a parameter."""
+        return float(self.continuity == STORAGE)
+
+    @property
+    def motion(self) -> Symmetry:
+        return symmetry_named(self.symmetry)
+
+    @property
+    def row(self) -> dict[str, float]:
+        """Its part of a row of a table, the columns `VARIANT`."""
+        return {"continuity": self.storage, "symmetry": CLASS_NAMES.index(self.symmetry)}
+
+    def prefix(self, own: Variant) -> str:
+        """Beginning of a sentence about it; empty for the variant of the case."""
+        if self == own:
+            return ""
+        return f"Under {self.continuity}: " if self.symmetry == own.symmetry else f"In class {self.symmetry}: "
 
 
-def read_classes(record: Record) -> list[dict[str, Any]]:
-    """Latest note on each of the other symmetry classes."""
-    return list({note["symmetry"]: _content(note) for note in record.notes(CLASS)}.values())
+def own_variant(case: Case) -> Variant:
+    """Variant of the equilibria of a case."""
+    return Variant(case.fluid.continuity, equilibria_of(case.part).name)
 
 
-def read_other_law(record: Record) -> dict[str, Any] | None:
-    """Latest note on the other continuity law; None where that was not asked for."""
-    notes = record.notes(LAW)
-    return _content(notes[-1]) if notes else None
+def variants(case: Case, study: str) -> list[Variant]:
+    """Variants that a study is asked for by its keys `symmetry` and `continuity`, those of the case's flow model first.
+
+    Raises
+    ------
+    CaseError
+        If two flow models are asked for where none is at work.
+    """
+    keys, law = getattr(case, study), case.fluid.continuity
+    found = [Variant(law, symmetry.name) for symmetry in chosen_symmetries(keys.symmetry, case.part)]
+    if getattr(keys, "continuity", "case") != "both":
+        return found
+    _require_two_laws(case, study)
+    return [*found, Variant(QUASI_STEADY if law == STORAGE else STORAGE, equilibria_of(case.part).name)]
 
 
-def _content(note: dict[str, Any]) -> dict[str, Any]:
-    return {name: value for name, value in note.items() if name != "what"}
+def _require_two_laws(case: Case, study: str) -> None:
+    """Refuse to compare flow models where none is at work, or where they do not differ.
+
+    Raises
+    ------
+    CaseError
+    """
+    keys, without = getattr(case, study), ""
+    if not case.continuity:
+        without = "drive.kind is 'uniform'" if case.drive.kind != "flow" else "fluid.unsteady is false"
+    if getattr(keys, "in_vacuo", False):
+        without = "modes.in_vacuo leaves the fluid out"
+    if without:
+        raise CaseError(
+            f"{study}.continuity is given as 'both', but {without}, so that no continuity law is at work; it must be "
+            "'case' then.",
+            key=f"{study}.continuity",
+        )
+    if study == "modes" and not asks_for_equilibria(keys.symmetry):
+        own = equilibria_of(case.part).name
+        raise CaseError(
+            f"modes.continuity is given as 'both' with modes.symmetry = {keys.symmetry!r}, but the laws differ in "
+            f"class {own} alone, since no other motion changes areas; modes.symmetry must be {own!r} then.",
+            key="modes.continuity",
+        )
+    if study == "onset" and keys.axis.parameter == "storage":
+        raise CaseError(
+            "onset.continuity is given as 'both', but onset.over moves the continuity law itself; it must be 'case' "
+            "then.",
+            key="onset.continuity",
+        )
 
 
 def leading_class(names: Sequence[str], rates: np.ndarray, frequencies: np.ndarray) -> dict[str, Any]:
@@ -92,28 +149,6 @@ def leading_class(names: Sequence[str], rates: np.ndarray, frequencies: np.ndarr
         for name, table in (("growth_rate", rates), ("frequency", frequencies))
     }
     return found | {"symmetry": np.where(gap, None, np.array(names, object)[first]).tolist()}
-
-
-def other_law(case: Case) -> str:
-    """The continuity law that a case does not use."""
-    return QUASI_STEADY if case.fluid.continuity == STORAGE else STORAGE
-
-
-def require_two_laws(case: Case, study: str, without: str = "") -> None:
-    """Refuse to compare laws where none is at work; `without` says why where the study knows.
-
-    Raises
-    ------
-    CaseError
-    """
-    if not without and not case.continuity:
-        without = "drive.kind is 'uniform'" if case.drive.kind != "flow" else "fluid.unsteady is false"
-    if without:
-        raise CaseError(
-            f"{study}.continuity is given as 'both', but {without}, so that no continuity law is at work; it must be "
-            "'case' then.",
-            key=f"{study}.continuity",
-        )
 
 
 def compare_states(own: str, stable: bool | None, other: str, other_stable: bool | None) -> str:

@@ -10,7 +10,6 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from eigen import Column, ColumnSolver, Workspace
-from eigen.columns import DIRECT
 
 from ...case.parameters import PARAMETERS, Mu
 from ...errors import NotValidError, SolveError
@@ -25,6 +24,7 @@ from ...observer import Observer
 from ..case import Case
 from .family import ValveFamily, name_state_in_failures
 from .place import condition_of, moving_surroundings, rebuilder
+from .samples import Sample
 from .verdict import Verdict
 
 #: Steps over the last one up to which a cubic is trusted ahead of it.
@@ -94,6 +94,7 @@ class StabilityWalk:
         self._moving = {name: own[name] for name in moving_surroundings(case)}
         self._built: dict[tuple, _Built] = {}
         self._last: tuple[tuple, ValveFamily] | None = None
+        self._classes: dict[str, StabilityWalk] = {}
         if model is not None:
             self._built[()] = self._new(model)
 
@@ -165,9 +166,14 @@ class StabilityWalk:
         return StabilityWalk(self.case, self.observer, model, self.symmetry)
 
     def in_class(self, symmetry: Symmetry) -> StabilityWalk:
-        """A walk for the motions of another class about the steady states of this one."""
-        other = StabilityWalk(self.case, self.observer, symmetry=symmetry)
-        other._built = {key: replace(built, solver=ColumnSolver()) for key, built in self._built.items()}
+        """The walk for the motions of a class about the steady states of this one."""
+        if symmetry == self.symmetry:
+            return self
+        if symmetry.name not in self._classes:
+            self._classes[symmetry.name] = StabilityWalk(self.case, self.observer, symmetry=symmetry)
+        other = self._classes[symmetry.name]
+        new = {key: replace(built, solver=ColumnSolver()) for key, built in self._built.items()}
+        other._built = new | {key: built for key, built in other._built.items() if key in new}
         return other
 
     def _reach(self, place: Mu) -> np.ndarray:
@@ -217,27 +223,37 @@ class StabilityWalk:
         """
         return self.family(place).leading(condition_of(place))
 
-    def require_valid(self, place: Mu) -> None:
-        """Refuse a place at which the constants of a rubber with loss factors are unstable.
+    def refusal(self, place: Mu) -> str:
+        """Reason why the constants of a rubber with loss factors are unstable at a place; empty where they are not.
 
         Raises
         ------
-        NotValidError
-            With the verdict on the place as its sentence.
         SolveError
             If there is no steady state.
         """
         loss = condition_of(place).loss
         if not loss:
-            return
+            return ""
         key = place.pressure, self._key(place), loss
         if key not in self._validity:
             if len(self._validity) > 4000:
                 self._validity.clear()
             found = material_stability(self.built(place).model, self.equilibrium(place), place.pressure, loss)
             self._validity[key] = "" if found.holds else found.sentence
-        if self._validity[key]:
-            raise NotValidError(self._validity[key])
+        return self._validity[key]
+
+    def require_valid(self, place: Mu) -> None:
+        """Refuse a place at which the constants of a rubber are unstable.
+
+        Raises
+        ------
+        NotValidError
+            With the `refusal` as its sentence.
+        SolveError
+            If there is no steady state.
+        """
+        if refusal := self.refusal(place):
+            raise NotValidError(refusal)
 
     def spectrum(self, place: Mu, count: int = 6):
         """Leading modes of the full pencil, an `eigen.Spectrum`.
@@ -273,24 +289,20 @@ class StabilityWalk:
             If that is so at all of them.
         SolveError
         """
-        sound, refusal = [], None
-        for i, place in enumerate(places):
-            try:
-                self.require_valid(place)
-                sound.append(i)
-            except NotValidError as error:
-                refusal = error
+        sound = [i for i, place in enumerate(places) if not self.refusal(place)]
         if not sound:
-            raise refusal
+            self.require_valid(places[-1])
         family = self.family(places[0])
         with name_state_in_failures(places[0].pressure):
             conditions = [condition_of(places[i]) for i in sound]
             column = self.built(places[0]).solver.solve(family, conditions, snapshots, edges, spectra, count)
-        return column if refusal is None else column.spread(sound, len(places))
+        return column if len(sound) == len(places) else column.spread(sound, len(places))
 
-    def verdicts(self, places: list[Mu], column: Column) -> list[Verdict]:
-        """Verdicts on places from the cells that `column` gave of them."""
-        return [self.verdict_of(place, column, i) for i, place in enumerate(places)]
+    def sample(self, place: Mu, column: Column, cell: int = 0, value: float = np.nan) -> Sample:
+        """Sample of a place from its cell of a column; `value` is that of the parameter of a line."""
+        if refusal := self.refusal(place):
+            return Sample(value, refusal=refusal)
+        return Sample.of(value, column, cell, self.search(place).claimed)
 
     def verdict(self, place: Mu, spectrum=None) -> Verdict:
         """Verdict on one place; its leading modes with the full pencil may be known.
@@ -301,23 +313,6 @@ class StabilityWalk:
             If there is no steady state, or its spectrum was not found.
         """
         try:
-            return self.verdicts([place], self.column([place], spectra=None if spectrum is None else [spectrum]))[0]
+            return self.sample(place, self.column([place], spectra=None if spectrum is None else [spectrum])).verdict
         except NotValidError as error:
             return Verdict.not_valid(str(error))
-
-    def verdict_of(self, place: Mu, column: Column, cell: int) -> Verdict:
-        """Verdict on a place from its cell of a column."""
-        try:
-            self.require_valid(place)
-        except NotValidError as error:
-            return Verdict.not_valid(str(error))
-        own = column.certificate(cell)
-        return Verdict.of(
-            column.leading[cell],
-            own.unstable,
-            own.counted,
-            own.certain,
-            proven=bool(column.how[cell] == DIRECT),
-            line=own.line,
-            band=min(own.band, self.search(place).claimed),
-        )

@@ -1,47 +1,84 @@
-"""Run of the sweep study: follows modes along a parameter and keeps them in a record."""
+"""Modes along a parameter: run, storage, and what can be read off a run or its file."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import fields
+from collections.abc import Callable, Iterator
+from dataclasses import asdict, dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
+from matplotlib.figure import Figure
 
+from ...case.axis import Axis
+from ...case.parameters import PARAMETERS
 from ...model.state import SteadyState
-from ...record.record import GrowingRecord
+from ...observer import Observer, Observers
+from ...record.mesh import MeshData
+from ...record.record import GrowingRecord, Record
 from ...record.states import SUMMARY
+from ...record.table import Column, TableSpec
 from ..case import Case
-from ..session import Session
+from ..result import StudyResult
+from ..session import Session, describe_surroundings
+from ..stability.dimensions import variants
 from ..stability.place import is_surrounding, require_parameter
-from ..study import Study
-from .result import BRANCHES, CHECKS, POINTS, STATES, SweepResult, head, point_row, tables_of
-from .run import FoundBranches, SweepOptions, SweepPoint, run_sweep
+from ..stability.samples import SAMPLE_TABLE, SAMPLES, Sample, keep_samples, read_samples
+from ..stability.verdict import Verdict
+from ..study import Study, nothing_to_resume
+from . import figures
+from .branches import FoundBranches, SweepOptions, run_sweep
+
+BRANCHES, STATES = "branches", "states"
+_BRANCHES = (
+    Column("id", "", "Number of the branch, by falling largest growth rate", "i8"),
+    Column("value", "SI", "Value of the parameter"),
+    Column("growth_rate", "1/s", "NaN where the branch does not exist"),
+    Column(
+        "angular_frequency",
+        "rad/s",
+        "Imaginary part of the eigenvalue; negative for the second of two real modes that have merged",
+    ),
+    Column("confidence", "", "0 to 1, of the match with the value before"),
+)
+
+
+def tables_of(_mesh: MeshData) -> tuple[TableSpec, ...]:
+    """Tables of a sweep; checks are notes."""
+    states = TableSpec(STATES, SUMMARY, {"max_displacement_position": (3,)})
+    return SAMPLE_TABLE, TableSpec(BRANCHES, _BRANCHES), states
+
+
+class _KeepSamples(Observer):
+    """Keeps every sample as soon as it is found."""
+
+    def __init__(self, record: GrowingRecord):
+        self.record = record
+
+    def item(self, result: object) -> None:
+        if isinstance(result, Sample):
+            keep_samples(self.record, [result])
 
 
 def run(session: Session, record: GrowingRecord) -> None:
-    """Modes along `sweep.over` of the case; what is done is kept every few seconds."""
-    axis = session.case.sweep.axis
-    require_parameter(session.case, axis.parameter)
-    stays = is_surrounding(session.case, axis.parameter)
-    state = session.equilibrium(record) if stays else None
+    """Modes along `sweep.over` of the case; samples are kept as they are found, branches so far every few seconds."""
+    case, axis = session.case, session.case.sweep.axis
+    require_parameter(case, axis.parameter)
     found = run_sweep(
         session.model,
         axis,
-        options=SweepOptions.of(session.case),
-        state=state,
-        observer=record,
+        options=SweepOptions.of(case),
+        observer=Observers(_KeepSamples(record), record),
+        state=session.equilibrium(record) if is_surrounding(case, axis.parameter) else None,
         keep=lambda part: record.note("kept", **_tables(part)),
     )
-    tables, places = _tables(found), {}
+    tables = _tables(found)
     record.note("kept", **tables)  # read while the rows are written
-    for table, rows in tables.items():
-        first = record.rows(table)  # those before are of an attempt that was ended
-        if rows:
-            record.extend(table, {name: [row[name] for row in rows] for name in rows[0]})
-        places[table] = [first, first + len(rows)]
-    verdicts = [verdict.summary() for verdict in found.verdicts]
-    record.note("over", certified=found.certified, remarks=list(found.notes), rows=places, verdicts=verdicts)
+    for table, every in tables.items():
+        if every:
+            record.extend(table, {name: [row[name] for row in every] for name in every[0]})
+    checks = [asdict(check) for check in found.checks]
+    record.note("over", certified=found.certified, remarks=list(found.notes), checks=checks)
     for sentence in found.failures:
         record.note("failure", text=sentence)
     if found.interrupted:
@@ -49,42 +86,296 @@ def run(session: Session, record: GrowingRecord) -> None:
 
 
 def _tables(found: FoundBranches) -> dict[str, list[dict[str, Any]]]:
-    """Rows of the tables of a sweep."""
+    """Rows of the tables of branches and states."""
     branches, rows = found.branches, []
     for i, number in enumerate(branches.ids):
         for k, value in enumerate(found.values):
             eigenvalue = branches.eigenvalues[i, k]
-            there = np.isfinite(eigenvalue.real)
-            rows.append(
-                {
-                    "id": int(number),
-                    "value": float(value),
-                    "growth_rate": float(eigenvalue.real),
-                    "angular_frequency": float(eigenvalue.imag) if there else float("nan"),
-                    "confidence": float(branches.confidence[i, k]),
-                }
-            )
-    counts = zip(found.values.tolist(), found.unstable_count.tolist())
-    return {
-        POINTS: [{"value": value, "unstable_count": count} for value, count in counts],
-        BRANCHES: rows,
-        CHECKS: [{f.name: getattr(check, f.name) for f in fields(check)} for check in found.checks],
-        STATES: [{c.name: getattr(state, c.name) for c in SUMMARY} for state in found.states],
-    }
+            imaginary = float(eigenvalue.imag) if np.isfinite(eigenvalue.real) else float("nan")
+            place = {"id": int(number), "value": float(value), "confidence": float(branches.confidence[i, k])}
+            rows.append(place | {"growth_rate": float(eigenvalue.real), "angular_frequency": imaginary})
+    return {BRANCHES: rows, STATES: [{c.name: getattr(state, c.name) for c in SUMMARY} for state in found.states]}
+
+
+def rows_to_keep(known: Record, _case: Case) -> dict[str, int]:
+    """No rows: a sweep that was ended starts anew.
+
+    Raises
+    ------
+    CaseError
+        If the sweep is complete.
+    """
+    if known.complete:
+        raise nothing_to_resume("sweep", known.path)
+    return dict.fromkeys((SAMPLES, BRANCHES, STATES), 0)
+
+
+@dataclass(frozen=True, eq=False)
+class Branch:
+    """A mode followed along the parameter.
+
+    Attributes
+    ----------
+    id : int
+    growth_rate : (p,) 1/s
+        NaN where the branch does not exist.
+    angular_frequency : (p,) rad/s
+    confidence : (p,)
+    """
+
+    id: int
+    growth_rate: np.ndarray
+    angular_frequency: np.ndarray
+    confidence: np.ndarray
+
+    @property
+    def frequency(self) -> np.ndarray:
+        """(p,) Hz, not negative."""
+        return np.abs(self.angular_frequency) / (2 * np.pi)
+
+    def summary(self) -> dict[str, Any]:
+        """Plain numbers for JSON; None where the branch does not exist."""
+        columns = {"growth_rate": self.growth_rate, "frequency": self.frequency, "confidence": self.confidence}
+        return {"id": self.id} | {
+            name: [float(v) if np.isfinite(v) else None for v in values] for name, values in columns.items()
+        }
+
+
+@dataclass(frozen=True)
+class Crossing:
+    """Crossing of zero growth by a branch, interpolated between two values of the parameter.
+
+    Attributes
+    ----------
+    branch : int
+    value : float
+    frequency : float, Hz
+    to_unstable : bool
+        True where the branch becomes unstable as the parameter grows.
+    """
+
+    branch: int
+    value: float
+    frequency: float
+    to_unstable: bool
+
+
+class SweepResult(StudyResult):
+    """Modes tracked along one parameter.
+
+    Attributes
+    ----------
+    parameter : str
+        "pressure", "density", "alpha", "beta" or "loss_factor".
+    values : (p,) SI
+        Those done.
+    branches : tuple of Branch
+    unstable_count : (p,) int
+        Both eigenvalues of a pair count.
+    checks : tuple of dict
+        See `dbvfiv.studies.sweep.branches.Check`.
+    certified : bool
+    points : tuple of dict
+        States, see `dbvfiv.record.states.SUMMARY`: one for each value over pressure, a single one otherwise.
+    notes : tuple of str
+    """
+
+    kind = "sweep"
+
+    def _latest(self, what: str) -> dict[str, Any]:
+        """Last note of a kind of this attempt, empty without one."""
+        log = self.record.log
+        last = max((i for i, note in enumerate(log) if note["what"] == "begin"), default=0)
+        return next((note for note in log[:last:-1] if note["what"] == what), {})
+
+    @cached_property
+    def _over(self) -> dict[str, Any]:
+        """What a sweep that is over says of itself; of one that goes on or was killed nothing."""
+        return self._latest("over")
+
+    def _rows(self, name: str) -> list[dict[str, Any]]:
+        """Rows of a table; of a sweep that goes on or was killed, what was kept on the way."""
+        if not self._over:
+            return self._latest("kept").get(name, [])
+        return self.record.table_rows(next(spec for spec in tables_of(self.mesh) if spec.name == name))
+
+    @property
+    def axis(self) -> Axis:
+        return self.case.sweep.axis
+
+    @property
+    def parameter(self) -> str:
+        return self.axis.parameter
+
+    @cached_property
+    def samples(self) -> tuple[Sample, ...]:
+        """Leading modes and counts at the values done, in the order of these."""
+        order = {float(value): i for i, value in enumerate(self.axis.values)}
+        return tuple(sorted(read_samples(self.record), key=lambda sample: order[sample.value]))
+
+    @cached_property
+    def values(self) -> np.ndarray:
+        return np.array([sample.value for sample in self.samples], float)
+
+    @cached_property
+    def unstable_count(self) -> np.ndarray:
+        return np.array([sample.unstable for sample in self.samples], int)
+
+    @property
+    def verdicts(self) -> tuple[Verdict, ...]:
+        """Verdict on each value."""
+        return tuple(sample.verdict for sample in self.samples)
+
+    @cached_property
+    def branches(self) -> tuple[Branch, ...]:
+        names, found = ("growth_rate", "angular_frequency", "confidence"), {}
+        for row in self._rows(BRANCHES):
+            table = found.setdefault(int(row["id"]), np.full((3, len(self.values)), np.nan))
+            table[:, self.values == row["value"]] = np.array([[row[name]] for name in names], float)
+        return tuple(Branch(number, *table) for number, table in found.items())
+
+    @property
+    def checks(self) -> tuple[dict[str, Any], ...]:
+        """See `dbvfiv.studies.sweep.branches.Check`."""
+        return tuple(self._over.get("checks", ()))
+
+    @cached_property
+    def points(self) -> tuple[dict[str, Any], ...]:
+        rows = self._rows(STATES)
+        return tuple({name: list(v) if isinstance(v, tuple) else v for name, v in row.items()} for row in rows)
+
+    @property
+    def certified(self) -> bool:
+        """True where all checks held."""
+        return self._over.get("certified", False)
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        return tuple(self._over.get("remarks", ()))
+
+    @property
+    def units(self) -> str:
+        """SI unit of the parameter."""
+        return PARAMETERS[self.parameter].quantity.si
+
+    def crossings(self) -> tuple[Crossing, ...]:
+        """Crossings of zero growth by the branches, interpolated between neighbouring values.
+
+        Two real branches that have merged count once.
+        """
+        scale = np.log if self.axis.log else np.asarray
+        place = scale(self.values)
+        found = []
+        for branch in self.branches:
+            growth = branch.growth_rate
+            for i in np.flatnonzero(growth[:-1] * growth[1:] < 0):
+                share = growth[i] / (growth[i] - growth[i + 1])
+                at = place[i] + share * (place[i + 1] - place[i])
+                frequency = branch.frequency[i] + share * (branch.frequency[i + 1] - branch.frequency[i])
+                if branch.angular_frequency[i] >= 0:
+                    found.append(
+                        Crossing(
+                            branch.id, float(np.exp(at) if self.axis.log else at), float(frequency), bool(growth[i] < 0)
+                        )
+                    )
+        return tuple(sorted(found, key=lambda c: c.value))
+
+    def summary(self) -> dict[str, Any]:
+        return {
+            "parameter": self.parameter,
+            "symmetry": variants(self.case, "sweep")[0].symmetry,
+            "values": self.values.tolist(),
+            "branches": [branch.summary() for branch in self.branches],
+            "unstable_count": self.unstable_count.tolist(),
+            "verdict": [verdict.summary() for verdict in self.verdicts],
+            "crossings": [vars(crossing) for crossing in self.crossings()],
+            "certificate": {"certified": self.certified, "checks": list(self.checks)},
+            "surroundings": {name: v for name, v in describe_surroundings(self.case).items() if name != self.parameter},
+            "states": list(self.points),
+            "notes": list(self.notes),
+            "warnings": list(self.warnings),
+            "failures": list(self.failures),
+            "interrupted": not (self.complete or bool(self.failures)),
+        }
+
+    def shortfall(self) -> str | None:
+        if not self.failures:
+            return None
+        kept = f"; they are kept in {self.path}" if self.path else ""
+        return f"{len(self.values)} of {len(self.axis.values)} values were reached{kept}"
+
+    def remarks(self) -> list[str]:
+        return self.lines()[2 + len(self.values) :]
+
+    def drawers(self) -> Iterator[tuple[str, Callable[[], Figure]]]:
+        yield from figures.draw(self)
+
+    def lines(self) -> list[str]:
+        crossings = [crossing_line(self, crossing) for crossing in self.crossings()]
+        places = ", ".join(f"{check['value']:.4g}" for check in self.checks)
+        word = "Certified" if self.certified else "Not certified"
+        checked = (
+            [f"{word}: checked at {self.parameter} {places} {self.units}".rstrip() + "."]
+            if self.checks
+            else ["Not certified: no value was checked."]
+        )
+        return [
+            *head(self.parameter),
+            *rows_of_sweep(self),
+            "",
+            *crossings,
+            *checked,
+            *(f"Note: {note}" for note in self.notes),
+        ]
+
+
+def head(parameter: str) -> tuple[str, str]:
+    """Names and units above the table."""
+    return (
+        f"{parameter:>12} {'growth rate':>12} {'frequency':>11} {'unstable':>9}",
+        f"{PARAMETERS[parameter].quantity.si:>12} {'1/s':>12} {'Hz':>11}",
+    )
 
 
 def print_live(case: Case) -> Callable[[Any], str]:
-    """Lines of the table as values are solved."""
+    """Lines of the table as values are solved: the leading mode and the number of unstable eigenvalues."""
     top = list(head(case.sweep.axis.parameter))
 
-    def write(item: SweepPoint | SteadyState) -> str:
+    def write(item: Sample | SteadyState) -> str:
         if isinstance(item, SteadyState):
             return f"Steady state at {item.pressure:.6g} Pa."
-        lines = [*top, point_row(item)]
+        leading = item.eigenvalues[0] if len(item.eigenvalues) else complex(np.nan, np.nan)
+        lines = [*top, _row(item.value, leading.real, abs(leading.imag) / (2 * np.pi), item.unstable)]
         top.clear()
         return "\n".join(lines)
 
     return write
 
 
-STUDY = Study("sweep", tables_of, run, SweepResult, resumable=False, live=print_live)
+def rows_of_sweep(result: SweepResult) -> list[str]:
+    """One line for each value: the leading branch."""
+    rows = []
+    for i, value in enumerate(result.values):
+        there = [b for b in result.branches if np.isfinite(b.growth_rate[i])]
+        leading = max(there, key=lambda b: b.growth_rate[i], default=None)
+        growth, frequency = (leading.growth_rate[i], leading.frequency[i]) if leading else (np.nan, np.nan)
+        outcome = result.verdicts[i].outcome if result.verdicts else ""
+        rows.append(f"{_row(value, growth, frequency, result.unstable_count[i])}  {outcome}".rstrip())
+    return rows
+
+
+def crossing_line(result: SweepResult, crossing: Crossing) -> str:
+    """One sentence on a crossing of zero growth."""
+    shown = PARAMETERS[result.parameter]
+    becomes = "unstable" if crossing.to_unstable else "stable"
+    how = f"at {crossing.frequency:.4g} Hz" if crossing.frequency > 0 else "without oscillation"
+    place = f"{crossing.value / shown.scale:.4g} {shown.shown_unit}".rstrip()
+    under = f" under {result.case.continuity}" if result.case.continuity else ""
+    return f"Branch {crossing.branch} becomes {becomes} near {result.parameter} {place} {how}{under} (interpolated)."
+
+
+def _row(value: float, growth: float, frequency: float, unstable: int) -> str:
+    return f"{value:>12.6g} {growth:>12.4f} {frequency:>11.4f} {unstable:>9d}"
+
+
+STUDY = Study("sweep", tables_of, run, SweepResult, resumable=False, rows_to_keep=rows_to_keep, live=print_live)

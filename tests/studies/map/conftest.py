@@ -2,7 +2,7 @@
 
 import pytest
 
-from dbvfiv.studies.map.run import run_map
+from dbvfiv.studies.map.study import run_map
 from tests.studies.map.axes import AXES
 
 

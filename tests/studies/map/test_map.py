@@ -20,10 +20,8 @@ from dbvfiv.record.header import Header
 from dbvfiv.record.record import GrowingRecord
 from dbvfiv.studies.map import pool as map_pool
 from dbvfiv.studies.map.figures import stability_map
-from dbvfiv.studies.map.result import MapResult
-from dbvfiv.studies.map.rows import keep_column, tables_of
-from dbvfiv.studies.map.run import run_map
-from dbvfiv.studies.modes.run import run_modes
+from dbvfiv.studies.map.study import MapResult, keep_column, run_map, tables_of
+from dbvfiv.studies.modes.search import run_modes
 from dbvfiv.studies.session import load_result
 from eigen import SingularShiftError
 from eigen.reduced_counts import CellCounts
@@ -45,7 +43,8 @@ def test_onsets_of_columns_lie_between_cells_of_opposite_sign(whole):
     y = np.array(whole.plan.y.values)
     for column in whole.columns:
         for _, along, frequency, direction, _ in column.onsets:
-            below, above = column.cells["growth_rate"][0][y < along][-1], column.cells["growth_rate"][0][y > along][0]
+            rates = column.numbers(0, "growth_rate")
+            below, above = rates[y < along][-1], rates[y > along][0]
             assert np.sign(above - below) == direction and below * above < 0 and frequency > 10
 
 
@@ -108,8 +107,11 @@ def same(result, whole):
     for a, b in zip(result.columns, whole.columns):
         assert (a.value, a.level, a.error) == (b.value, b.level, b.error)
         assert np.array_equal(a.onsets, b.onsets, equal_nan=True)
-        for name, values in a.cells.items():
-            assert np.array_equal(values, b.cells[name], equal_nan=True), name
+        assert list(a.samples) == list(b.samples)
+        for part in a.samples:
+            for one, other in zip(a.samples[part], b.samples[part], strict=True):
+                assert np.array_equal(one.eigenvalues, other.eigenvalues) and one.verdict == other.verdict
+                assert (one.key[:3], one.how, one.counted) == (other.key[:3], other.how, other.counted)
     assert [c.points() for c in result.curves] == [c.points() for c in whole.curves]
     assert result.checks == whole.checks and set(result.warnings) == set(whole.warnings)
 
@@ -126,18 +128,6 @@ def test_an_interrupted_map_resumes_to_the_same_numbers(case, whole, tmp_path):
     same(again, whole)
     assert [c.points() for c in again.curves] == [c.points() for c in result.curves]
     assert run(["resume", str(path)]) == 2  # nothing left to do
-
-
-def test_a_map_of_an_earlier_version_is_read(case, tmp_path):
-    path = tmp_path / "map.h5"
-    few = case.replace({"map.x": "pressure=3000:8000:2", "map.y": "density=10:1000:3:log", "map.curve": False})
-    found = Valve(few, "valve").map(output=path)
-    with h5py.File(path, "a") as file:
-        for name in ("outcome", "damping_ratio", "oscillating_rate", "oscillating_frequency"):
-            del file[f"tables/cells/{name}"]
-    again = load_result(path)
-    assert np.array_equal(again.grid("unstable"), found.grid("unstable"))
-    assert np.array_equal(again.grid("outcome"), found.grid("outcome"))
 
 
 def test_json_and_figures(case, tmp_path, capsys):
@@ -271,7 +261,7 @@ def test_cells_that_the_count_does_not_confirm_are_uncertain(case, monkeypatch):
     assert any("20 cells are uncertain" in sentence for sentence in result.warnings)
     record = GrowingRecord(Header.of("map", result.plan.case, "valve"), None, tables_of(None))
     for column in result.columns:
-        keep_column(record, result.plan, column)
+        keep_column(record, column)
     results = MapResult(record)
     # an unstable eigenvalue of the full pencil is proof without the count
     assert " 11 unstable, 0 stable, 0 of 20 certified" in results.lines()[1]
@@ -307,9 +297,9 @@ def test_a_map_without_damping_finds_what_modes_finds(undamped, coarse_case):
             model = ValveModel(case)
             (state,) = find_equilibria(model, [pressure]).states
             modes = run_modes(model, state)
-            assert modes.certified.agrees
+            assert modes.certificate.agrees
             assert undamped.grid("growth_rate")[0][j, i] == pytest.approx(modes.eigenvalues[0].real, rel=1e-5)
-            assert undamped.grid("unstable")[0][j, i] == modes.certified.unstable_count > 0
+            assert undamped.grid("unstable")[0][j, i] == modes.certificate.unstable_count > 0
     assert undamped.grid("frequency")[0].max() > 80.0
     assert any("hold for modes up to" in sentence for sentence in undamped.warnings)
 
@@ -319,13 +309,3 @@ def test_the_band_of_modes_is_that_of_the_map(coarse_case):
     result = run_map(coarse_case.replace(UNDAMPED | axes))
     assert result.grid("frequency")[0].max() <= 60.0
     assert any("up to 60 Hz" in sentence or "up to 59.94 Hz" in sentence for sentence in result.warnings)
-
-
-def test_a_file_of_an_earlier_version_has_no_cycles(coarse_case, tmp_path):
-    """It reads as one in which none were asked for."""
-    path = tmp_path / "map.h5"
-    axes = {"map.x": "pressure=2000:4000:2", "map.y": "density=1:1000:3:log", "map.curve": False, "map.checks": 0}
-    lines = Valve(coarse_case.replace(axes)).map(output=path).lines()
-    with h5py.File(path, "r+", libver="latest") as file:
-        del file["tables/cycles"]
-    assert load_result(path).lines() == lines

@@ -5,8 +5,10 @@ import pytest
 
 from dbvfiv.studies.map.column import MapColumn, MapPlan
 from dbvfiv.studies.map.curves import Web, linked
-from dbvfiv.studies.map.run import run_map
+from dbvfiv.studies.map.study import run_map
+from dbvfiv.studies.stability.samples import Sample
 from dbvfiv.studies.stability.walk import StabilityWalk
+from eigen.columns import REDUCED
 
 
 def test_linked_curves_go_through_all_onsets(whole):
@@ -28,7 +30,7 @@ def test_linked_tongue_is_one_curve(case):
                 (0, plan.value(plan.y, middle + d), f, way, 0.0) for d, f, way in ((-half, 30.0, 1), (half, 31.0, -1))
             ]
         )
-        columns.append(MapColumn(value, 0, {}, np.array(onsets, float).reshape(-1, 5), 0.0))
+        columns.append(MapColumn(value, 0, {0: [Sample(value, how=REDUCED)]}, np.array(onsets, float).reshape(-1, 5)))
     (curve,) = linked(plan, tuple(columns))
     assert len(curve.x) == 7 and curve.points()[0] == curve.points()[-1], "a tongue is closed"
     assert not curve.exact and "not known between" in curve.reason
@@ -40,8 +42,9 @@ def test_a_change_at_the_lower_edge_calls_for_columns(case, solved):
     plan = MapPlan.of(case)
     columns = []
     for value, number in ((1000.0, 0), (2000.0, 1)):
-        cells = {"unstable": np.full((1, 3), number if solved else -1)}
-        columns.append(MapColumn(value, 0, cells, np.zeros((0, 5)), 0.0))
+        unknown = Sample(value, refusal="The constants do not hold.")
+        cells = [Sample(value, unstable=number, how=REDUCED) if solved else unknown, Sample(value, how=REDUCED)]
+        columns.append(MapColumn(value, 0, {0: cells}, np.zeros((0, 5))))
     assert bool(Web.of(plan, columns, 0).wanted()) == solved
 
 
@@ -76,13 +79,13 @@ def test_columns_put_in_certify_what_onsets_lie_between_and_nothing_else(traced)
     put_in = [column for column in traced.columns if column.level > 0]
     assert put_in
     for column in put_in:
-        for law in range(2):
-            certified = np.flatnonzero(column.cells["certified"][law])
+        for law in column.samples:
+            certified = np.flatnonzero(column.numbers(law, "certified"))
             onsets = [row[1] for row in column.onsets if int(row[0]) == law]
             beside = {i for value in onsets for i in (np.searchsorted(along, value) - 1, np.searchsorted(along, value))}
             assert set(certified) == beside
-            counted = column.cells["counted"][law]
-            assert (counted[certified] == column.cells["unstable"][law][certified]).all()
+            counted = column.numbers(law, "counted")
+            assert (counted[certified] == column.numbers(law, "unstable")[certified]).all()
             assert (np.delete(counted, certified) == -1).all()
 
 
@@ -93,13 +96,13 @@ def test_a_column_is_put_in_under_the_law_that_asks_for_it(coarse_case):
     put_in = [column for column in result.columns if column.level > 0]
     assert any(column.has(0) != column.has(1) for column in put_in)
     for column in put_in:
-        for law in (0, 1):
-            assert column.has(law) == np.isfinite(column.cells["growth_rate"][law]).all()
+        assert [part for part in (0, 1) if column.has(part)] == list(column.samples)
+        assert all(np.isfinite(column.numbers(part, "growth_rate")).all() for part in column.samples)
     assert all(curve.exact for curve in result.curves)
 
 
 def test_a_curve_that_is_not_followed_says_so(case, monkeypatch):
-    monkeypatch.setattr("dbvfiv.studies.map.run.ROUNDS", 0)
+    monkeypatch.setattr("dbvfiv.studies.map.study.ROUNDS", 0)
     result = run_map(case.replace({"map.curve": True, "map.refine": 0, "map.checks": 0}))
     assert result.curves and not any(curve.exact for curve in result.curves)
     assert all(any(f"= {curve.x[0]:.6g}" in sentence for sentence in result.warnings) for curve in result.curves)

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from dbvfiv.studies.case import THESIS
-from dbvfiv.studies.map.run import run_map
+from dbvfiv.studies.map.study import run_map
 from dbvfiv.studies.session import load_result
 
 SETTINGS = {

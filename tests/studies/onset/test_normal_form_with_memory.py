@@ -19,10 +19,11 @@ def test_without_relaxation_both_ways_give_the_same():
     search = OnsetSearch(case, options)
     (crossing,) = search.scan.run(options.values)
     point = search.point(crossing)
-    mode = search.critical(point.place, 2j * np.pi * point.frequency)
-    plain = normal_form(case, search.walk, point.place, mode, "density")
-    model = search.walk.built(point.place).model
-    forms = ValveMemoryForms(model, search.walk.equilibrium(point.place), point.place.for_system())
+    place = search.place(point.value)
+    mode = search.critical(place, 2j * np.pi * point.frequency)
+    plain = normal_form(case, search.walk, place, mode, "density")
+    model = search.walk.built(place).model
+    forms = ValveMemoryForms(model, search.walk.equilibrium(place), place.for_system())
     found = hopf_normal_form_of(forms, plain.omega, np.concatenate([mode.q, mode.u]), "density")
     assert found.c1 == pytest.approx(plain.c1, rel=1e-8) and found.l1 == pytest.approx(plain.l1, rel=1e-8)
     assert found.crossing == pytest.approx(plain.crossing, rel=1e-8)

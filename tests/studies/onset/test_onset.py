@@ -8,9 +8,10 @@ import pytest
 from dbvfiv.case.parameters import Mu
 from dbvfiv.errors import CaseError, SolveError
 from dbvfiv.studies.case import thesis_case
-from dbvfiv.studies.map.run import run_map
-from dbvfiv.studies.onset.search import OnsetOptions, OnsetSearch, run_onset
+from dbvfiv.studies.map.study import run_map
+from dbvfiv.studies.onset.search import OnsetOptions, run_onset
 from dbvfiv.studies.stability.place import condition_of
+from dbvfiv.studies.stability.walk import StabilityWalk
 from tests.small_valves import FORMER
 
 
@@ -31,7 +32,8 @@ def test_the_onset_is_neutral_and_confirmed_on_both_sides(over_density):
     assert abs(point.growth_rate) < 1e-6
     assert point.confirmed and point.edge and not point.gains
     assert point.below.eigenvalue.real > 0 > point.above.eigenvalue.real
-    assert (point.below.unstable, point.above.unstable) == (2, 0) == (point.below.counted, point.above.counted)
+    sides = point.below, point.above
+    assert [side.unstable_count for side in sides] == [2, 0] == [side.unstable_count_independent for side in sides]
 
 
 def test_onset_over_pressure_meets_onset_over_density(over_density, coarse_case):
@@ -120,13 +122,13 @@ def test_each_onset_over_alpha_is_listed_once_and_shown_by_its_sides(coarse_case
 
 
 def test_nothing_is_claimed_beside_a_value_without_a_certificate(coarse_case, monkeypatch):
-    honest = OnsetSearch._solved
+    honest = StabilityWalk.sample
 
-    def doubtful(self, value):
-        sample = honest(self, value)
-        return replace(sample, certified=sample.certified and abs(value - 100.0) > 1e-6)
+    def doubtful(self, *arguments, value, **more):
+        sample = honest(self, *arguments, value=value, **more)
+        return replace(sample, certain=sample.certain and abs(value - 100.0) > 1e-6)
 
-    monkeypatch.setattr(OnsetSearch, "_solved", doubtful)
+    monkeypatch.setattr(StabilityWalk, "sample", doubtful)
     options = OnsetOptions("density", (1.0, 10.0, 100.0, 1000.0), True, normal_form=False, coarse_mesh=0)
     result = run_onset(coarse_case, options)
     assert not result.points

@@ -18,8 +18,9 @@ from dbvfiv.cli import run
 from dbvfiv.errors import CaseError
 from dbvfiv.observer import Observer
 from dbvfiv.studies.case import THESIS
-from dbvfiv.studies.onset.point import OnsetPoint, OnsetSample
+from dbvfiv.studies.onset.search import OnsetPoint
 from dbvfiv.studies.session import load_result
+from dbvfiv.studies.stability.samples import Sample
 from tests.small_valves import FORMER
 
 
@@ -47,8 +48,8 @@ class Watch(Observer):
         self.left, self.samples, self.points = most, [], []
 
     def item(self, result):
-        if isinstance(result, OnsetSample):
-            self.samples.append((result.mesh, result.value))
+        if isinstance(result, Sample):
+            self.samples.append((result.key.mesh, result.value))
         elif isinstance(result, OnsetPoint):
             self.points.append(result.key)
         self.left -= 1
@@ -183,7 +184,7 @@ def test_a_killed_run_goes_on(whole, tmp_path):
         time.sleep(0.02)
         try:
             with h5py.File(path, "r", swmr=True, locking=False) as file:
-                if len(file["tables/scan/#"]) >= 4:
+                if len(file["tables/samples/#"]) >= 4:
                     break
         except (OSError, KeyError, RuntimeError):
             continue

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from dbvfiv.errors import SolveError
-from dbvfiv.studies.stability.crossings import OnsetCorrection
+from dbvfiv.studies.stability.line import OnsetCorrection
 
 #: Neutral at 2, at 10 rad/s; the small model has it at 2.02.
 EXACT, SMALL = 2.0, 2.02

@@ -8,7 +8,7 @@ from dbvfiv.api import Valve
 from dbvfiv.case.parameters import Mu
 from dbvfiv.observer import Observer
 from dbvfiv.studies.case import thesis_case
-from dbvfiv.studies.map.run import run_map
+from dbvfiv.studies.map.study import run_map
 from dbvfiv.studies.onset.search import run_onset
 from dbvfiv.studies.session import load_result
 from dbvfiv.studies.stability.place import condition_of

@@ -1,4 +1,4 @@
-"""Every value of one parameter at which an eigenvalue of the coupled valve reaches the imaginary axis.
+"""Samples along a parameter line, and every value at which one of their eigenvalues reaches the imaginary axis.
 
 The k-th largest growth rate g_k is a continuous function of the parameter wherever the spectrum is, so crossings are
 its zeros. Between the values of a scan they are bracketed by the number of unstable modes; where the parabola through
@@ -11,47 +11,27 @@ Crossings found with a reduced-order model are corrected with the full matrices 
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 from scipy.optimize import brentq, linear_sum_assignment
 
-from eigen import Column, Condition
+from eigen import Column as Cells
+from eigen import Condition, Spectrum
 
-from ...errors import SolveError
+from ...case.parameters import Mu
+from ...errors import CaseError, NotValidError, SolveError
+from .place import condition_of, is_surrounding
+from .samples import WATCHED, Sample, SampleKey
+from .walk import StabilityWalk
 
 #: Times that an interval of the scan is halved in search of a narrow tongue.
 HALVINGS = 6
 #: A vertex of the parabola this close to zero, as a share of the values around it, calls for a closer look.
 MARGIN = 0.35
-#: Modes whose order is watched.
-WATCHED = 4
-
-
-@dataclass(frozen=True)
-class Sample:
-    """Leading eigenvalues at one value, sorted by growth rate, a conjugate pair given once.
-
-    `certified` says whether an independent count agrees with them, None where it was not asked.
-    """
-
-    value: float
-    eigenvalues: np.ndarray
-    certified: bool | None = None
-
-    @property
-    def growth(self) -> np.ndarray:
-        """(WATCHED,) largest growth rates; very negative where there are fewer."""
-        found = np.full(WATCHED, -1e9)
-        kept = self.eigenvalues.real[:WATCHED]
-        found[: len(kept)] = kept
-        return found
-
-    @property
-    def unstable(self) -> int:
-        """Unstable modes, a pair being one."""
-        return int(np.sum(self.eigenvalues.real > 0))
 
 
 @dataclass(frozen=True)
@@ -61,6 +41,11 @@ class Crossing:
     index: int
     low: Sample
     high: Sample
+
+    @property
+    def gains(self) -> bool:
+        """True where a mode becomes unstable as the parameter grows."""
+        return self.high.pairs > self.low.pairs
 
 
 class Scan:
@@ -93,6 +78,7 @@ class Scan:
         inside: Callable[[float], np.ndarray | Sample] | None = None,
     ):
         self._sample, self.log, self._certify, self._inside = sample, log, certify, inside or sample
+        self._vouched: dict[float, bool] = {}
         self.samples: dict[float, Sample] = {}
         self.failures: dict[float, str] = {}
         self.uncertain: list[tuple[float, float]] = []
@@ -165,11 +151,10 @@ class Scan:
 
     def certified(self, value: float) -> bool:
         """True where the eigenvalue count of the sample at a value of the scan is certified."""
-        sample = self.samples[value]
-        if sample.certified is None:
-            vouched = True if self._certify is None else bool(self._certify(value))
-            sample = self.samples[value] = replace(sample, certified=vouched)
-        return bool(sample.certified)
+        known = self.samples[value].certified
+        if known is None and value not in self._vouched:
+            self._vouched[value] = True if self._certify is None else bool(self._certify(value))
+        return self._vouched[value] if known is None else known
 
     def crossings(self) -> list[Crossing]:
         """Brackets of all crossings between neighbours of the scan that both have a certificate, with no value between
@@ -180,8 +165,8 @@ class Scan:
         values = sorted(self.samples)
         for a, b in zip(values[:-1], values[1:]):
             low, high = self.samples[a], self.samples[b]
-            few, many = sorted((low.unstable, high.unstable))
-            known = (low.certified is not False) and (high.certified is not False)
+            few, many = sorted((low.pairs, high.pairs))
+            known = low.certified is not False and high.certified is not False
             known = known and not any(a < value < b for value in self.failures)
             if known and few != many:
                 known = self.certified(a) and self.certified(b)
@@ -197,16 +182,16 @@ def _exchanged(low: Sample, high: Sample) -> bool:
 
     Modes of the samples are paired by the least sum of their distances.
     """
-    if not (low.unstable and high.unstable):
+    if not (low.pairs and high.pairs):
         return False
-    here, there = low.eigenvalues, high.eigenvalues
+    here, there = low.eigenvalues[:WATCHED], high.eigenvalues[:WATCHED]
     pairs = linear_sum_assignment(np.abs(here[:, None] - there))
     before, after = here[pairs[0]].real > 0, there[pairs[1]].real > 0
     return bool((before & ~after).any() and (after & ~before).any())
 
 
-def locate(scan: Scan, crossing: Crossing, tolerance: float) -> float:
-    """The value at which the growth rate of a bracketed crossing vanishes (Brent's method).
+def locate(scan: Scan, crossing: Crossing, tolerance: float) -> tuple[float, complex]:
+    """Value at which the growth rate of a bracketed crossing vanishes (Brent's method), and the eigenvalue there.
 
     Raises
     ------
@@ -214,20 +199,22 @@ def locate(scan: Scan, crossing: Crossing, tolerance: float) -> float:
         If an equilibrium inside the bracket was not found.
     """
 
-    def growth(value: float) -> float:
-        sample = scan.within(value)
-        if sample is None:
+    def sample(value: float) -> Sample:
+        found = scan.within(value)
+        if found is None:
             raise SolveError(scan.failures[float(value)])
-        return float(sample.growth[crossing.index])
+        return found
 
     low, high = crossing.low.value, crossing.high.value
-    return float(brentq(growth, low, high, xtol=tolerance * max(abs(low), abs(high)), rtol=8.9e-16, maxiter=80))
+    accuracy = {"xtol": tolerance * max(abs(low), abs(high)), "rtol": 8.9e-16, "maxiter": 80}
+    value = float(brentq(lambda v: float(sample(v).growth[crossing.index]), low, high, **accuracy))
+    return value, complex(sample(value).eigenvalues[crossing.index])
 
 
 #: Growth rate over the size of the eigenvalue up to which an onset counts as neutral.
 ACCURATE = 1e-6
 #: The same, at which corrections end.
-NEUTRAL = 1e-8
+NEUTRAL = 1e-10
 #: Corrections at most.
 CORRECTIONS = 5
 #: Step along the column for the slope of the growth rate, relative.
@@ -242,18 +229,18 @@ SAME = 1e-2
 
 @dataclass(frozen=True)
 class OnsetCorrection:
-    """Newton steps along a column with eigenvalues of the full matrices and slopes of the small model.
+    """Newton steps along a line with eigenvalues of the full matrices and slopes of the reduced-order model.
 
     Parameters
     ----------
-    column : Column
+    column : eigen.Column
     condition : callable
-        From a value along the column to its condition.
+        From a value along the line to its condition.
     direct : callable
         From a value to leading eigenvalues of the full pencil, where corrections on the small model do not settle.
     """
 
-    column: Column
+    column: Cells
     condition: Callable[[float], Condition]
     direct: Callable[[float], np.ndarray]
 
@@ -312,3 +299,229 @@ class OnsetCorrection:
 def _nearest(values: np.ndarray, near: complex) -> complex | None:
     """The eigenvalue next to a place, None if there is none at all."""
     return complex(values[int(np.argmin(np.abs(values - near)))]) if len(values) else None
+
+
+# -- the line
+# ----
+
+#: Accuracy of a crossing on a reduced-order model that the full matrices correct.
+ROUGH = 1e-6
+
+
+class LineOnset(NamedTuple):
+    """A located crossing of the imaginary axis.
+
+    Attributes
+    ----------
+    value : float
+    eigenvalue : complex, 1/s
+    residual : float
+        Growth rate over the size of the eigenvalue that the full matrices leave there; NaN where they were not asked.
+    """
+
+    value: float
+    eigenvalue: complex
+    residual: float
+
+    @property
+    def frequency(self) -> float:
+        """Hz."""
+        return abs(self.eigenvalue.imag) / (2 * np.pi)
+
+
+class ParameterLine:
+    """Samples and onsets along one parameter.
+
+    Where the steady state stays the same, samples come from one reduced-order model of it, cells without a certificate
+    excepted; elsewhere each value has its own steady state and its own full spectrum.
+
+    Parameters
+    ----------
+    walk : StabilityWalk
+    base : Mu
+        Parameter point with all that is not moved.
+    parameter : str
+    values : sequence of float
+        Ascending; the reduced-order model is made for them.
+    log : bool
+        Whether they are spaced logarithmically.
+    snapshots, edges, count
+        Of the reduced-order model, see `StabilityWalk.column`.
+    counts : str
+        "all": an independent count for every sample; "brackets": beside crossings; "none".
+    key : SampleKey
+        Of its samples.
+    known : iterable of Sample
+        Of an earlier run, not solved again; those of another key are left aside.
+    tell : callable, optional
+        Told of every sample with counts as it is found.
+    """
+
+    def __init__(
+        self,
+        walk: StabilityWalk,
+        base: Mu,
+        parameter: str,
+        values: Sequence[float],
+        log: bool = False,
+        *,
+        snapshots: int = 3,
+        edges: bool = False,
+        count: int = 2,
+        counts: str = "all",
+        key: SampleKey = SampleKey(),
+        known: Iterable[Sample] = (),
+        tell: Callable[[Sample], None] | None = None,
+    ):
+        self.walk, self.base, self.parameter, self.values, self.log = walk, base, parameter, tuple(values), log
+        self._column_options = {"snapshots": snapshots, "edges": edges, "count": count}
+        self.counts, self.tell, self.key = counts, tell, key
+        self.samples = {sample.value: sample for sample in known if sample.key[:3] == key[:3]}
+        self._earlier = set(self.samples)
+        certify = self._is_certified if counts == "brackets" else None
+        self.scan = Scan(self._scanned, log, certify, self._inside)
+
+    def place(self, value: float) -> Mu:
+        """Parameter point at a value."""
+        return self.base.at(**{self.parameter: float(value)})
+
+    def condition(self, value: float) -> Condition:
+        return condition_of(self.place(value))
+
+    @property
+    def stays(self) -> bool:
+        """True where all values share one steady state."""
+        return is_surrounding(self.walk.case, self.parameter)
+
+    @cached_property
+    def column(self) -> Cells | None:
+        """Cells at the values, with their reduced-order model; None where each value has its own steady state.
+
+        Raises
+        ------
+        SolveError
+        """
+        if not self.stays:
+            return None
+        return self.walk.column([self.place(value) for value in self.values], **self._column_options)
+
+    @property
+    def is_reduced(self) -> bool:
+        """True where there is a reduced-order model."""
+        return self.column is not None and self.column.cell is not None
+
+    @property
+    def error(self) -> float:
+        """Largest estimated relative error of a leading eigenvalue of the reduced-order model."""
+        return self.column.error if self.stays and any(not s.refusal for s in self.samples.values()) else 0.0
+
+    def cells(self) -> list[Sample]:
+        """Samples at all values at once.
+
+        Raises
+        ------
+        SolveError
+            If a steady state was not found.
+        """
+        try:
+            for i, value in enumerate(self.values if self.column is not None else ()):
+                self.samples[value] = replace(self.walk.sample(self.place(value), self.column, i, value), key=self.key)
+        except NotValidError:  # at all of them
+            refused = {v: Sample(v, refusal=self.walk.refusal(self.place(v)), key=self.key) for v in self.values}
+            self.samples |= refused
+        found = [self.sample(value) for value in self.values]
+        for sample in found:
+            if sample.failure:
+                raise SolveError(sample.failure)
+        return found
+
+    def sample(self, value: float, spectrum: Spectrum | None = None) -> Sample:
+        """Sample at a value, with its count; one that an earlier run has found is not solved again, and the leading
+        modes of the full pencil may be known.
+        """
+        if value not in self.samples:
+            try:
+                sample = self.walk.sample(self.place(value), self._cell(value, spectrum), value=value)
+            except NotValidError as error:
+                sample = Sample(value, refusal=str(error))
+            except (SolveError, CaseError) as error:
+                sample = Sample(value, failure=str(error))
+            self.samples[value] = sample = replace(sample, key=self.key)
+            if self.tell is not None:
+                self.tell(sample)
+        elif value in self._earlier and not self.samples[value].is_missing:
+            self._earlier.discard(value)
+            self.walk.recall(self.place(value))
+        return self.samples[value]
+
+    def _cell(self, value: float, spectrum: Spectrum | None = None) -> Cells:
+        """Leading eigenvalues at a value and their certificate."""
+        place = self.place(value)
+        if self.stays:
+            self.walk.require_valid(place)
+            if self.is_reduced:
+                return self.column.cell(condition_of(place))
+        return self.walk.column([place], spectra=None if spectrum is None else [spectrum])
+
+    def _is_certified(self, value: float) -> bool:
+        return bool(self._cell(value).certified[0])
+
+    def spectrum(self, value: float) -> np.ndarray:
+        """Leading eigenvalues of the full pencil.
+
+        Raises
+        ------
+        SolveError
+        """
+        return np.asarray(self.walk.spectrum(self.place(value)).eigenvalues)
+
+    def _scanned(self, value: float) -> Sample:
+        if value in self.samples or self.counts == "all":
+            sample = self.sample(value)
+            if sample.is_missing:
+                raise SolveError(sample.failure or sample.refusal)
+            return sample
+        if self.is_reduced:
+            return Sample(value, self.column.eigenvalues(self.condition(value)))
+        return Sample(value, self.spectrum(value))
+
+    def _inside(self, value: float) -> Sample:
+        """A sample on the way to a crossing. Where the wall relaxes the count costs most by far, and next to a neutral
+        mode it is of no use, so it is left out there and the sample is not kept.
+        """
+        counted = value in self.samples or (self.counts == "all" and not self.condition(value).loss)
+        if counted or not self.is_reduced:
+            return self._scanned(value)
+        return Sample(value, self.column.eigenvalues(self.condition(value)))
+
+    def bracket(self, crossing: Crossing, tolerance: float) -> tuple[float, complex]:
+        """Value and eigenvalue of a crossing as samples have it, without a correction.
+
+        Raises
+        ------
+        SolveError
+        """
+        return locate(self.scan, crossing, tolerance)
+
+    def locate(self, crossing: Crossing, tolerance: float) -> LineOnset:
+        """Locate a crossing; on a reduced-order model it is corrected with the full matrices, which search for it where
+        corrections do not settle.
+
+        Raises
+        ------
+        SolveError
+        """
+        value, eigenvalue = self.bracket(crossing, tolerance)
+        if not self.is_reduced:
+            return LineOnset(value, eigenvalue, abs(eigenvalue.real) / max(abs(eigenvalue), 1.0))
+        correct = OnsetCorrection(self.column, self.condition, self.spectrum)
+        found, frequency, residual = correct(value, abs(eigenvalue.imag) / (2 * np.pi))
+        if np.isfinite(residual):
+            return LineOnset(found, 2j * np.pi * frequency, residual)
+        full = Scan(self.spectrum)
+        full.samples |= {sample.value: sample for sample in (crossing.low, crossing.high)}
+        try:
+            found, exact = locate(full, crossing, tolerance)
+        except (SolveError, IndexError, ValueError):  # the full matrices have no such crossing there
+            return LineOnset(value, eigenvalue, np.nan)
+        return LineOnset(found, exact, abs(exact.real) / max(abs(exact), 1.0))

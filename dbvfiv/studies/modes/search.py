@@ -1,0 +1,544 @@
+"""Leading modes of the coupled valve at one steady state, with an independent count of the unstable ones."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+from scipy.optimize import brentq
+
+from eigen import CertifiedSpectrum, CoupledPencil, SearchOptions, Spectrum, TransferBasis, certified_spectrum
+
+from ...case.parameters import PARAMETERS, Mu
+from ...errors import CaseError
+from ...model import ValveModel
+from ...model.equilibria import require_equilibrium
+from ...model.state import SteadyState
+from ...model.symmetry import EQUILIBRIA, SYMMETRIES, Symmetry, symmetry_named
+from ...observer import Observer
+from ...record.table import Column
+from ..stability.dimensions import VARIANT
+from ..stability.family import ValveFamily, name_state_in_failures
+from ..stability.line import ParameterLine
+from ..stability.verdict import FLUTTERS, STABLE, UNDECIDED, Verdict, lowered, oscillates
+from ..stability.walk import StabilityWalk
+from ..state import State
+
+#: Structural modes in the basis behind the independent count.
+_BASIS = 24
+_NO_PLUG = (
+    "Inner fluid answers to the areas of this half of the valve and does not go along where it sways sideways in x: "
+    "such modes are too quick and too lightly damped in a liquid."
+)
+#: One row for each mode in a result file.
+MODE = (
+    *VARIANT,
+    Column("growth_rate", "1/s", "Real part of the eigenvalue"),
+    Column("angular_frequency", "rad/s", "Imaginary part of the eigenvalue, not negative"),
+    Column("residual", "", "Relative residual of the full pencil"),
+    Column("backward_error", "", "The same against matrix norms"),
+    Column(
+        "shape",
+        "1, rad/m",
+        "Displacements and rotations of the nodes, the largest displacement being 1 and real",
+        "c16",
+    ),
+    Column(
+        "area",
+        "m",
+        "Change of the flow area of the computed part at each row, m2 for 1 m of largest displacement",
+        "c16",
+    ),
+    Column("pressure", "Pa/m", "Change of the pressure at each row for 1 m of largest displacement", "c16"),
+    Column("inlet_velocity", "1/s", "Change of the inlet velocity for 1 m of largest displacement", "c16"),
+)
+#: Largest displacement at which shapes are drawn, as a fraction of the valve's length, and as one of the opening that
+#: must not close.
+_DRAWN, _OPEN = 0.035, 0.85
+
+
+@dataclass(frozen=True, eq=False)
+class ModeShape:
+    """A mode; a conjugate pair is one mode, with frequency >= 0.
+
+    Motion: Re(shape exp(eigenvalue t)), of undetermined amplitude.
+
+    Attributes
+    ----------
+    number : int
+        From 1, by falling growth rate.
+    growth_rate : float, 1/s
+    angular_frequency : float, rad/s
+    residual, backward_error : float
+        See `eigen.Spectrum`.
+    shape : (nn, c) complex
+        Displacements and rotations of the nodes, c = 5; the largest displacement is 1 and
+        real.
+    area : (m,) complex, m2 per m
+    pressure : (m,) complex, Pa per m
+        NaN in vacuo.
+    inlet_velocity : complex, m/s per m
+    symmetry : str
+        Class of motion, see `dbvfiv.model.symmetry`.
+    """
+
+    number: int
+    growth_rate: float
+    angular_frequency: float
+    residual: float
+    backward_error: float
+    shape: np.ndarray = field(repr=False)
+    area: np.ndarray = field(repr=False)
+    pressure: np.ndarray = field(repr=False)
+    inlet_velocity: complex = field(repr=False)
+    symmetry: str = EQUILIBRIA
+
+    def __repr__(self) -> str:
+        return f"<{type(self).__name__} {self.number}: growth {self.growth_rate:+.5g} 1/s at {self.frequency:.5g} Hz>"
+
+    @property
+    def eigenvalue(self) -> complex:
+        """1/s."""
+        return complex(self.growth_rate, self.angular_frequency)
+
+    @property
+    def frequency(self) -> float:
+        """Hz."""
+        return self.angular_frequency / (2 * np.pi)
+
+    @property
+    def damping_ratio(self) -> float:
+        """-growth rate over |eigenvalue|; 1 or -1 where nothing oscillates."""
+        size = abs(self.eigenvalue)
+        return -self.growth_rate / size if size > 0 else 0.0
+
+    @property
+    def amplitude(self) -> np.ndarray:
+        """(nn,) largest displacement of each node over a cycle, 1 at most."""
+        u = self.shape[:, :3]
+        square, turning = np.sum(np.abs(u) ** 2, axis=1), np.sum(u**2, axis=1)
+        return np.sqrt(0.5 * (square + np.abs(turning)))
+
+    def at_phase(self, phase: float) -> np.ndarray:
+        """(nn, c) displacements and rotations at a phase of the cycle, rad; growth or decay left out."""
+        return (self.shape * np.exp(1j * phase)).real
+
+    def drawn_amplitude(self, state: State) -> float:
+        """Largest displacement, m, at which the mode shows well and the centre line of the duckbill stays open."""
+        mesh = state.results.mesh
+        largest = _DRAWN * float(np.ptp(mesh.z))
+        if not symmetry_named(self.symmetry).moves_lips_apart:
+            return largest
+        line = mesh.centre_line
+        height = mesh.nodes[line, 1] + state.nodal[line, 1]
+        swing = np.abs(self.shape[line, 1])
+        moving = swing > 1e-3
+        room = float(np.min(_OPEN * height[moving] / swing[moving])) if moving.any() else np.inf
+        return min(largest, room) if room > 0.05 * largest else 0.2 * largest
+
+    def summary(self) -> dict[str, Any]:
+        """Plain SI numbers for JSON."""
+        return {
+            "growth_rate": self.growth_rate,
+            "frequency": self.frequency,
+            "damping_ratio": self.damping_ratio,
+            "residual": self.residual,
+            "symmetry": self.symmetry,
+        }
+
+
+#: The independent count as a curve.
+CURVE = (
+    *VARIANT,
+    Column("frequency", "Hz", "Points on the line at which the determinant was evaluated"),
+    Column("phase", "rad", "Continuous phase of the determinant against that of a stable structure"),
+)
+
+
+@dataclass(frozen=True, eq=False)
+class Certificate:
+    """Eigenvalue count by two routes: the list of modes, and the argument principle.
+
+    Attributes
+    ----------
+    agrees : bool
+    unstable_count, unstable_count_independent : int
+        From the list of modes, and from the winding of the determinant; both eigenvalues of a conjugate pair count.
+    statement : str
+        The count and its certainty in a sentence.
+    certain : bool
+        True where the phase of the determinant could be followed everywhere.
+    line : float, 1/s
+        Growth rate above which eigenvalues are counted: 0 but for undamped structures.
+    counted_up_to : float, Hz
+        Frequency at which the independent count ends; infinite but for searches in a band.
+    distance : float
+        Distance of the winding from a whole number.
+    response_error : float
+        Error of log det made by the reduced basis behind the count; NaN if no basis was used.
+    status : str
+        "complete" if no mode was missed among those listed.
+    asked : int
+    complete_above : float, 1/s
+    band : float, Hz
+        Every eigenvalue above this growth rate and up to this frequency was found.
+    rejected : int
+        Pairs thrown away because of their residual.
+    frequency, phase : (k,) Hz, rad
+        Phase of the determinant on the line.
+    """
+
+    agrees: bool
+    unstable_count: int
+    unstable_count_independent: int
+    statement: str
+    certain: bool
+    line: float
+    counted_up_to: float
+    distance: float
+    response_error: float
+    status: str
+    asked: int
+    complete_above: float
+    band: float
+    rejected: int
+    frequency: np.ndarray
+    phase: np.ndarray
+
+    @classmethod
+    def of(cls, found: CertifiedSpectrum) -> Certificate:
+        spectrum, count, error = found.spectrum, found.count, found.response_error
+        return cls(
+            agrees=found.agrees,
+            unstable_count=found.unstable_count,
+            unstable_count_independent=found.unstable_count_independent,
+            statement=found.statement,
+            certain=count.certain,
+            line=float(count.line),
+            counted_up_to=float(count.band),
+            distance=count.distance,
+            response_error=float("nan") if error is None else float(error),
+            status=spectrum.status,
+            asked=spectrum.asked,
+            complete_above=float(spectrum.complete_above),
+            band=float(spectrum.band),
+            rejected=spectrum.rejected,
+            frequency=count.frequencies,
+            phase=count.phase,
+        )
+
+    def note(self) -> dict[str, Any]:
+        """All but the curve, as a note of a record."""
+        curve = [column.name for column in CURVE]
+        return {name: value for name, value in vars(self).items() if name not in curve}
+
+    @classmethod
+    def joined(cls, parts: Mapping[str, Certificate]) -> Certificate:
+        """Join the certificates of several symmetry classes, given by their names.
+
+        Counts add up, and what holds for all of them holds. The curve is that of the first.
+        """
+        each = list(parts.values())
+        if len(each) == 1:
+            return each[0]
+        incomplete = [c.status for c in each if c.status != "complete"]
+        return cls(
+            agrees=all(c.agrees for c in each),
+            unstable_count=sum(c.unstable_count for c in each),
+            unstable_count_independent=sum(c.unstable_count_independent for c in each),
+            statement=" ".join(f"In {name}: {lowered(c.statement)}" for name, c in parts.items()),
+            certain=all(c.certain for c in each),
+            line=max(c.line for c in each),
+            counted_up_to=min(c.counted_up_to for c in each),
+            distance=max(c.distance for c in each),
+            response_error=max((c.response_error for c in each if c.response_error >= 0), default=float("nan")),
+            status=incomplete[0] if incomplete else "complete",
+            asked=sum(c.asked for c in each),
+            complete_above=max(c.complete_above for c in each),
+            band=min(c.band for c in each),
+            rejected=sum(c.rejected for c in each),
+            frequency=each[0].frequency,
+            phase=each[0].phase,
+        )
+
+    def summary(self) -> dict[str, Any]:
+        """Plain numbers for JSON, without the counts and the curve."""
+        return {name: value for name, value in self.note().items() if not name.startswith("unstable_count")}
+
+
+@dataclass(frozen=True)
+class ModesOptions:
+    """Options of `run_modes`.
+
+    Attributes
+    ----------
+    count : int
+        Modes wanted, a conjugate pair being one; fewer are given where eigenvalues accumulate.
+    in_vacuo : bool
+        Leave the fluid out; the steady pressures stay as follower loads.
+    search : SearchOptions
+        Band and limit point are chosen by the damping where they are not given.
+    """
+
+    count: int = 10
+    in_vacuo: bool = False
+    search: SearchOptions = field(default_factory=SearchOptions)
+
+    @classmethod
+    def of(cls, case) -> ModesOptions:
+        """Options of a case file."""
+        modes = case.modes
+        shift = None if modes.shift is None else (complex(modes.shift, 2 * math.pi * modes.shift_frequency),)
+        return cls(
+            modes.count, modes.in_vacuo, SearchOptions(modes.max_frequency, shifts=shift, tolerance=modes.tolerance)
+        )
+
+
+@dataclass(frozen=True)
+class FoundModes:
+    """Leading modes of one state in one variant.
+
+    Attributes
+    ----------
+    modes : tuple of ModeShape
+        By falling growth rate.
+    certificate : Certificate
+        Of the eigenvalue count.
+    verdict : Verdict
+        Stability of the state in this symmetry class.
+    notes : tuple of str
+    spectrum : Spectrum, optional
+        Eigenvalues, vectors and residuals, of a run.
+    """
+
+    modes: tuple[ModeShape, ...]
+    certificate: Certificate
+    verdict: Verdict
+    notes: tuple[str, ...] = ()
+    spectrum: Spectrum | None = None
+
+    @property
+    def eigenvalues(self) -> np.ndarray:
+        """(k,) complex, 1/s, sorted by growth rate."""
+        return np.array([mode.eigenvalue for mode in self.modes], complex)
+
+    @property
+    def stable(self) -> bool | None:
+        """True where all modes decay; None where that is not known."""
+        return self.verdict.stable
+
+    def summary(self) -> dict[str, Any]:
+        """Plain SI numbers for JSON."""
+        return {
+            "unstable_count": self.certificate.unstable_count,
+            "unstable_count_independent": self.certificate.unstable_count_independent,
+            "stable": self.stable,
+            "certificate": self.certificate.summary(),
+        }
+
+
+def run_modes(
+    model: ValveModel,
+    state: SteadyState,
+    mu: Mu | None = None,
+    options: ModesOptions | None = None,
+    observer: Observer | None = None,
+    symmetry: Symmetry = SYMMETRIES[EQUILIBRIA],
+    walk: StabilityWalk | None = None,
+) -> FoundModes:
+    """Leading modes of a steady state in one class of motion.
+
+    Parameters
+    ----------
+    model : ValveModel
+    state : SteadyState
+        An equilibrium of the model.
+    mu : Mu, optional
+        Parameter point; that of the case by default.
+    options : ModesOptions, optional
+    observer : Observer, optional
+    symmetry : Symmetry, optional
+        The class; that of the equilibria by default.
+    walk : StabilityWalk, optional
+        One that knows the state.
+
+    Raises
+    ------
+    CaseError
+        For a valve at rest with fluid in it: without a pressure its velocity is undetermined.
+    NotValidError
+        If the constants of a rubber with loss factors are unstable at this state.
+    SolveError
+        If the state is no equilibrium, or no shift was found at which the pencil can be factored.
+    """
+    options = ModesOptions.of(model.case) if options is None else options
+    observer = Observer() if observer is None else observer
+    require_equilibrium(model, state)
+    in_vacuo = options.in_vacuo or not model.flow.has_fluid
+    if not in_vacuo and state.pressure <= model.flow.back:
+        raise CaseError(
+            f"Coupled modes need an inlet pressure greater than {model.flow.back:g}, because without one the velocity "
+            "of an ideal fluid is undetermined; "
+            "modes.in_vacuo gives those of the structure at rest."
+        )
+    place = Mu.of(model.case).at(**(mu or {})).at(pressure=state.pressure)
+    if walk is None:
+        walk = StabilityWalk(model.case, observer, model, symmetry)
+        walk.give(Mu.of(model.case).at(pressure=state.pressure), state)
+    walk.require_valid(place)
+    observer.progress("linearising")
+    linear = walk.family(place).linear
+    pencil = linear.pencil(place, not in_vacuo)
+    observer.progress("searching")
+    with name_state_in_failures(state.pressure):
+        family = ValveFamily(linear, options.search.max_frequency, options.count)
+        search = family.leading_under(place, in_vacuo)
+        asked = replace(search.options, shifts=options.search.shifts, tolerance=options.search.tolerance)
+        basis = TransferBasis(pencil, modes=max(_BASIS, options.count))
+        certified = certified_spectrum(pencil, options.count, asked, basis=basis)
+    certified = replace(certified, spectrum=_ties_by_frequency(certified.spectrum))
+    notes = (*search.notes, *certified.spectrum.notes)
+    if symmetry.of_equilibria and not (model.mesh.part.is_quarter or in_vacuo):
+        notes = (*notes, _NO_PLUG)
+    searched = family.is_searched(certified.spectrum.eigenvalues, place, search.band)
+    verdict = _verdict(certified, searched, search.claimed)
+    modes = _shapes(model, pencil, linear, certified.spectrum, symmetry, in_vacuo)
+    result = FoundModes(modes, Certificate.of(certified), verdict, notes, certified.spectrum)
+    observer.item(result)
+    if result.stable is None:
+        observer.warn(result.verdict.reason)
+    return result
+
+
+def _verdict(found: CertifiedSpectrum, searched: np.ndarray, claimed: float) -> Verdict:
+    """Verdict from the modes in the region that every study searches, up to the frequency that is claimed."""
+    count = found.count
+    verdict = Verdict.of(
+        found.spectrum.eigenvalues[searched],
+        found.unstable_count,
+        found.unstable_count_independent,
+        found.certificate.certain,
+        line=count.line,
+        band=min(count.band, claimed),
+        statement="" if found.agrees else found.statement,
+    )
+    if np.isinf(count.band) or verdict.outcome != STABLE:
+        return verdict
+    beyond = " Above that the count finds more: modes may be unstable there; modes.max_frequency moves the end."
+    return replace(verdict, outcome=UNDECIDED, reason=verdict.reason + beyond)
+
+
+def _shapes(model, pencil: CoupledPencil, linear, spectrum, symmetry, in_vacuo) -> tuple[ModeShape, ...]:
+    """Modes with shapes, areas and pressures of the eigenvectors, scaled to a largest displacement of 1."""
+    change, pressure = _changes(model, pencil, linear, spectrum, symmetry, in_vacuo)
+    found = []
+    for i, value in enumerate(spectrum.eigenvalues):
+        nodal = linear.nodal(spectrum.q[:, i])
+        scale = _largest(nodal)
+        found.append(
+            ModeShape(
+                number=i + 1,
+                growth_rate=float(value.real),
+                angular_frequency=float(value.imag),
+                residual=float(spectrum.residual[i]),
+                backward_error=float(spectrum.backward_error[i]),
+                shape=nodal / scale,
+                area=change[:, i] / scale,
+                pressure=pressure[:, i] / scale,
+                inlet_velocity=complex(spectrum.u[0, i] / scale) if pencil.b else 0j,
+                symmetry=symmetry.name,
+            )
+        )
+    return tuple(found)
+
+
+def _changes(model, pencil: CoupledPencil, linear, spectrum, symmetry, in_vacuo) -> tuple[np.ndarray, np.ndarray]:
+    """Changes of areas and pressures (m, k) of the eigenvectors; no pressures in vacuo, NaN, and none of either to
+    first order but in the class of the equilibria.
+    """
+    pressure = np.full((model.stations, len(spectrum)), np.nan if in_vacuo else 0.0, complex)
+    if not symmetry.of_equilibria:
+        return np.zeros_like(pressure, complex), pressure
+    change = linear.slope @ spectrum.q
+    for i, value in enumerate(() if in_vacuo else spectrum.eigenvalues):
+        by_area, by_velocity, _, _ = pencil.fluid_at(value)
+        # behind the stations stands what couples the fluid outside
+        stations = len(change)
+        by_area, by_velocity = by_area[:stations, :stations], by_velocity[:stations]
+        pressure[:, i] = by_area @ change[:, i] + by_velocity @ spectrum.u[:, i]
+    return change, pressure
+
+
+def _ties_by_frequency(spectrum: Spectrum) -> Spectrum:
+    """Modes whose growth rates differ by rounding only, as without damping, in the order of their frequencies."""
+    values = spectrum.eigenvalues
+    unit = 1e-9 * np.abs(values).max(initial=0.0)
+    return spectrum.select(np.lexsort((values.imag, -np.round(values.real / unit)))) if unit > 0 else spectrum
+
+
+def _largest(nodal: np.ndarray) -> complex:
+    """Largest displacement in any direction at any instant of a cycle, as a factor to divide by."""
+    u = nodal[:, :3]
+    # semi-axes of the ellipses on which the nodes move
+    square, turning = np.sum(np.abs(u) ** 2, axis=1), np.sum(u**2, axis=1)
+    reach = np.sqrt(0.5 * (square + np.abs(turning)))
+    where = int(np.argmax(reach))
+    phase = np.sqrt(turning[where] / abs(turning[where])) if abs(turning[where]) > 0 else 1.0
+    return complex(reach[where] * phase) if reach[where] > 0 else 1.0 + 0j
+
+
+#: Factors asked, from that of the case outwards; below a twentieth a wall is as good as undamped.
+LOWER, HIGHER = np.geomspace(1.0, 0.05, 9), np.geomspace(1.0, 10.0, 7)
+#: Relative accuracy of the factor.
+ACCURACY = 1e-4
+
+
+def critical_damping_factor(walk: StabilityWalk, place: Mu, verdict: Verdict) -> float:
+    """Factor on the loss factors, or on beta, at which flutter begins, next to 1.
+
+    It lies below 1 where the state is stable and above where it flutters.
+
+    Parameters
+    ----------
+    walk : StabilityWalk
+    place : Mu
+    verdict : Verdict
+        On the place.
+
+    Returns
+    -------
+    float
+        NaN where the wall has no such damping, the verdict is another, or no factor in reach makes the difference.
+
+    Raises
+    ------
+    SolveError
+        If there is no steady state.
+    """
+    name = "loss_factor" if place.loss_factor > 0 else "beta"
+    own = place[name]
+    if own <= 0 or verdict.outcome not in (STABLE, FLUTTERS):
+        return np.nan
+    factors = LOWER if verdict.outcome == STABLE else HIGHER
+    factors = factors[own * factors <= PARAMETERS[name].high]
+    line = ParameterLine(walk, place, name, own * factors, snapshots=len(factors), edges=True)
+    if line.column is None:
+        return np.nan
+
+    def growth(values) -> float:
+        values = np.asarray(values)
+        modes = values[oscillates(values)]
+        return float(modes.real.max()) if modes.size else np.nan
+
+    rates = [growth(row) for row in line.column.leading]
+    for a, b, low, high in zip(factors[:-1], factors[1:], rates[:-1], rates[1:]):
+        if not (np.isfinite(low) and np.isfinite(high)):
+            return np.nan
+        if low * high <= 0 and line.is_reduced:
+            at = lambda factor: growth(line.column.eigenvalues(line.condition(own * factor)))  # noqa: E731
+            found = brentq(at, min(a, b), max(a, b), rtol=ACCURACY)
+            return float(f"{found:.8g}")  # rounding of factorisations would part a resumed run from a whole one
+    return np.nan

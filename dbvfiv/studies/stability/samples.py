@@ -1,0 +1,177 @@
+"""Samples of the parameter space, leading eigenvalues with both counts of the unstable ones, and their storage.
+
+Studies over parameters keep all they find of states in one table of samples. The verdict on a state follows from its
+sample.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+
+from eigen import Column as Cells
+from eigen.columns import DIRECT, MISSING
+
+from ...record.record import GrowingRecord, Record
+from ...record.table import Column, TableSpec
+from .dimensions import CLASS_NAMES, VARIANT
+from .verdict import OUTCOMES, Verdict
+
+#: Modes whose order is watched.
+WATCHED = 4
+#: Eigenvalues kept of a sample.
+KEPT = 8
+
+
+class SampleKey(NamedTuple):
+    """What tells apart the samples of one run besides the value of their line's parameter."""
+
+    continuity: float = 0.0
+    symmetry: str = ""
+    mesh: int = 0
+    across: float = np.nan
+
+
+@dataclass(frozen=True, eq=False)
+class Sample:
+    """Leading eigenvalues at one parameter point, and both counts of the unstable ones.
+
+    Attributes
+    ----------
+    value : float
+        Of the parameter of the line.
+    eigenvalues : (k,) complex array, 1/s
+        Sorted by growth rate, a conjugate pair given once.
+    unstable, counted : int
+        Unstable eigenvalues by the spectrum and by the argument principle, conjugates counted apart; -1 where nobody
+        asked.
+    certain : bool
+        The count followed its phase, and what both rest on is accurate enough.
+    line, band : float, 1/s, Hz
+        Growth rate counted from, and frequency up to which the sample is a verdict.
+    how : int
+        `eigen.columns.REDUCED`, `DIRECT` or `MISSING`.
+    failure : str
+        Why there is no spectrum; empty if there is one.
+    refusal : str
+        Why the constants of the rubber do not hold; empty where they do.
+    key : SampleKey
+    """
+
+    value: float
+    eigenvalues: np.ndarray = field(default_factory=lambda: np.zeros(0, complex))
+    unstable: int = -1
+    counted: int = -1
+    certain: bool = False
+    line: float = 0.0
+    band: float = np.inf
+    how: int = MISSING
+    failure: str = ""
+    refusal: str = ""
+    key: SampleKey = SampleKey()
+
+    @classmethod
+    def of(cls, value: float, cells: Cells, cell: int, claimed: float) -> Sample:
+        """Sample of a cell of a column; `claimed` is the frequency, Hz, up to which the search speaks for the state."""
+        own = cells.certificate(cell)
+        band, counts = min(own.band, claimed), (own.unstable, own.counted, own.certain)
+        return cls(value, np.asarray(cells.leading[cell])[:KEPT], *counts, own.line, band, int(cells.how[cell]))
+
+    @cached_property
+    def growth(self) -> np.ndarray:
+        """(WATCHED,) largest growth rates; very negative where there are fewer."""
+        found = np.full(WATCHED, -1e9)
+        kept = self.eigenvalues.real[:WATCHED]
+        found[: len(kept)] = kept
+        return found
+
+    @property
+    def pairs(self) -> int:
+        """Unstable modes, a pair being one."""
+        return int(np.sum(self.eigenvalues.real > 0))
+
+    @property
+    def certified(self) -> bool | None:
+        """True where both counts agree; None where nobody counted."""
+        return None if self.counted < 0 else bool(self.certain and self.unstable == self.counted)
+
+    @property
+    def is_missing(self) -> bool:
+        return bool(self.failure or self.refusal)
+
+    @cached_property
+    def verdict(self) -> Verdict:
+        """Stability at the parameter point."""
+        if self.refusal:
+            return Verdict.not_valid(self.refusal)
+        if self.failure:
+            return Verdict.undecided(self.failure)
+        counts, region = (self.unstable, self.counted, self.certain), {"line": self.line, "band": self.band}
+        return Verdict.of(self.eigenvalues, *counts, proven=self.how == DIRECT, **region)
+
+    def number(self, name: str) -> float:
+        """A quantity by its name, for tables over several parameters: growth_rate, frequency (of the leading mode),
+        second (growth rate of the next), unstable, counted, certified, how or outcome.
+        """
+        if name == "outcome":
+            return OUTCOMES.index(self.verdict.outcome)
+        if name in ("growth_rate", "frequency", "second"):
+            place = int(name == "second")
+            value = self.eigenvalues[place] if len(self.eigenvalues) > place else complex(np.nan, np.nan)
+            return float(value.imag / (2 * np.pi) if name == "frequency" else value.real)
+        return getattr(self, name) or 0
+
+
+# -- storage
+# ----
+
+SAMPLES, _TEXT = "samples", "no sample"
+_COLUMNS = (
+    *VARIANT,
+    Column("mesh", "", "0 for the mesh of the case, 1 for the coarser one", "i8"),
+    Column("across", "SI", "Value of the parameter across in a map; NaN along a single line"),
+    Column("value", "SI", "Value of the parameter"),
+    Column("growth_rates", "1/s", "Of the leading modes; NaN where there are fewer"),
+    Column("angular_frequencies", "rad/s", "Of the leading modes"),
+    Column("unstable", "", "Unstable eigenvalues listed, conjugates counted apart; -1 where there is no list", "i8"),
+    Column("counted", "", "The same by the argument principle; -1 where nobody asked", "i8"),
+    Column("certain", "", "Whether that count, and what both rest on, can be relied on", "bool"),
+    Column("line", "1/s", "Growth rate counted from"),
+    Column("band", "Hz", "Frequency up to which the sample is a verdict; infinite for all"),
+    Column("how", "", "0 on the reduced-order model, 1 with the full matrices, 2 none; a note says why", "i8"),
+)
+SAMPLE_TABLE = TableSpec(SAMPLES, _COLUMNS, dict.fromkeys(("growth_rates", "angular_frequencies"), (KEPT,)), chunk=512)
+
+
+def keep_samples(record: GrowingRecord, samples: Sequence[Sample]) -> None:
+    """Keep samples as rows; why one is missing is noted before its row, which vouches for it."""
+    modes = np.full((len(samples), KEPT), complex(np.nan, np.nan))
+    for number, sample in enumerate(samples, record.rows(SAMPLES)):
+        if sample.is_missing:
+            record.note(_TEXT, row=number, failure=sample.failure, refusal=sample.refusal)
+    for row, sample in zip(modes, samples):
+        row[: len(sample.eigenvalues)] = sample.eigenvalues[:KEPT]
+    own = ("value", "unstable", "counted", "certain", "line", "band", "how")
+    rows = {name: [getattr(sample, name) for sample in samples] for name in own}
+    rows |= {name: [getattr(sample.key, name) for sample in samples] for name in SampleKey._fields}
+    rows["symmetry"] = [CLASS_NAMES.index(name) for name in rows["symmetry"]]
+    record.extend(SAMPLES, rows | {"growth_rates": modes.real, "angular_frequencies": modes.imag})
+
+
+def read_samples(record: Record) -> list[Sample]:
+    """Samples in the order they were found in."""
+    texts = {note["row"]: {name: note[name] for name in ("failure", "refusal")} for note in record.notes(_TEXT)}
+    modes = 1j * record.column(SAMPLES, "angular_frequencies")
+    modes += record.column(SAMPLES, "growth_rates")
+    names = [column.name for column in _COLUMNS if column.name not in SAMPLE_TABLE.shapes]
+    found = []
+    for i, row in enumerate(record.table_rows(SAMPLE_TABLE, names)):
+        row["symmetry"] = CLASS_NAMES[row["symmetry"]]
+        key = SampleKey(**{name: row.pop(name) for name in SampleKey._fields})
+        text = texts.get(i, {}) if row["how"] == MISSING else {}
+        found.append(Sample(eigenvalues=modes[i][np.isfinite(modes[i])], key=key, **row, **text))
+    return found
