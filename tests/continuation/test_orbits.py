@@ -25,7 +25,7 @@ from continuation.first_order import DirectLinearisation, FirstOrderSystem
 from continuation.harmonics import Harmonics
 from continuation.periodic import PeriodicMotion
 from tests.systems.brusselator import brusselator, brusselator_1d
-from tests.systems.excitable import fitzhugh_nagumo
+from tests.systems.literature import fitzhugh_nagumo
 from tests.systems.lorenz import lorenz
 from tests.systems.normal_forms import bautin, stuart_landau, warped_stuart_landau
 from tests.systems.van_der_pol import van_der_pol
