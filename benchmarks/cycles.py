@@ -9,7 +9,7 @@ from dbvfiv.motion.control import RunOptions
 from dbvfiv.observer import Observer
 from dbvfiv.studies.case import thesis_case
 from dbvfiv.studies.session import Session
-from dbvfiv.studies.transient.study import Runner
+from dbvfiv.studies.transient.run import Runner
 
 from .registry import Row, benchmark
 

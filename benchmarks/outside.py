@@ -13,7 +13,7 @@ from dbvfiv.model.equilibria import find_equilibria
 from dbvfiv.motion.control import RunOptions
 from dbvfiv.studies.case import thesis_case
 from dbvfiv.studies.stability.walk import StabilityWalk
-from dbvfiv.studies.transient.study import Runner
+from dbvfiv.studies.transient.run import Runner
 from eigen import SearchOptions, Workspace, leading_modes
 
 from .registry import Row, benchmark

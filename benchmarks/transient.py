@@ -16,8 +16,8 @@ from dbvfiv.record.header import Header
 from dbvfiv.record.mesh import MeshData
 from dbvfiv.record.record import GrowingRecord
 from dbvfiv.studies.case import thesis_case
-from dbvfiv.studies.transient.keeping import RESTART, row_bytes, tables_of
-from dbvfiv.studies.transient.study import Runner
+from dbvfiv.studies.transient.history import RESTART, tables_of
+from dbvfiv.studies.transient.run import Runner
 
 from .registry import Row, benchmark
 
@@ -85,7 +85,7 @@ def block(model: ValveModel, first, steps: int = BLOCK) -> tuple[float, int, obj
             runner = Runner(model, RunOptions.of(case), record, case)
             start = process_time()
             run = runner.start(first)
-            return process_time() - start, run.residuals, run.progress.state
+            return process_time() - start, run.stepper.residuals, run.progress.state
 
 
 @benchmark("time-steps-relaxing")
@@ -136,7 +136,7 @@ def time_steps():
             run = runner.start(cycle)
             spent, wall = process_time() - start - unit.spent, perf_counter() - wall - unit.wall
             record.conclude(True)
-            restarts = record.rows(RESTART) * row_bytes(record.tables[RESTART])
+            restarts = record.rows(RESTART) * record.tables[RESTART].row_bytes
         size = os.path.getsize(path)
     force, solve = np.median(unit.force), np.median(unit.solve)
     steps = run.progress.steps
@@ -152,9 +152,9 @@ def time_steps():
     )
     yield Row(
         "residuals a step",
-        run.residuals / steps,
+        run.stepper.residuals / steps,
         "",
-        note=f"solves {run.solves / steps:.2f}, steps per factorisation {steps / max(1, run.factorisations):.0f}",
+        note=f"solves {run.stepper.solves / steps:.2f}, steps per factorisation {steps / max(1, run.stepper.factorisations):.0f}",
     )
     yield Row(
         "steps per second of processor time",

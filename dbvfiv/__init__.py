@@ -33,7 +33,7 @@ _PUBLIC = {
     "State": "studies.state",
     "SteadyResult": "studies.steady.study",
     "SweepResult": "studies.sweep.study",
-    "TransientResult": "studies.transient.result",
+    "TransientResult": "studies.transient.study",
 }
 __all__ = sorted(_PUBLIC)
 

@@ -26,7 +26,7 @@ from .studies.session import Session, named_changes
 from .studies.state import State, sensitivity_keys
 from .studies.steady.study import SteadyResult
 from .studies.sweep.study import SweepResult
-from .studies.transient.result import TransientResult
+from .studies.transient.study import TransientResult
 
 #: A result file to write; none without it.
 Output = str | Path | None

@@ -15,7 +15,7 @@ from ..studies.case import thesis_case
 from ..studies.closure.study import ClosureResult
 from ..studies.session import Session, kept_run
 from ..studies.steady.study import SteadyResult
-from ..studies.transient.result import TransientResult
+from ..studies.transient.study import TransientResult
 
 _HEAD = ("", "ours", "thesis", "difference")
 

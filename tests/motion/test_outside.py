@@ -9,7 +9,7 @@ import dbvfiv
 from dbvfiv.motion.control import RunOptions
 from dbvfiv.motion.equations import ValveMotion
 from dbvfiv.motion.outside import OutsideCorrection
-from dbvfiv.studies.transient.study import Runner
+from dbvfiv.studies.transient.run import Runner
 from tests.observers import Stop
 from tests.small_valves import make_valve
 from tests.studies.transient.runs import transient
@@ -79,7 +79,7 @@ def test_accelerations_carry_the_fluid():
 
 @pytest.mark.parametrize("adaptive", [False, True])
 def test_a_resumed_run_gives_the_same_numbers(tmp_path, adaptive, monkeypatch):
-    monkeypatch.setattr("dbvfiv.studies.transient.keeping.RESTART_SHARE", float("inf"))
+    monkeypatch.setattr("dbvfiv.studies.transient.history.RESTART_SHARE", float("inf"))
     changes = WATER | SMOOTH | {"transient.start": "rest", "transient.restart_every": 7, "transient.duration": 0.02}
     model = make_valve(changes | {"transient.step": 5e-4, "transient.adaptive": adaptive})
     whole = transient(model, output=tmp_path / "whole.h5")

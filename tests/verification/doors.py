@@ -24,7 +24,7 @@ from dbvfiv.studies.session import Session
 from dbvfiv.studies.stability.verdict import UNDECIDED, Verdict
 from dbvfiv.studies.stability.walk import StabilityWalk
 from dbvfiv.studies.sweep.branches import SweepOptions, run_sweep
-from dbvfiv.studies.transient.study import Runner
+from dbvfiv.studies.transient.run import Runner
 from tests.verification.test_transient_modes import ringing
 
 #: Case files.

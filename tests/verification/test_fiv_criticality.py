@@ -13,7 +13,7 @@ from dbvfiv.model import ValveModel
 from dbvfiv.studies.case import thesis_case
 from dbvfiv.studies.onset.normal_form import normal_form
 from dbvfiv.studies.onset.search import OnsetOptions, OnsetSearch
-from dbvfiv.studies.transient.study import run_transient
+from dbvfiv.studies.transient.run import Runner
 
 #: Relative distance from the onset density.
 ASIDE = 0.02
@@ -65,7 +65,7 @@ class Onset:
             "transient.duration": 0.5,
             "transient.step": 4e-4,
         }
-        history = run_transient(ValveModel(self.case.replace(changes))).history
+        history = Runner(ValveModel(self.case.replace(changes))).start().history
         time, lip = np.array(history["time"]), np.array(history["lip_displacement"]) - self.steady
         period = 1.0 / self.point.frequency
         starts = np.arange(0.1, time[-1] - period, period)

@@ -19,7 +19,7 @@ from dbvfiv.model.equilibria import LoadPath
 from dbvfiv.motion.control import RunOptions
 from dbvfiv.motion.stepper import StepOptions
 from dbvfiv.studies.case import thesis_case
-from dbvfiv.studies.transient.study import Runner
+from dbvfiv.studies.transient.run import Runner
 from eigen import SearchOptions, TransferBasis, certified_spectrum, leading_modes
 from tests.small_valves import FORMER
 from tests.verification.test_transient_modes import QUASI, STORAGE, check_three_routes, three_routes

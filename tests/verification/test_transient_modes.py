@@ -21,7 +21,7 @@ from dbvfiv.motion.stepper import StepOptions
 from dbvfiv.studies.case import thesis_case
 from dbvfiv.studies.stability.place import condition_of
 from dbvfiv.studies.stability.walk import StabilityWalk
-from dbvfiv.studies.transient.study import Runner
+from dbvfiv.studies.transient.run import Runner
 
 PUSH = 1e-8  # m; at 2 kPa, where stops at the corners of the lips part, 1e-6 m changes the frequency by 0.5 %
 BETA = 0.003

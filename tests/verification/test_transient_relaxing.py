@@ -17,7 +17,7 @@ from dbvfiv.motion.control import RunOptions
 from dbvfiv.motion.start import steady_positions
 from dbvfiv.motion.stepper import StepOptions
 from dbvfiv.studies.case import thesis_case
-from dbvfiv.studies.transient.study import Runner
+from dbvfiv.studies.transient.run import Runner
 from tests.small_valves import FORMER
 
 from .test_transient_modes import PUSH, QUASI, STORAGE, errors, ringing

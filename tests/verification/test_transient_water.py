@@ -12,7 +12,7 @@ import pytest
 
 import dbvfiv
 from dbvfiv.studies.case import thesis_case
-from dbvfiv.studies.transient.study import run_transient
+from dbvfiv.studies.transient.run import Runner
 
 STUDY = Path(__file__).parents[2] / "cases" / "studies" / "sudden_pressure.py"
 
@@ -29,7 +29,7 @@ def approach(pressure: float, mesh, duration: float, step: float):
         "transient.step": step,
     }
     valve = dbvfiv.load(thesis_case(), changes)
-    history = run_transient(valve.model).history
+    history = Runner(valve.model).start().history
     off = history["mass_flow"] / valve.steady(pressure).mass_flow - 1.0
     time = history["time"]
     late = (np.abs(off) < 1e-2) & (np.abs(off) > 1e-5)

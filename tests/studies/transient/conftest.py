@@ -2,7 +2,7 @@
 
 import pytest
 
-from dbvfiv.studies.transient import keeping
+from dbvfiv.studies.transient import history
 from tests.small_valves import make_valve
 
 
@@ -15,4 +15,4 @@ def valve():
 @pytest.fixture
 def all_restart_points(monkeypatch):
     """Keep every restart point, however large."""
-    monkeypatch.setattr(keeping, "RESTART_SHARE", float("inf"))
+    monkeypatch.setattr(history, "RESTART_SHARE", float("inf"))

@@ -13,7 +13,7 @@ from dbvfiv.motion.state import consistent_state
 from dbvfiv.motion.stepper import StepOptions, Stepper
 from dbvfiv.studies.session import load_result
 from dbvfiv.studies.transient.figures import energies
-from dbvfiv.studies.transient.keeping import FACES
+from dbvfiv.studies.transient.history import FACES
 from tests.observers import Stop
 
 from .runs import transient

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 import dbvfiv
-from dbvfiv.studies.transient.keeping import GAS
-from dbvfiv.studies.transient.result import beyond_model
+from dbvfiv.studies.transient.history import GAS
+from dbvfiv.studies.transient.run import beyond_model
 from tests.observers import Stop
 
 from .runs import SHORT, transient

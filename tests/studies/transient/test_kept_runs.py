@@ -21,9 +21,9 @@ from dbvfiv.record.mesh import MeshData
 from dbvfiv.record.record import GrowingRecord, StoredRecord
 from dbvfiv.studies.case import THESIS, Case
 from dbvfiv.studies.session import load_result
-from dbvfiv.studies.transient import keeping
-from dbvfiv.studies.transient.keeping import HISTORY, RESTART, STATES, Progress, rows_to_keep, tables_of
-from dbvfiv.studies.transient.study import Runner, run_transient
+from dbvfiv.studies.transient import history
+from dbvfiv.studies.transient.history import HISTORY, RESTART, STATES, Progress, rows_to_keep, tables_of
+from dbvfiv.studies.transient.run import Runner
 from tests.observers import Stop
 
 from .runs import SHORT, transient
@@ -46,7 +46,7 @@ def test_a_file_holds_the_run(tmp_path, valve):
     with h5py.File(export) as file:
         assert file["VTKHDF/Steps/Values"][:] == pytest.approx([0, 0.005, 0.01, 0.015, 0.02])
     # a state of it starts another run
-    again = run_transient(
+    again = Runner(
         type(model)(
             model.case.replace(
                 {
@@ -57,7 +57,7 @@ def test_a_file_holds_the_run(tmp_path, valve):
                 }
             )
         )
-    )
+    ).start()
     assert again.history["lip_displacement"][0] == result.history["lip_displacement"][10]
     assert again.history["mass_flow"][0] == pytest.approx(result.history["mass_flow"][10], rel=1e-6)
 
@@ -140,13 +140,13 @@ def test_restart_points_take_little_of_the_file(tmp_path, valve, monkeypatch):
     changes = {"transient.duration": 0.3, "transient.restart_every": 7, "transient.step": 5e-4}
     transient(valve(changes), output=tmp_path / "run.h5")
     record = StoredRecord(tmp_path / "run.h5", tables_of, Case)
-    sizes = {table.name: keeping.row_bytes(table) * record.rows(table.name) for table in record.tables.values()}
-    first_and_last = 2 * keeping.row_bytes(record.tables[RESTART])
-    assert sizes[RESTART] - first_and_last <= keeping.RESTART_SHARE * (sizes[HISTORY] + sizes[STATES])
+    sizes = {table.name: table.row_bytes * record.rows(table.name) for table in record.tables.values()}
+    first_and_last = 2 * record.tables[RESTART].row_bytes
+    assert sizes[RESTART] - first_and_last <= history.RESTART_SHARE * (sizes[HISTORY] + sizes[STATES])
     assert 2 < record.rows(RESTART) < 601 // 7
     # but no more than so many seconds of work may be lost
-    monkeypatch.setattr(keeping, "RESTART_SECONDS", 0.0)
-    monkeypatch.setattr(keeping, "RESTART_LOSS", 0.0)
+    monkeypatch.setattr(history, "RESTART_SECONDS", 0.0)
+    monkeypatch.setattr(history, "RESTART_LOSS", 0.0)
     transient(valve(changes), output=tmp_path / "run.h5")
     assert StoredRecord(tmp_path / "run.h5", tables_of, Case).rows(RESTART) == 2 + 600 // 7
 

@@ -9,7 +9,7 @@ import pytest
 import dbvfiv
 from dbvfiv.record.record import StoredRecord
 from dbvfiv.studies.case import Case
-from dbvfiv.studies.transient.keeping import HISTORY, LINE, rows_to_keep, tables_of
+from dbvfiv.studies.transient.history import HISTORY, LINE, rows_to_keep, tables_of
 from tests.observers import Stop
 
 from .runs import SHORT, transient

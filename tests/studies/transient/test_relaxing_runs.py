@@ -12,8 +12,8 @@ from dbvfiv.motion.equations import ValveMotion
 from dbvfiv.record.record import StoredRecord
 from dbvfiv.studies.case import Case
 from dbvfiv.studies.session import load_result
-from dbvfiv.studies.transient.keeping import HISTORY, MEMORY_COLUMNS, RELAXING, rows_to_keep, tables_of
-from dbvfiv.studies.transient.study import run_transient
+from dbvfiv.studies.transient.history import HISTORY, MEMORY, RELAXING, rows_to_keep, tables_of
+from dbvfiv.studies.transient.run import Runner
 from tests.observers import Stop
 
 from .runs import SHORT, transient
@@ -42,17 +42,17 @@ def test_nothing_is_stored_where_nothing_relaxes(tmp_path, valve):
     model = valve(SHORT | {"transient.duration": 0.005})
     run = transient(model, output=tmp_path / "elastic.h5")
     assert run.mesh.relaxing == () and not {c.name for c in RELAXING} & set(run.history)
-    assert run_transient(model).progress.state.memory is None
+    assert Runner(model).start().progress.state.memory is None
     with h5py.File(tmp_path / "elastic.h5") as file:
         assert "relaxing" not in file["mesh"]
-        assert not {c.name for c in MEMORY_COLUMNS} & set(file["tables/restart"])
+        assert not {c.name for c in MEMORY} & set(file["tables/restart"])
     assert "dissipated" not in "\n".join(run.lines())
 
 
 def test_a_loss_factor_of_zero_is_an_undamped_wall(valve):
     fast = SHORT | {"transient.duration": 0.01, "drive.pressure": 6e3}
-    zero = run_transient(valve(fast | {"damping.model": "loss factor", "damping.loss_factor": 0.0}))
-    plain = run_transient(valve(fast | {"damping.alpha": 0.0, "damping.beta": 0.0}))
+    zero = Runner(valve(fast | {"damping.model": "loss factor", "damping.loss_factor": 0.0})).start()
+    plain = Runner(valve(fast | {"damping.alpha": 0.0, "damping.beta": 0.0})).start()
     for name in ("lip_displacement", "mass_flow", "balance"):
         assert np.array_equal(zero.history[name], plain.history[name])
 
@@ -62,7 +62,7 @@ def test_energy_is_balanced_and_each_material_has_its_share(valve):
     changes = LOSSY | {"fluid.density": 300.0, "transient.ramp": 0.1, "transient.duration": 0.1}
     off = []
     for step in (2e-4, 1e-4):
-        run = run_transient(valve(changes | {"transient.step": step}))
+        run = Runner(valve(changes | {"transient.step": step})).start()
         h = run.history
         off.append(np.abs(h["balance"]).max() / np.abs(h["pressure_work"]).max())
     print(f"unexplained over the work of the pressure: {off}")
@@ -91,7 +91,7 @@ def test_figures_and_words_say_what_materials_dissipate(tmp_path, valve):
 
 
 def test_a_valve_that_was_loaded_long_ago_stays_where_it_is(valve):
-    run = run_transient(valve(SHORT | LOSSY | {"transient.start": "steady"}))
+    run = Runner(valve(SHORT | LOSSY | {"transient.start": "steady"})).start()
     assert np.ptp(run.history["lip_displacement"]) < 1e-9
     assert np.abs(run.progress.state.memory.branches).max() < 1e-6 * np.abs(run.progress.state.memory.slow).max()
 
@@ -104,7 +104,7 @@ def test_staggered_coupling_has_the_same_wall(valve):
         "transient.duration": 0.05,
     }
     runs = [
-        run_transient(valve(changes | {"transient.coupling": c, "transient.step": 2e-4}))
+        Runner(valve(changes | {"transient.coupling": c, "transient.step": 2e-4})).start()
         for c in ("monolithic", "staggered")
     ]
     ends = [r.history["lip_displacement"][-1] for r in runs]

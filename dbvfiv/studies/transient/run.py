@@ -1,0 +1,457 @@
+"""A run in time: steps until the end or until the verdict is certain, kept in a record as it goes."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ...errors import CaseError
+from ...model import ValveModel
+from ...model.equilibria import model_warnings
+from ...model.material_stability import material_stability
+from ...motion.control import Drive, RunOptions, step_control
+from ...motion.equations import ValveMotion
+from ...motion.start import first_state
+from ...motion.state import MotionState, consistent_state
+from ...motion.stepper import StepFailure, Stepper
+from ...record.files import kind_of
+from ...record.header import Header
+from ...record.mesh import MeshData
+from ...record.record import GrowingRecord, Record, StoredRecord
+from ...record.states import state_table
+from ...verdict import JudgeOptions, Verdict, judge
+from ..case import Case
+from .history import HISTORY, STATES, Keeper, Progress, Reader, tables_of
+
+#: Columns of a history by name.
+Columns = Mapping[str, np.ndarray]
+#: Smallest area over that of the lip gap at rest up to which a valve is closed: where the pressure drives fluid out,
+#: and where nothing does.
+SHUT, UNOPENED = 0.5, 2.0
+#: Pascal; no fluid's pressure falls further below that of the surroundings.
+ATMOSPHERE = 101_325.0
+#: Numbers of the mass flow that stand in the document of a verdict itself.
+NUMBERS = ("amplitude", "frequency", "mean", "cycles_observed", "periodicity_error")
+#: Kind of the note that says why the constants of the rubber do not hold at the state that was kicked.
+REFUSAL = "not valid"
+
+
+@dataclass(frozen=True)
+class RunVerdict:
+    """Verdicts on the signals and what mass flow and lip displacement say together.
+
+    Attributes
+    ----------
+    mass_flow, lip_displacement : Verdict
+    lip_opening : Verdict
+        Of the clear opening, which is cut off at zero and says nothing more; amplitudes are about twice as large.
+    residual : float
+        Unbalanced force at the end over pressure force; not a number while the pressure changes.
+    steps : int
+    time : float, s
+    """
+
+    mass_flow: Verdict
+    lip_displacement: Verdict
+    lip_opening: Verdict
+    residual: float
+    steps: int
+    time: float
+
+    @property
+    def name(self) -> str:
+        """The livelier of the two: a flow can look settled while the lip still moves."""
+        names = (self.mass_flow.name, self.lip_displacement.name)
+        return max(names, key=_LIVELINESS.index)
+
+    @property
+    def decided(self) -> bool:
+        """True where the verdicts on mass flow and lip displacement agree and a longer run would not change them."""
+        lip = self.lip_displacement
+        return self.mass_flow.decided and lip.decided and self.mass_flow.name == lip.name
+
+    @property
+    def governing(self) -> Verdict:
+        """The verdict that gives the name."""
+        return self.mass_flow if self.mass_flow.name == self.name else self.lip_displacement
+
+    def summary(self) -> dict[str, Any]:
+        """Plain SI numbers for JSON: name and numbers of the mass flow, then each signal by itself."""
+        flow = self.mass_flow.summary()
+        return {
+            "verdict": self.name,
+            "decided": bool(self.decided),
+            "reason": self.governing.reason,
+            **{key: flow[key] for key in NUMBERS},
+            "steps": self.steps,
+            "time": self.time,
+            "residual": self.residual if np.isfinite(self.residual) else None,
+            "mass_flow": flow,
+            "lip_opening": self.lip_opening.summary(),
+            "lip_displacement": self.lip_displacement.summary(),
+        }
+
+
+_LIVELINESS = ("closed", "steady", "decaying", "limit cycle", "growing", "undecided", "irregular")
+
+
+def assess(
+    history: Columns,
+    model: ValveModel,
+    residual: float = np.nan,
+    options: JudgeOptions = JudgeOptions(),
+    since: float = 0.0,
+) -> RunVerdict:
+    """Verdict on a history.
+
+    A valve is closed where its lips shut the gap they have at rest, or where nothing drives fluid out and they do not
+    open; one that stands at its gap under a pressure lets flow what passes there.
+
+    Parameters
+    ----------
+    history : mapping of str to array
+        See `dbvfiv.studies.transient.history.SCALARS`.
+    model : ValveModel
+    residual : float
+        Of the equilibrium at the end; not a number if it is not known.
+    since : float
+        Time, s, before which the drive still changed.
+    """
+    time = history["time"]
+    chosen = time >= since
+    known = residual if np.isfinite(residual) else None
+    signals = ("mass_flow", "lip_displacement", "lip_opening")
+    found = [judge(time[chosen], history[name][chosen], options, residual=known) for name in signals]
+    driven = history["inlet_pressure"] > model.case.rest_pressure
+    area = history["smallest_area"] / (np.where(driven, SHUT, UNOPENED) * lip_gap(model))
+    if judge(time[chosen], area[chosen], options, closed_below=1.0).name == "closed":
+        reason = "The lips shut the gap that they have at rest, or nothing drives fluid out and they do not open."
+        found = [Verdict(**{**vars(v), "name": "closed", "decided": True, "reason": reason}) for v in found]
+    return RunVerdict(*found, residual, len(time) - 1, float(time[-1]))
+
+
+def lip_gap(model: ValveModel) -> float:
+    """Flow area of the whole valve at the lip at rest, m2."""
+    mesh = model.mesh
+    return mesh.part.copies * float(mesh.rest_area[0] - mesh.wall_deduction[0])
+
+
+def beyond_model(history: Columns) -> str | None:
+    """Sentence on speeds and pressures beyond what the equations are for, None without any.
+
+    An ideal incompressible fluid pays any price for passing a gap that shuts; a real one separates, cavitates or is
+    compressed. What follows such an instant is the solution of the equations and no prediction.
+    """
+    fastest = np.asarray(history["mach"]) if "mach" in history else np.zeros(1)
+    if fastest.max() > 1.0:
+        where = int(np.argmax(fastest > 1.0))
+        return (
+            f"The fluid is faster than sound in the valve from {history['time'][where]:.4g} s on, in "
+            f"{100 * np.mean(fastest > 1.0):.2g} % of the steps and up to Mach {fastest.max():.3g}: what shocks take "
+            "is a loss of head here, and the air that lips draw in then is a rough estimate."
+        )
+    lowest = np.min(history["station_pressure"], axis=1)
+    beyond = np.flatnonzero(lowest < -ATMOSPHERE)
+    if not len(beyond):
+        return None
+    time, share = history["time"][beyond[0]], len(beyond) / len(lowest)
+    return (
+        f"Pressures fall below vacuum from {time:.4g} s on, in {100 * share:.2g} % of the steps and down to "
+        f"{1e-3 * lowest.min():.4g} kPa, where the valve slams "
+        "shut: the fluid's equations are beyond their range there, and the motion afterwards is no prediction."
+    )
+
+
+def stored_state(motion: ValveMotion, case: Case, inlet: float) -> MotionState:
+    """State `transient.start_state` of `transient.start_file`, a steady or a transient result on the same mesh.
+
+    A wall that relaxes starts without stress in its branches: states do not hold what it remembered.
+
+    Parameters
+    ----------
+    motion : ValveMotion
+    case : Case
+    inlet : float
+        Inlet pressure of the first instant, Pa.
+
+    Raises
+    ------
+    CaseError
+        If the file cannot be read, has no such state, or belongs to another mesh.
+    """
+    path, index, model = Path(case.transient.start_file), case.transient.start_state, motion.model
+    record, moving = _read(path)
+    count = record.rows(STATES)
+    if not count:
+        raise CaseError(f"{str(path)!r} holds no states to start from.")
+    if not -count <= index < count:
+        raise CaseError(f"{str(path)!r} holds {count} states, so there is no state {index}.")
+    if record.mesh.nodes.shape != model.mesh.nodes.shape:
+        raise CaseError(
+            f"The states of {str(path)!r} belong to a mesh of {len(record.mesh.nodes)} nodes and this case's has "
+            f"{len(model.mesh.nodes)}."
+        )
+    q = model.shell.dofs.restrict(record.value(STATES, "nodal", index))
+    if not moving:
+        speed = float(record.value(STATES, "station_velocity", index)[-1])
+        return consistent_state(motion, 0.0, q, np.zeros(model.size), speed, inlet)
+    v = model.shell.dofs.restrict(record.value(STATES, "nodal_rate", index))
+    return consistent_state(motion, 0.0, q, v, float(record.value(STATES, "inlet_velocity", index)), inlet)
+
+
+def _read(path: Path) -> tuple[Record, bool]:
+    """The record of a file, and whether its states move."""
+    kind = kind_of(path)
+    if kind == "transient":
+        return StoredRecord(path, tables_of, Case), True
+    if kind == "steady":
+        return StoredRecord(path, lambda mesh: (state_table(STATES, mesh),), Case), False
+    raise CaseError(
+        f"{str(path)!r} holds a result of kind {kind!r}; a run starts from a state of a steady or a transient result."
+    )
+
+
+class Runner:
+    """One run in time, kept in a record as it goes.
+
+    Parameters
+    ----------
+    model : ValveModel
+    options : RunOptions, optional
+        Of the case by default.
+    record : GrowingRecord, optional
+        Keeps the run and is told of its progress; one in memory by default.
+    case : Case, optional
+        That of the model by default; it may differ in keys of the study.
+
+    Attributes
+    ----------
+    history : Keeper
+        Columns of the history by their names.
+    progress : Progress
+    verdict : RunVerdict or None
+        None if not even one step was made.
+    failures : list of str
+    interrupted : bool
+    stopped : bool
+        True where the verdict ended the run.
+    """
+
+    def __init__(
+        self,
+        model: ValveModel,
+        options: RunOptions | None = None,
+        record: GrowingRecord | None = None,
+        case: Case | None = None,
+    ):
+        self.model = model
+        self.case = case = model.case if case is None else case
+        if record is None:
+            mesh = MeshData.of(model)
+            record = GrowingRecord(Header.of("transient", case), mesh, tables_of(mesh))
+        self.record = record
+        self.options = RunOptions.of(case) if options is None else options
+        self.drive = Drive.of(case)
+        self.motion = ValveMotion(model, staggered=case.transient.coupling == "staggered")
+        self.stepper = Stepper(self.motion, self.options.scheme, self.drive, self.options.step)
+        self.control = step_control(self.stepper, self.options.control)
+        self.history = Keeper(record, model)
+        self._reader = Reader(self.motion, record.tables[HISTORY].columns)
+        self.failures: list[str] = []
+        self.interrupted = self.stopped = False
+
+    def start(self, first: MotionState | None = None) -> Runner:
+        """Run from the case's first state, or from a given one; a step that is not found ends the run, which keeps
+        everything up to there and says so in `failures`; so does an interrupt.
+
+        Raises
+        ------
+        SolveError, CaseError
+            If there is no first state.
+        """
+        self._begin(0)
+        inlet = self.drive(0.0)
+        state, kick = (first, None) if first is not None else self._first(inlet)
+        energy = sum(self.motion.energies(state.q, state.v)) + self.motion.outside_energy(state.q, state.v)
+        energy += self.model.weight_energy(state.q)
+        self.progress = progress = Progress(state, energy=energy, control=tuple(self.control.pack()))
+        if kick is not None:
+            progress.eigenvalue = kick.eigenvalue
+            self._judge_rubber(state, inlet)
+        row = self._reader.first(progress, inlet)
+        self.history.append(row)
+        self._save(row)
+        self._checkpoint(needed=True)
+        return self._go()
+
+    def resume(self) -> Runner:
+        """Go on from the last restart point of the record, which must hold the rows up to that and no more."""
+        self.progress = progress = Progress.read(self.record, wall=self.motion.wall)
+        self._begin(progress.steps)
+        self.control.unpack(progress.control)
+        self.stepper.forget()
+        if self.motion.outside is not None:
+            self.motion.outside.start_afresh(progress.state.q, progress.state.v)
+            self.motion.outside.renewed = progress.renewed
+        return self._go()
+
+    def _first(self, inlet: float):
+        if self.case.transient.start == "state":
+            return stored_state(self.motion, self.case, inlet), None
+        return first_state(self.motion, self.case, inlet, self.record)
+
+    def _judge_rubber(self, state: MotionState, inlet: float) -> None:
+        """Note where the constants of rubbers with loss factors do not hold at the state that is kicked."""
+        loss = self.motion.mu.loss_factor
+        found = material_stability(self.model, state.q, inlet, loss) if loss else None
+        if found is not None and not found.holds:
+            self.record.note(REFUSAL, text=found.sentence)
+            self.record.warn(found.sentence)
+
+    # -- the loop
+    # ----
+
+    def _begin(self, done: int) -> None:
+        total = max(done, math.ceil(self.options.duration / self.options.control.step * (1 - 1e-9)))
+        self.record.begin("transient", total)
+        for sentence in model_warnings(self.model):
+            self.record.warn(sentence)
+
+    def _go(self) -> Runner:
+        progress, every = self.progress, self.options.judge_every
+        judged, before, row = _next_verdict(progress.steps, every), self._certain_before(), {}
+        try:
+            while not self.stopped and progress.state.time < self.options.end:
+                row = self._step()
+                if gone := self._beyond_pump(progress.state):
+                    self._fail(gone)
+                    break
+                if progress.steps == judged:
+                    verdict = self._judge()
+                    certain = verdict.name if verdict.decided else ""
+                    self.stopped = bool(certain) and certain in self.options.stop_when and certain == before
+                    before, judged = certain, _next_verdict(progress.steps, every)
+        except StepFailure as failure:
+            smallest = self.options.control.step * self.options.control.smallest
+            self._fail(
+                f"No step was found from {progress.state.time:.6g} s on, after {progress.steps} steps: "
+                f"{str(failure).rstrip('.')}; steps down to {smallest:.3g} s and a line search were tried."
+            )
+        except KeyboardInterrupt:
+            self.interrupted = True
+        if row and not (self.options.save_every and _multiple(progress.state.time, self.options.save_every)):
+            self._save(row)
+        self.history.flush()
+        if not self.interrupted and not self.failures:
+            self._checkpoint(needed=True)
+        self.verdict = self._judge() if self.history.rows > 1 else None
+        if sentence := beyond_model(self.history):
+            self.record.warn(sentence)
+        return self
+
+    def _fail(self, sentence: str) -> None:
+        self.failures.append(sentence)
+        self.record.fail(sentence)
+
+    def _certain_before(self) -> str:
+        """The certain verdict that a run had before it goes on, as the same once more may end it."""
+        steps = self.progress.steps
+        due = _last_verdict(steps, self.options.judge_every)
+        found = [note for note in self.record.notes("verdict") if note["steps"] == due > 0]
+        if not found and due == steps > 0:  # ended before it was judged
+            found = [self._judge().summary()]
+        return found[-1]["verdict"] if found and found[-1]["decided"] else ""
+
+    def _step(self) -> dict[str, Any]:
+        options, progress = self.options, self.progress
+        before = progress.state.time
+        result = self.control.advance(progress.state, self._next_stop(before))
+        progress.advance(result)
+        time = progress.state.time
+        row = self._reader.row(progress, result.load, time - before, result.residuals)
+        self.history.append(row)
+        if options.save_every and time >= progress.saved * options.save_every - 1e-9 * options.control.step:
+            self._save(row)
+        if progress.steps % options.restart_every == 0:
+            self._checkpoint()
+        self.record.item(row)
+        return row
+
+    def _next_stop(self, time: float) -> float:
+        """Instant that adaptive steps must meet: the next full state or the end."""
+        every, end = self.options.save_every, self.options.duration
+        if not every:
+            return end
+        return min(end, every * (math.floor(time / every * (1 + 1e-12) + 1e-9) + 1))
+
+    def _save(self, row: dict[str, Any]) -> None:
+        self.history.state(self.progress.state, row)
+        self.progress.saved += 1
+
+    def _checkpoint(self, needed: bool = False) -> None:
+        """Make the past safe, and the future independent of it but for the state."""
+        progress, outside = self.progress, self.motion.outside
+        self.stepper.forget()
+        if outside is not None:
+            outside.start_afresh(progress.state.q, progress.state.v)
+            progress.renewed = outside.renewed
+        progress.control = tuple(self.control.pack())
+        self.history.restart(progress, needed)
+
+    # -- what the run amounts to
+    # ----
+
+    def _judge(self) -> RunVerdict:
+        state, model = self.progress.state, self.model
+        inlet, residual, since = self.drive(state.time), np.nan, 0.0
+        if self.drive.constant_after(state.time):
+            since = self.drive.times[-1]
+            if inlet > model.flow.back:
+                scale = model.force_scale(state.q, inlet)
+                residual = float(np.linalg.norm(model.residual(state.q, inlet)) / scale)
+        if np.count_nonzero(self.history["time"] >= since) < 2:
+            since = 0.0
+        verdict = assess(self.history, model, residual, since=since)
+        self.record.note("verdict", **verdict.summary())
+        self.record.progress(f"{verdict.name}{'' if verdict.decided else '?'} at {state.time:.4g} s")
+        return verdict
+
+    def _beyond_pump(self, state: MotionState) -> str:
+        """Sentence where the flow has left the pump's table; empty otherwise."""
+        pump = self.model.pump
+        if pump is None or not self.motion.moving_fluid:
+            return ""
+        velocity = state.speed if state.line is None else float(state.line.velocity[0])
+        mesh = self.model.mesh
+        flow = mesh.part.copies * float(mesh.rest_area[-1] - mesh.wall_deduction[-1]) * velocity
+        if pump.holds(flow):
+            return ""
+        return (
+            f"At {state.time:.6g} s the flow at the pump is {1e3 * flow:.4g} L/s, and its table goes from "
+            f"{1e3 * pump.flow[0]:.4g} to {1e3 * pump.flow[-1]:.4g} L/s; the run ends there."
+        )
+
+
+def _next_verdict(steps: int, every: int) -> int:
+    """Number of the step after which the next verdict is due; the same sequence wherever a run was resumed."""
+    due = every
+    while due <= steps:
+        due = max(due + every, int(1.05 * due))
+    return due
+
+
+def _last_verdict(steps: int, every: int) -> int:
+    """Number of the step of the last verdict that was due up to a number of steps; 0 without one."""
+    last, due = 0, every
+    while due <= steps:
+        last, due = due, max(due + every, int(1.05 * due))
+    return last
+
+
+def _multiple(time: float, every: float) -> bool:
+    return abs(time / every - round(time / every)) < 1e-6
