@@ -154,7 +154,8 @@ def time_steps():
         "residuals a step",
         run.stepper.residuals / steps,
         "",
-        note=f"solves {run.stepper.solves / steps:.2f}, steps per factorisation {steps / max(1, run.stepper.factorisations):.0f}",
+        note=f"solves {run.stepper.solves / steps:.2f}, steps per factorisation "
+        f"{steps / max(1, run.stepper.factorisations):.0f}",
     )
     yield Row(
         "steps per second of processor time",
