@@ -32,8 +32,8 @@ def on_page_markdown(markdown: str, **_) -> str:
 
 
 def first_page(text: str) -> str:
-    """The README with links that lead from docs/."""
-    return re.sub(r"(\]\()docs/", r"\1", text)
+    """The README with links that lead from docs/, those to notebooks to their pages."""
+    return re.sub(r"(\]\()docs/", r"\1", text).replace(".ipynb)", ".md)")
 
 
 def notebook_page(path: Path) -> str:

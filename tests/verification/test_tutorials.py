@@ -1,5 +1,5 @@
-"""The tutorials, as a reader does them: their files are written, their commands given one after another, on a coarse
-mesh where a command takes one. What the text says about the outcome is held afterwards.
+"""The tutorials and recipes, as a reader does them: their files are written, their commands given one after another, on
+a coarse mesh where a command takes one. What the text says about the outcome is held afterwards.
 """
 
 from __future__ import annotations
@@ -8,6 +8,7 @@ import re
 import shlex
 from pathlib import Path
 
+import numpy as np
 import pytest
 import typer
 
@@ -16,22 +17,22 @@ from dbvfiv import cli
 from dbvfiv.cli.main import build
 from tests.pages import ROOT, command_lines
 
-TUTORIALS = ROOT / "docs/tutorials"
+FOLDERS = ("tutorials", "recipes")
 COARSE = (8, 14)
 pytestmark = pytest.mark.slow
 
 
-def follow(name: str, mesh: tuple[int, int] = COARSE) -> None:
-    """Write the files and give the commands of a tutorial in the working folder.
+def follow(name: str, mesh: tuple[int, int] = COARSE, folder: str = "recipes") -> None:
+    """Write the files and give the commands of a tutorial or recipe in the working folder.
 
-    A block of TOML that begins with `# NAME.toml` is that file; every line of a block of the shell is a command.
+    A block of TOML or CSV that begins with `# NAME` is that file; every line of a block of the shell is a command.
     """
     commands = typer.main.get_command(build()).commands
     keys = ("--set", f"mesh.around={mesh[0]}", "--set", f"mesh.along={mesh[1]}")
-    text = (TUTORIALS / f"{name}.md").read_text()
+    text = (ROOT / f"docs/{folder}/{name}.md").read_text()
     for language, body in re.findall(r"^```(\w+)\n(.*?)^```$", text, re.M | re.S):
-        if language == "toml":
-            Path(body.splitlines()[0].removeprefix("# ")).write_text(body)
+        if language in ("toml", "csv"):
+            Path(re.match(r"# ([\w.-]+)", body)[1]).write_text(body)
         if language == "sh":
             for line in command_lines(body):
                 program, *words = shlex.split(line)
@@ -48,13 +49,13 @@ def in_a_folder_of_its_own(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
 
 
-def test_every_tutorial_is_followed():
+def test_every_page_is_followed():
     mine = set(re.findall(r'follow\("([a-z-]+)"', Path(__file__).read_text()))
-    assert mine == {page.stem for page in TUTORIALS.glob("*.md")}
+    assert mine == {page.stem for folder in FOLDERS for page in (ROOT / "docs" / folder).glob("*.md")}
 
 
 def test_quick_start(capsys):
-    follow("quick-start")
+    follow("quick-start", folder="tutorials")
     told = capsys.readouterr().out
     assert "Stable under storage continuity" in told and "Flutters under storage continuity" in told
     assert "the spectrum and the independent count agree" in told
@@ -63,7 +64,7 @@ def test_quick_start(capsys):
 
 
 def test_own_valve():
-    follow("own-valve")
+    follow("own-valve", folder="tutorials")
     thin, thick = dbvfiv.load_result("six.h5"), dbvfiv.load_result("thick.h5")
     # by the stable constants, the default; 0.028 m, 12.6 L/s and other levels by the published ones before
     assert thin.states[1].lip_opening == pytest.approx(0.0363, abs=0.002)
@@ -74,7 +75,7 @@ def test_own_valve():
 
 
 def test_is_it_stable(capsys):
-    follow("is-it-stable")
+    follow("is-it-stable", folder="tutorials")
     told = capsys.readouterr().out
     assert not dbvfiv.load_result("modes.h5").stable
     assert "Flutters under quasi-steady continuity" in told and "Stable under storage continuity" in told
@@ -85,7 +86,7 @@ def test_is_it_stable(capsys):
 
 def test_in_time():
     """Rougher meshes have the onset so far up that the cycle at 40 kg/m3 all but touches."""
-    follow("in-time", (14, 24))
+    follow("in-time", (14, 24), "tutorials")
     run, half, cycle = (dbvfiv.load_result(f"{name}.h5") for name in ("run", "half", "cycle"))
     assert run.verdict["verdict"] == half.verdict["verdict"] == "limit cycle"
     swings = [result.verdict["lip_displacement"]["amplitude"] for result in (run, half)]
@@ -95,8 +96,77 @@ def test_in_time():
 
 
 def test_back_pressure(capsys):
-    follow("back-pressure")
+    follow("back-pressure", folder="tutorials")
     shut = dbvfiv.load_result("shut.h5")
     assert all(state.closed for state in shut.states) and shut.safety.factor >= 1
     turned = dbvfiv.load_result("turned.h5")
     assert 0.1 < turned.closing.closing_time < 0.2
+
+
+def test_chatter(capsys):
+    follow("chatter")
+    told = capsys.readouterr().out
+    assert told.count("the independent count agree") >= 3
+    small, large = (dbvfiv.load_result(f"{name}.h5") for name in ("small", "large"))
+    assert small.stable and large.stable
+
+
+def test_seal(capsys):
+    follow("seal")
+    told = capsys.readouterr().out
+    assert "Rated back pressure 19.6133 kPa: s" in told  # sealed, or shut
+    result = dbvfiv.load_result("seal.h5")
+    assert result.safety.factor >= 1 and result.states[0].closed
+    assert Path("figures/contact-map.png").exists()
+
+
+def test_headloss_curve():
+    follow("headloss-curve")
+    states = dbvfiv.load_result("curve.h5").states
+    flows, losses = [state.mass_flow for state in states], [state.hydraulics.loss_coefficient for state in states]
+    assert len(states) == 5 and flows == sorted(flows) and losses == sorted(losses, reverse=True)
+    head, *rows = Path("sheet.csv").read_text().splitlines()
+    assert "Kv" in head and len(rows) == 4
+    assert Path("figures/head-discharge.png").exists()
+
+
+def test_rubber_from_tension(capsys):
+    follow("rubber-from-tension")
+    told = capsys.readouterr().out
+    assert "[materials.rubber]" in told and "stable in every state" in told
+    states = dbvfiv.load_result("fitted.h5").states
+    assert 0 < states[0].mass_flow < states[1].mass_flow
+
+
+def test_how_much_damping(capsys):
+    follow("how-much-damping")
+    told = capsys.readouterr().out
+    assert "flutter would begin at" in told and "Storage modulus over the slow one" in told
+    assert dbvfiv.load_result("margin.h5").stable
+    assert Path("figures/sweep.png").exists()
+
+
+def test_limit_cycle(capsys):
+    follow("limit-cycle", (14, 24))
+    assert "limit cycle" in capsys.readouterr().out
+    run, cycle = dbvfiv.load_result("run.h5"), dbvfiv.load_result("cycle.h5").nearest(40.0)
+    assert cycle.stable
+    assert run.verdict["lip_displacement"]["amplitude"] == pytest.approx(cycle.amplitude, rel=0.02)
+
+
+def test_measured_record(capsys):
+    times = np.arange(0.0, 2.0, 2e-3)
+    rows = [f"{t:.3f}, {10 + 3 * np.sin(2 * np.pi * 20 * t):.5f}" for t in times]
+    Path("record.csv").write_text("\n".join(["time [s], lip [mm]", *rows]) + "\n")
+    follow("measured-record")
+    told = capsys.readouterr().out
+    assert "computed flow over measured" in told and '"limit cycle"' in told
+    assert Path("figures/head-discharge.png").exists()
+
+
+def test_data_sheet(capsys):
+    follow("data-sheet")
+    told = capsys.readouterr().out
+    assert "sheet.toml fits" in told and "Rated back pressure 19.6133 kPa: s" in told
+    assert dbvfiv.load_result("modes.h5").stable is True
+    assert dbvfiv.load_result("sheet.h5").states[1].lip_opening > 0.02
