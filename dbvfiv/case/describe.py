@@ -21,7 +21,7 @@ from .axis import FORM
 from .damping import Relaxing
 from .materials import KINDS, Materials
 from .quantity import DIMENSION, Quantity
-from .section import Section, description_of
+from .section import Described, Section, mark_of
 
 
 @dataclass(frozen=True)
@@ -52,20 +52,8 @@ class KeyInfo:
 
 def quantity_of(field: FieldInfo) -> Quantity | None:
     """The physical quantity of a scalar field, or of the elements of a list."""
-    found = next((m for m in field.metadata if isinstance(m, Quantity)), None)
-    described = description_of(field)
-    return found or (described and described.quantity) or _inner_quantity(field.annotation)
-
-
-def _inner_quantity(annotation: Any) -> Quantity | None:
-    for argument in typing.get_args(annotation):
-        for meta in getattr(argument, "__metadata__", ()):
-            if isinstance(meta, Quantity):
-                return meta
-        found = _inner_quantity(argument)
-        if found:
-            return found
-    return None
+    described = mark_of(field, Described)
+    return (described and described.quantity) or mark_of(field, Quantity)
 
 
 def element_model(annotation: Any) -> type[Section] | None:
@@ -126,16 +114,15 @@ def _bounds(limits: dict[str, Any], quantity: Quantity | None) -> str:
 
 
 def _type_words(field: FieldInfo) -> str:
-    described = description_of(field)
+    described, quantity = mark_of(field, Described), quantity_of(field)
+    core, many = _strip_none(field.annotation), typing.get_origin(field.annotation) is tuple
     if described:
         return described.type
-    annotation, quantity = field.annotation, quantity_of(field)
-    core = _strip_none(annotation)
     if core is dict or typing.get_origin(core) is dict:
         return "tables"
-    if element_model(annotation):
-        return "list of tables" if typing.get_origin(annotation) is tuple else "table"
-    if typing.get_origin(annotation) is tuple:
+    if element_model(field.annotation):
+        return "list of tables" if many else "table"
+    if many:
         return f"list of {DIMENSION[quantity.si]}s" if quantity else "list"
     if typing.get_origin(core) is Literal:
         return "choice"
@@ -154,28 +141,25 @@ def _strip_none(annotation: Any) -> Any:
 
 def allowed_words(field: FieldInfo) -> str:
     """Values that a field allows, as words that complete "it must be ..."."""
-    described = description_of(field)
+    described, quantity, kind = mark_of(field, Described), quantity_of(field), _type_words(field)
+    some = "at least one" if _limits(field.metadata).get("min_length") else ""
     if described:
         return described.allowed
-    quantity = quantity_of(field)
-    core, kind = _strip_none(field.annotation), _type_words(field)
     if kind == "choice":
-        options = [repr(a).replace("'", '"') for a in typing.get_args(core)]
-        return options[0] if len(options) == 1 else " or ".join(options)
-    if kind == "list of tables" and not _limits(field.metadata).get("min_length"):
-        return "a list of tables"
-    if kind in ("table", "list of tables", "tables"):
-        some = "a list of at least one table" if _limits(field.metadata).get("min_length") else "a list of tables"
-        return {"table": "a table", "list of tables": some, "tables": "tables"}[kind]
-    if kind == "file":
-        return "the name of a file that can be read"
+        return " or ".join(repr(a).replace("'", '"') for a in typing.get_args(_strip_none(field.annotation)))
+    fixed = {
+        "table": "a table",
+        "tables": "tables",
+        "list of tables": f"a list of {some} table" if some else "a list of tables",
+        "file": "the name of a file that can be read",
+        "true or false": "true or false",
+    }
+    if kind in fixed:
+        return fixed[kind]
     if kind.startswith("list of"):
-        if not _limits(field.metadata).get("min_length"):
-            return f"a list of {DIMENSION[quantity.si]}s"
-        words = _bounds(_item_limits(field.annotation), quantity)
-        return f"a list of at least one {DIMENSION[quantity.si]}, each {words}"
-    if kind == "true or false":
-        return "true or false"
+        noun = DIMENSION[quantity.si]
+        each = _bounds(_item_limits(field.annotation), quantity)
+        return f"a list of {some} {noun}, each {each}" if some else f"a list of {noun}s"
     bounds = _bounds(_limits(field.metadata), quantity)
     if quantity:
         noun = _article(DIMENSION[quantity.si]) if quantity.si else "a number"

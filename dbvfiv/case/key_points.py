@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from .quantity import Quantity
-from .tables import read_text_file
+from .tables import numbered_lines
 
 #: A file of bare numbers of this many lines holds nine profiles of fifteen points, as the thesis's program reads them.
 _BARE = 9, 15
@@ -67,9 +67,7 @@ def read_key_points(path: Path) -> tuple[KeyProfile, ...]:
     ValueError
         With a clause that completes "key_points is given as FILE, ...".
     """
-    lines = read_text_file(path).splitlines()
-    numbered = [(i, line.split("#")[0].strip()) for i, line in enumerate(lines, 1)]
-    numbered = [(i, line) for i, line in numbered if line]
+    numbered = numbered_lines(path)
     if not numbered:
         raise ValueError("which holds no points")
     if len(numbered) > _LARGEST:

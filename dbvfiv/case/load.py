@@ -169,7 +169,7 @@ def _unknown(path: KeyPath, owner: type[Section] | None, model: type[Section]) -
         names += ["NAME"]
     place = ".".join(path[:-1])
     close = difflib.get_close_matches(key.lower(), names, n=1, cutoff=0.6)
-    nearest = _elsewhere(key, model) or synonym(key) or (".".join(filter(None, (place, close[0]))) if close else None)
+    nearest = synonym(key) or _elsewhere(key, model) or (".".join(filter(None, (place, close[0]))) if close else None)
     if nearest:
         hint = f"the nearest valid key is {nearest}"
     else:
@@ -327,11 +327,11 @@ def _apply(model: type[Section], data: dict[str, Any], override: str) -> tuple[s
     key, equals, value = override.partition("=")
     if not equals or not key.strip():
         raise CaseError(f'The override {override!r} is not of the form KEY=VALUE, such as drive.pressure="18 kPa".')
-    return put(model, data, key.strip(), _value(value.strip()))
+    return put(model, data, key.strip(), toml_value(value.strip()))
 
 
-def _value(text: str) -> Any:
-    """An override's value: TOML where it is TOML, otherwise the text itself (``18 kPa``, ``storage``)."""
+def toml_value(text: str) -> Any:
+    """Value of a text that is TOML, such as "8" or "[1e3, 2e3]"; any other text as it is (``18 kPa``, ``storage``)."""
     try:
         parsed = tomllib.loads(f"value = {text}")
     except (ValueError, RecursionError):

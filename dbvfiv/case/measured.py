@@ -14,7 +14,7 @@ from pydantic import ValidationInfo
 
 from .quantity import Quantity
 from .section import Described
-from .tables import read_text_file
+from .tables import numbered_lines
 
 _PRESSURE, _VOLUME, _MASS = Quantity("Pa", "kPa", head=True), Quantity("m^3/s", "L/s"), Quantity("kg/s", "kg/s")
 _LENGTH, _AREA = Quantity("m", "mm"), Quantity("m^2", "cm^2")
@@ -89,9 +89,7 @@ def read_measured(path: Path, density: float | None = None) -> MeasuredTable:
         With a clause that completes "measured is given as FILE, ...".
     """
     density = 1000.0 if density is None else density
-    lines = read_text_file(path).splitlines()
-    numbered = [(i, line.split("#")[0].strip()) for i, line in enumerate(lines, 1)]
-    numbered = [(i, line) for i, line in numbered if line]
+    numbered = numbered_lines(path)
     if not numbered:
         raise ValueError("which holds no rows")
     columns = _read_header(numbered[0][1], density)

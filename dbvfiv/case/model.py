@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Collection, Iterable, Mapping
 from typing import Any, Self
 
@@ -11,7 +10,7 @@ from pydantic import ValidationInfo, model_validator
 from ..errors import CaseError
 from . import physics
 from .damping import SHIPPED_LOSSES, Damping
-from .load import make_case, put
+from .load import make_case, put, toml_value
 from .materials import AUTO, DEFAULT_LAYERS, RUBBERS, Layer, Materials
 from .mesh import Mesh
 from .parameters import PARAMETERS
@@ -337,8 +336,9 @@ def change_case(case: Case, changes: Changes) -> Case:
         try:
             return case.replace(wanted)
         except CaseError as error:
-            other = _read(wanted.get(error.key))
-            if other is None:
+            given = wanted.get(error.key)
+            other = toml_value(given) if isinstance(given, str) else given
+            if other is given:
                 raise
             try:
                 case.replace({error.key: other})
@@ -372,14 +372,3 @@ def _plain(value: Any) -> Any:
     if isinstance(value, (list, tuple)):
         return [_plain(each) for each in value]
     return value.tolist() if hasattr(value, "tolist") else value
-
-
-def _read(value: Any) -> Any:
-    """Value of a text that is TOML, such as "8" or "[1e3, 2e3]"; None for any other text."""
-    if not isinstance(value, str):
-        return None
-    try:
-        found = tomllib.loads(f"value = {value}")
-    except (ValueError, RecursionError):
-        return None
-    return found["value"] if set(found) == {"value"} else None

@@ -5,7 +5,7 @@ from __future__ import annotations
 import typing
 from collections.abc import Collection
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, TypeVar
 
 from pydantic import BaseModel, ConfigDict, Field
 from pydantic.fields import FieldInfo
@@ -30,15 +30,18 @@ class Described:
     quantity: Any = None
 
 
-def description_of(field: FieldInfo) -> Described | None:
-    """Mark that describes a field, also where it is on an alternative of a union; None without one."""
-    found = next((m for m in field.metadata if isinstance(m, Described)), None)
-    return found or _inner(field.annotation)
+Mark = TypeVar("Mark")
 
 
-def _inner(annotation: Any) -> Described | None:
+def mark_of(field: FieldInfo, kind: type[Mark]) -> Mark | None:
+    """Mark of a kind on a field, or on what a list or an alternative of a union in it holds; None without one."""
+    return next((m for m in field.metadata if isinstance(m, kind)), None) or _inner(field.annotation, kind)
+
+
+def _inner(annotation: Any, kind: type[Mark]) -> Mark | None:
     for argument in typing.get_args(annotation):
-        found = next((m for m in getattr(argument, "__metadata__", ()) if isinstance(m, Described)), None)
+        marks = getattr(argument, "__metadata__", ())
+        found = next((m for m in marks if isinstance(m, kind)), None) or _inner(argument, kind)
         if found:
             return found
     return None

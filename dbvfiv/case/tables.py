@@ -31,6 +31,12 @@ def read_text_file(path: Path, encoding: str | None = "utf-8-sig") -> str:
         raise ValueError(f"which cannot be read ({getattr(error, 'strerror', None) or 'bad name'})") from None
 
 
+def numbered_lines(path: Path) -> list[tuple[int, str]]:
+    """Lines of a text file with their numbers, but for empty ones and what follows ``#``; see `read_text_file`."""
+    lines = ((i, line.split("#")[0].strip()) for i, line in enumerate(read_text_file(path).splitlines(), 1))
+    return [(i, line) for i, line in lines if line]
+
+
 def existing_file(path: Path, info: ValidationInfo) -> Path:
     """Full name of a file that a key names; as it is where files are not to be looked for.
 
@@ -95,14 +101,13 @@ def read_pairs(path: Path, kinds: tuple[Quantity, Quantity], words: str) -> list
     ValueError
         With a clause that completes "KEY is given as FILE, ...".
     """
-    text = read_text_file(path)
     units, rows = [kind.si for kind in kinds], []
-    for number, line in enumerate(text.splitlines(), 1):
-        found = _words(line.split("#")[0])
+    for number, line in numbered_lines(path):
+        found = _words(line)
         if not found:
             continue
         if not rows and re.match(r"[A-Za-z]", found[0]):
-            units = _header_units(line.split("#")[0], number, kinds)
+            units = _header_units(line, number, kinds)
             continue
         if len(found) != 2:
             raise ValueError(f"whose line {number} is not {words}")

@@ -12,7 +12,7 @@ def test_word_of_the_trade_leads_to_a_key_that_exists(word):
     key = SYNONYMS[word]
     assert key in {info.key for info in walk(Case)}
     with pytest.raises(CaseError, match="is not a key") as raised:
-        explain(Case, word)
+        explain(Case, f"valve.{word}")
     assert key in str(raised.value)
 
 
@@ -23,6 +23,7 @@ def test_word_of_the_trade_leads_to_a_key_that_exists(word):
         ("valve.hardness=60", "materials.NAME(neo-hookean).shear_modulus"),
         ("closure.back_pressure=5 m", "closure.rated_pressure"),
         ("head=2 m", "drive.head"),
+        ("steady.heads=[1]", "steady.pressures"),
     ],
 )
 def test_unknown_key_names_the_one_that_holds_it(given, key):
