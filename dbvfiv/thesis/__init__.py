@@ -7,14 +7,11 @@ stand by subject in `materials`, `openings` and `histories`.
 from collections.abc import Sequence
 
 from ..errors import CaseError
-from . import histories, materials, openings
-from .entry import Entry, Number, Workshop
+from . import histories, materials, openings  # noqa: F401  declare their entries
+from .entry import DECLARED, Entry, Number, Workshop
 
-_SUBJECTS = (materials, openings, histories)
 #: All entries, in the order of the thesis.
-ENTRIES: tuple[Entry, ...] = tuple(
-    sorted((entry for subject in _SUBJECTS for entry in subject.ENTRIES), key=lambda entry: entry.place)
-)
+ENTRIES: tuple[Entry, ...] = tuple(sorted(DECLARED, key=lambda entry: entry.place))
 
 __all__ = ["ENTRIES", "Entry", "Number", "Workshop", "choose_entries"]
 

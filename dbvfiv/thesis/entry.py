@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -57,6 +57,9 @@ class Number:
         return f"{self.what}{', ' if self.unit else ''}{self.unit}", f"{self.ours:.4g}", published, difference
 
 
+Found = str | Number | Picture
+
+
 @dataclass(frozen=True)
 class Outcome:
     """Findings of an entry.
@@ -70,8 +73,8 @@ class Outcome:
     """
 
     sentences: tuple[str, ...]
-    numbers: tuple[Number, ...] = ()
-    pictures: tuple[Picture, ...] = ()
+    numbers: tuple[Number, ...]
+    pictures: tuple[Picture, ...]
 
 
 @dataclass(frozen=True)
@@ -83,13 +86,18 @@ class Entry:
     name : str
         "7-4", or "T3-5" for a table.
     title : str
-    make : callable
-        From a `Workshop` to an `Outcome`.
+    tell : callable
+        From a `Workshop` to sentences, numbers and pictures, in any order.
     """
 
     name: str
     title: str
-    make: Callable[[Workshop], Outcome]
+    tell: Callable[[Workshop], Iterable[Found]]
+
+    def make(self, workshop: Workshop) -> Outcome:
+        """Findings, sorted by what they are."""
+        found = list(self.tell(workshop))
+        return Outcome(*(tuple(x for x in found if isinstance(x, kind)) for kind in (str, Number, Picture)))
 
     @property
     def place(self) -> tuple[int, int, int]:
@@ -117,6 +125,20 @@ class Entry:
         """The outcome for a page."""
         tables = (Table(_HEAD, tuple(n.row for n in outcome.numbers)),) if outcome.numbers else ()
         return Part(f"entry-{self.name}", f"{self.label}: {self.title}", outcome.sentences, tables, outcome.pictures)
+
+
+#: All entries, as they are declared.
+DECLARED: list[Entry] = []
+
+
+def entry(name: str, title: str) -> Callable:
+    """Declare what a function tells as the entry of a figure or table."""
+
+    def declare(tell: Callable[[Workshop], Iterable[Found]]) -> Callable[[Workshop], Iterable[Found]]:
+        DECLARED.append(Entry(name, title, tell))
+        return tell
+
+    return declare
 
 
 def spread(numbers: Sequence[Number]) -> str:

@@ -13,7 +13,7 @@ from ..materials.laws import fibre_ply, ply_from_constituents
 from ..materials.shipped import published_rubber, strain_levels
 from ..report.content import picture
 from ..shell import Layer, Section, Shell, ShellMesh
-from .entry import Entry, Number, Outcome, Workshop
+from .entry import Number, Workshop, entry
 
 _RUBBERS = ("SBR", "CR", "EPDM")
 #: C10, C01, C11 of Table 3-3, three constants, MPa, by rubber and strain level.
@@ -24,21 +24,20 @@ _TABLE_3_3 = {
 }
 
 
-def rubber_constants(workshop: Workshop) -> Outcome:
-    """Table 3-3 beside the constants of App. A's listing, which the program works with."""
-    numbers = []
+@entry("T3-3", "constants of the rubbers")
+def _rubber_constants(workshop: Workshop):
+    worst = 0.0
     for name, levels in _TABLE_3_3.items():
         for level, printed in zip(strain_levels(), levels):
             law = published_rubber(name, level)
             for symbol, ours, theirs in zip(("C10", "C01", "C11"), (law.c10, law.c01, law.c11), printed):
-                numbers.append(Number(f"{name} {100 * level:g} %, {symbol}", ours / 1e6, theirs, "MPa"))
-    worst = max(abs(n.ours - n.published) for n in numbers)
-    told = f"The table rounds the constants of App. A's listing: no difference is larger than {worst:.3f} MPa."
-    return Outcome((told,), tuple(numbers))
+                worst = max(worst, abs(ours / 1e6 - theirs))
+                yield Number(f"{name} {100 * level:g} %, {symbol}", ours / 1e6, theirs, "MPa")
+    yield f"The table rounds the constants of App. A's listing: no difference is larger than {worst:.3f} MPa."
 
 
-def rubber_curves(workshop: Workshop) -> Outcome:
-    """Fig. 3-6: nominal stress of uniaxial tension with two and three constants at each strain level."""
+@entry("3-6", "rubber curves")
+def _rubber_curves(workshop: Workshop):
 
     def draw():
         figure = new_figure(11.0, 3.8)
@@ -55,47 +54,40 @@ def rubber_curves(workshop: Workshop) -> Outcome:
         figure.axes[0].legend(title="strain level")
         return figure
 
-    caption = "Full lines three constants, dotted two; each set up to the strain that it was fitted to."
-    told = (
+    yield (
         "Constants are fitted anew for each strain level, so the sets do not lie on one curve. The measured curves are "
         "printed as a picture only, so nothing is compared in numbers."
     )
-    return Outcome((told,), (), (picture("thesis-3-6", caption, draw),))
+    caption = "Full lines three constants, dotted two; each set up to the strain that it was fitted to."
+    yield picture("thesis-3-6", caption, draw)
 
 
-def ply_constants(workshop: Workshop) -> Outcome:
-    """Table 3-5: the fibre ply from its constituents."""
+@entry("T3-5", "constants of the fibre ply")
+def _ply_constants(workshop: Workshop):
     ply = ply_from_constituents()
-    numbers = (
-        Number("E along the fibre", ply.e1 / 1e6, 1558, "MPa"),
-        Number("E across it", ply.e2 / 1e6, 7.94, "MPa"),
-        Number("G in the plane of the ply", ply.g12 / 1e6, 2.94, "MPa"),
-        Number("G across it", ply.g23 / 1e6, 5.57, "MPa"),
-        Number("Poisson's ratio in the plane", ply.nu12, 0.27),
+    yield Number("E along the fibre", ply.e1 / 1e6, 1558, "MPa")
+    yield Number("E across it", ply.e2 / 1e6, 7.94, "MPa")
+    yield Number("G in the plane of the ply", ply.g12 / 1e6, 2.94, "MPa")
+    yield Number("G across it", ply.g23 / 1e6, 5.57, "MPa")
+    yield Number("Poisson's ratio in the plane", ply.nu12, 0.27)
+    yield (
+        "The table and App. A's program exchange the shear moduli: the program has 5.57 MPa in the plane of the ply "
+        "and 2.94 across it, the table the other way round. Which of them the published results were computed with is "
+        'not said; the listing runs, so it is the default here, and materials.fibre_constants = "table" takes the '
+        "other. The flow differs by 0.3 to 2 %."
     )
-    told = (
-        "The table and App. A's program exchange the shear moduli: the program has 5.57 MPa in the plane of the "
-        "ply and "
-        "2.94 across it, the table the other way round. Which of them the published results were computed with is not "
-        'said; the listing runs, so it is the default here, and materials.fibre_constants = "table" takes the other. '
-        "The flow differs by 0.3 to 2 %."
-    )
-    return Outcome((told,), numbers)
 
 
-def rayleigh_table(workshop: Workshop) -> Outcome:
-    """Table 5-1: alpha and beta of a damping ratio between 1 and 10 Hz."""
-    numbers = []
+@entry("T5-1", "Rayleigh damping from a damping ratio")
+def _rayleigh_table(workshop: Workshop):
     for ratio, alpha, beta in ((0.05, 0.57, 0.002), (0.5, 5.7, 0.02)):
         ours = rayleigh_constants((ratio, ratio), (1.0, 10.0))
-        numbers.append(Number(f"alpha, ratio {ratio:g}", ours[0], alpha, "1/s"))
-        numbers.append(Number(f"beta, ratio {ratio:g}", ours[1], beta, "s"))
-    told = (
-        "By the thesis's own Eq. 5.5 beta is 0.00145 and 0.0145 s; the table prints 0.002 and 0.02. Its beta of "
-        "0.003 s "
-        "is a damping ratio of 0.39 at 41 Hz, where the valve flutters; rubber has a tenth to a third of that there."
+        yield Number(f"alpha, ratio {ratio:g}", ours[0], alpha, "1/s")
+        yield Number(f"beta, ratio {ratio:g}", ours[1], beta, "s")
+    yield (
+        "By the thesis's own Eq. 5.5 beta is 0.00145 and 0.0145 s; the table prints 0.002 and 0.02. Its beta of 0.003 "
+        "s is a damping ratio of 0.39 at 41 Hz, where the valve flutters; rubber has a tenth to a third of that there."
     )
-    return Outcome((told,), tuple(numbers))
 
 
 #: m: the strip's length and width, and half the span between the supports, symmetric about the load.
@@ -166,8 +158,8 @@ def _equilibrium(shell: Shell, start: np.ndarray, force: np.ndarray) -> np.ndarr
     raise SolveError("The strip in three-point bending was not solved.")
 
 
-def bending(workshop: Workshop) -> Outcome:
-    """Flexural stress over strain by Eq. 3.25."""
+@entry("3-13", "three-point bending")
+def _bending(workshop: Workshop):
     bent, loads = deflections(COARSE if workshop.quick else FINE), np.array(LOADS)
     span, depth = 2 * HALF_SPAN, sum(layer.thickness for layer in layers())
     stress = 3.0 * loads * span / (2.0 * WIDTH * depth**2)
@@ -184,22 +176,11 @@ def bending(workshop: Workshop) -> Outcome:
         axes.set_ylabel("Flexural stress, MPa")
         return figure
 
-    numbers = (
-        Number("flexural modulus at small strain", modulus[0] / 1e6, None, "MPa"),
-        Number("secant modulus at the largest strain", modulus[-1] / 1e6, None, "MPa"),
-    )
-    told = (
+    yield Number("flexural modulus at small strain", modulus[0] / 1e6, None, "MPa")
+    yield Number("secant modulus at the largest strain", modulus[-1] / 1e6, None, "MPa")
+    yield (
         f"Nearly a straight line up to a strain of {1e2 * strain[-1]:.2g} %, as in the thesis, whose shell and solid "
         "differ by 1 % on average and lie 13.6 and 12.4 % off its tests; it prints them as a picture only. Shell and "
-        "layered solid of ours agree within 1 % too (tests/verification/test_three_point_bending.py).",
+        "layered solid of ours agree within 1 % too (tests/verification/test_three_point_bending.py)."
     )
-    return Outcome(told, numbers, (picture("thesis-3-13", "", draw),))
-
-
-ENTRIES = (
-    Entry("T3-3", "constants of the rubbers", rubber_constants),
-    Entry("3-6", "rubber curves", rubber_curves),
-    Entry("T3-5", "constants of the fibre ply", ply_constants),
-    Entry("T5-1", "Rayleigh damping from a damping ratio", rayleigh_table),
-    Entry("3-13", "three-point bending", bending),
-)
+    yield picture("thesis-3-13", "", draw)
