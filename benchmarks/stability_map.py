@@ -12,7 +12,7 @@ import numpy as np
 
 from dbvfiv.studies.case import thesis_case
 from dbvfiv.studies.map.column import MapPlan
-from dbvfiv.studies.map.study import run_map
+from dbvfiv.studies.session import Session
 from dbvfiv.studies.stability.place import condition_of
 from dbvfiv.studies.stability.walk import StabilityWalk
 from eigen import leading_modes
@@ -49,7 +49,7 @@ def stability_map():
     for part in (picks[: SAMPLE // 2], None, picks[SAMPLE // 2 :]):
         if part is None:  # in the middle, so that a slow spell of the machine meets both
             started, before = time.perf_counter(), _processor()
-            result = run_map(case, workers=WORKERS)
+            result = Session(case).perform("map", workers=WORKERS)
             taken = time.perf_counter() - started
             work = _processor() - before
             continue
@@ -128,7 +128,7 @@ def maps_with_curves():
             ],
         )
         before = _processor()
-        taken, result = seconds(lambda case=case: run_map(case, workers=WORKERS))
+        taken, result = seconds(lambda case=case: Session(case).perform("map", workers=WORKERS))
         works[damping] = work = _processor() - before
         exact = sum(curve.exact for curve in result.curves)
         added = sum(column.level > 0 for column in result.columns)

@@ -17,11 +17,11 @@ from .model import ValveModel
 from .observer import Observer, Progress, is_watched
 from .studies.case import Case, load_case
 from .studies.closure.study import ClosureResult
-from .studies.cycle.result import CycleResult
+from .studies.cycle.study import CycleResult
 from .studies.map.study import MapResult
 from .studies.modes.study import ModesResult
 from .studies.onset.study import OnsetResult
-from .studies.sensitivity.result import SensitivityResult
+from .studies.sensitivity.study import SensitivityResult
 from .studies.session import Session, named_changes
 from .studies.state import State, sensitivity_keys
 from .studies.steady.study import SteadyResult

@@ -43,8 +43,8 @@ def test_pencil_of_a_state_has_the_eigenvalues_of_its_modes(state):
 def test_tables_come_with_units_and_ranges_as_arrays():
     valve = dbvfiv.load(thesis_case(), {"mesh.around": 4, "mesh.along": 6})
     swept = valve.sweep({"density": np.array([10.0, 20.0, 100.0])})
-    frame = swept.table("points")
-    assert list(frame["value"]) == [10.0, 20.0, 100.0] and frame.attrs["units"]["unstable_count"] == ""
+    frame = swept.table("samples")
+    assert list(frame["value"]) == [10.0, 20.0, 100.0] and frame.attrs["units"]["growth_rate"] == "1/s"
     grid = swept.table("states", form="xarray")
     assert grid["pressure"].attrs["units"] == "Pa" and grid["max_displacement_position"].shape == (1, 3)
     assert len(swept.table()) == sum(len(branch["growth_rate"]) for branch in swept.summary()["branches"])

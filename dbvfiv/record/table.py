@@ -11,7 +11,7 @@ from typing import Any
 import h5py
 import numpy as np
 
-LAYOUT = 2
+LAYOUT = 3
 TEXT = "text"
 #: SI value of the units in which numbers are printed, where it is not 1.
 PRINTED = {"kPa": 1e3, "static kPa": 1e3, "mm": 1e-3, "cm2": 1e-4, "mm2": 1e-6, "L/s": 1e-3, "%": 1e-2}

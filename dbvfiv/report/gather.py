@@ -12,7 +12,7 @@ from ..errors import CaseError, SolveError
 from ..observer import Observer
 from ..studies.case import Case
 from ..studies.closure.study import ClosureResult
-from ..studies.cycle.result import CycleResult
+from ..studies.cycle.study import CycleResult
 from ..studies.map.study import MapResult
 from ..studies.modes.study import ModesResult
 from ..studies.onset.study import OnsetResult

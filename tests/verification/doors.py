@@ -17,14 +17,13 @@ from dbvfiv.motion.start import steady_positions
 from dbvfiv.motion.stepper import StepOptions
 from dbvfiv.observer import Observer
 from dbvfiv.studies.case import Case, load_case
-from dbvfiv.studies.map.study import run_map
 from dbvfiv.studies.modes.search import ModesOptions, run_modes
 from dbvfiv.studies.onset.search import OnsetOptions, run_onset
 from dbvfiv.studies.session import Session
 from dbvfiv.studies.stability.verdict import UNDECIDED, Verdict
 from dbvfiv.studies.stability.walk import StabilityWalk
-from dbvfiv.studies.sweep.branches import SweepOptions, run_sweep
 from dbvfiv.studies.transient.run import Runner
+from tests.studies.map.axes import run_map
 from tests.verification.test_transient_modes import ringing
 
 #: Case files.
@@ -144,26 +143,20 @@ def verdicts_of(session: Session, state: SteadyState) -> Iterator[tuple[str, Ver
     plain = {"map.curve": False, "map.refine": 0, "map.checks": 0, "map.continuity": "case"}
     p, rho = here.pressure, here.density
     axes = {"map.x": f"pressure={p!r}:{p * (1 + STEP)!r}:2", "map.y": f"density={rho!r}:{rho * (1 + STEP)!r}:2"}
-    found = run_map(case.replace(plain | axes), workers=1, walk=_walk(case, model, here, state))
+    found = run_map(case.replace(plain | axes), start=state, workers=1)
     yield "map", found.columns[0].verdict(0, 0)
     around = (rho / (1 + STEP), rho, rho * (1 + STEP))
     options = OnsetOptions("density", around, normal_form=False, coarse_mesh=0)
     onset = run_onset(case, options, walk=_walk(case, model, here, state))
     yield "onset", onset.verdicts[list(onset.values).index(rho)]
-    axis = load_axis(case, f"density={rho!r}:{rho * (1 + STEP)!r}:2")
-    sweep = run_sweep(model, axis, options=SweepOptions.of(case), state=state)
-    yield "sweep", sweep.verdicts[0]
+    over = {"sweep.over": f"density={rho!r}:{rho * (1 + STEP)!r}:2"}
+    yield "sweep", Session(case.replace(over), start=state).perform("sweep").verdicts[0]
 
 
 def _walk(case: Case, model, here: Mu, state: SteadyState) -> StabilityWalk:
     walk = StabilityWalk(case, model=model)
     walk.give(here, state.q)
     return walk
-
-
-def load_axis(case: Case, over: str):
-    """Axis of a sweep."""
-    return case.replace({"sweep.over": over}).sweep.axis
 
 
 def rates_in_time(case: Case, frequency: float, push: float = 1e-8) -> tuple[complex, complex]:

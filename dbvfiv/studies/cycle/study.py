@@ -1,40 +1,238 @@
-"""Run of the cycle study: follows a branch of cycles and keeps it in a record."""
+"""Cycles along one parameter: run, storage and restart, ranges of strain for fatigue, what can be read off a run."""
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from functools import cached_property
 from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
+from matplotlib.figure import Figure
 
 from continuation.cycle_branch import CycleTracer
 from continuation.cycle_points import CyclePoint, SpecialCycle
+from continuation.cycles import Cycle
+from continuation.harmonics import Harmonics
+from continuation.hill import Exponents
+from continuation.periodic import PeriodicMotion
 
-from ...case.parameters import Mu
+from ...case.parameters import PARAMETERS, Mu
 from ...errors import CaseError, SolveError
+from ...model.system import ValveSystem
 from ...motion.periodic import check_periodic
-from ...record.record import GrowingRecord
+from ...record.mesh import MeshData, WholeValve
+from ...record.record import GrowingRecord, Record
+from ...record.table import Column, Shown, TableSpec, printed_head, printed_row
+from ...record.vtkhdf import Step, motion
+from ...shell.recovery import layer_fields
 from ..case import Case
-from ..orbits import MODES, Follower
+from ..orbits import MODES, Follower, Orbit
+from ..result import StudyResult
 from ..session import Session
-from ..stability.place import check_scan
+from ..stability.place import check_scan, describe_fixed, fixed_conditions, rebuilder
 from ..stability.verdict import Verdict
 from ..stability.walk import StabilityWalk
 from ..study import Study, print_rows
-from .result import (
-    COLUMNS,
-    CYCLES,
-    ENDED,
-    SERIES,
-    SPECIAL,
-    VERDICT,
-    CycleResult,
-    cycle_row,
-    read_points,
-    series_rows,
-    special_note,
-    tables_of,
-)
+from . import figures
 from .start import find_onset, given_motion
+
+CYCLES, SERIES, SPECIAL, ENDED, VERDICT = "cycles", "series", "special", "ended", "verdict"
+#: Floquet exponents kept of each cycle.
+KEPT = 20
+
+_PERTURBED = "Dimension in which perturbations grow; -1 where it was not asked for"
+_LEG = "1 on the way up from a start within the range, after the way down from there; 0 elsewhere"
+COLUMNS = (
+    Column("value", "SI", "Value of the parameter", shown=Shown("value", "SI", 12, ".6g")),
+    Column("amplitude", "m", "Half the swing in y of one lip at x = z = 0", shown=Shown("amplitude", "mm", 10, ".4f")),
+    Column("frequency", "Hz", "Frequency", shown=Shown("frequency", "Hz", 10, ".4f")),
+    Column("lip_least", "m", "Least displacement", shown=Shown("lip from", "mm", 9, ".3f")),
+    Column("lip_largest", "m", "Largest displacement", shown=Shown("to", "mm", 9, ".3f")),
+    Column("lip_mean", "m", "Mean displacement"),
+    Column("flow_mean", "kg/s", "Mean mass flow at the lip", shown=Shown("flow", "kg/s", 9, ".4f")),
+    Column("flow_amplitude", "kg/s", "Half the swing of the mass flow at the lip"),
+    Column("least_speed", "m/s", "Least speed of the fluid at any row; below zero where it is drawn in"),
+    Column(
+        "unstable", "", _PERTURBED, "i8", Shown("stable", "", 7, lambda r: {0: "yes", -1: "?"}.get(r.unstable, "no"))
+    ),
+    Column("growth_rates", "1/s", "Of the leading Floquet exponents; NaN where there are fewer", shape=(KEPT,)),
+    Column("leading", "1/s", "Growth rate of the leading one", shown=Shown("leading", "1/s", 9, ".3g")),
+    Column("angular_frequencies", "rad/s", "Of the exponents, from 0 to half that of the cycle", shape=(KEPT,)),
+    Column("errors", "", "Share of each perturbation that the full equations miss", shape=(KEPT,)),
+    Column("trivial", "1/s", "Size of the exponent of a shift in time, zero but for errors"),
+    Column("harmonics", "", "Harmonics of the series", "i8", Shown("harm.", "", 6, "")),
+    Column("tail", "", "Share of the motion that the last two hold", shown=Shown("tail", "", 8, ".1g")),
+    Column("correction", "", "Last correction over the motion"),
+    Column("iterations", "", "Corrections", "i8"),
+    Column("krylov", "", "Krylov iterations", "i8"),
+    Column("arclength", "", "Along the branch"),
+    Column("asked", "", "Whether the value is one of those asked for", "bool"),
+    Column("leg", "", _LEG, "i8"),
+)
+_SERIES = (
+    Column("cycle", "", "Number of the cycle, from 0", "i8"),
+    Column("q", "m, rad", "Coefficients of 1, sqrt(2) cos, sqrt(2) sin of each harmonic: free unknowns"),
+    Column("inner", "m/s", "The same of the flow's unknowns"),
+)
+
+
+def tables_of(mesh: MeshData) -> tuple[TableSpec, ...]:
+    """Tables of a cycle result on a mesh."""
+    waves = len(mesh.line_places)
+    inner = int(mesh.gas_unknowns[0]) if len(mesh.gas_unknowns) else 2 * waves - 1 if waves else 1
+    series = {"q": (int(mesh.free.sum()),), "inner": (inner,)}
+    return TableSpec(CYCLES, COLUMNS), TableSpec(SERIES, _SERIES, series)
+
+
+def cycle_row(point: CyclePoint, orbit: Orbit, leg: int) -> dict[str, Any]:
+    """A cycle of a leg of the branch as a row of its table."""
+    flow, speeds = orbit.flow
+    low, high = orbit.lip_extremes
+    exponents, wide = point.exponents, np.full((3, KEPT), np.nan)
+    if exponents is not None:
+        count = min(len(exponents.values), KEPT)
+        wide[:, :count] = exponents.values.real[:count], exponents.values.imag[:count], exponents.errors[:count]
+    return {
+        "value": point.value,
+        "amplitude": 0.5 * (high - low),
+        "frequency": point.motion.omega / (2 * np.pi),
+        "lip_least": low,
+        "lip_largest": high,
+        "lip_mean": float(orbit.lip.mean()),
+        "flow_mean": float(flow.mean()),
+        "flow_amplitude": 0.5 * float(np.ptp(flow)),
+        "least_speed": float(speeds.min()),
+        "unstable": -1 if exponents is None else exponents.unstable,
+        "growth_rates": wide[0],
+        "leading": wide[0, 0],
+        "angular_frequencies": wide[1],
+        "errors": wide[2],
+        "trivial": np.nan if exponents is None else exponents.trivial,
+        "harmonics": point.motion.harmonics.count,
+        "tail": point.motion.tail,
+        "correction": point.cycle.correction,
+        "iterations": point.cycle.iterations,
+        "krylov": point.cycle.krylov,
+        "arclength": point.arclength,
+        "asked": point.asked,
+        "leg": leg,
+    }
+
+
+def series_rows(number: int, motion: PeriodicMotion, size: int) -> dict[str, np.ndarray]:
+    """The series of a cycle as rows of its table."""
+    c = motion.coefficients
+    return {"cycle": np.full(len(c), number), "q": c[:, :size], "inner": c[:, size:]}
+
+
+def special_note(special: SpecialCycle, parameter: str, orbit: Orbit) -> dict[str, Any]:
+    """Note that a record keeps of a bifurcation of the branch of cycles."""
+    low, high = orbit.lip_extremes
+    return {
+        "kind": special.kind,
+        "parameter": parameter,
+        "value": special.value,
+        "amplitude": 0.5 * (high - low),
+        "frequency": special.point.motion.omega / (2 * np.pi),
+        "perturbation_frequency": special.frequency,
+        "located": special.located,
+    }
+
+
+def read_motion(record: Record, number: int) -> PeriodicMotion:
+    """The motion of a cycle."""
+    first = np.searchsorted(record.column(SERIES, "cycle"), number)
+    count = int(record.value(CYCLES, "harmonics", number))
+    rows = slice(first, first + 2 * count + 1)
+    c = np.hstack([record.column(SERIES, "q")[rows], record.column(SERIES, "inner")[rows]])
+    return PeriodicMotion(Harmonics(count), c, 2 * np.pi * float(record.value(CYCLES, "frequency", number)))
+
+
+def read_points(record: Record, mu: dict, name: str, leg: int = 0) -> list[CyclePoint]:
+    """Cycles of a leg that a record holds, that at which all start among them, for a branch to go on from; `name` is
+    the parameter's among `mu`.
+    """
+    found = []
+    for number in range(record.rows(CYCLES)):
+        if number and record.value(CYCLES, "leg", number) != leg:
+            continue
+        value = {c.name: record.value(CYCLES, c.name, number) for c in COLUMNS}
+        motion = read_motion(record, number)
+        exponents = None
+        if value["unstable"] >= 0:
+            kept = np.isfinite(value["growth_rates"])
+            numbers = (value["growth_rates"] + 1j * value["angular_frequencies"])[kept]
+            exponents = Exponents(numbers, [], value["errors"][kept], float(value["trivial"]), motion.omega)
+        spent = int(value["iterations"]), int(value["krylov"])
+        cycle = Cycle(motion, mu | {name: float(value["value"])}, float(value["correction"]), *spent)
+        length, asked = float(value["arclength"]), bool(value["asked"])
+        found.append(CyclePoint(cycle, float(value["value"]), length, exponents, asked))
+    return found
+
+
+#: Instants of a period at which layers are looked at.
+INSTANTS = 16
+
+
+@dataclass(frozen=True, eq=False)
+class LayerRanges:
+    """Ranges over a period, of element values as `dbvfiv.shell.recovery.LayerFields` has them.
+
+    Attributes
+    ----------
+    names : tuple of str
+        Layers, inside to outside.
+    strain : (ne, nl) array
+        Largest range of the five strains in the layer's axes.
+    stress : (ne, nl) array, Pa
+        Largest range of the five stresses there.
+    von_mises : (ne, nl) array, Pa
+        Largest von Mises stress of the period.
+    place : (ne, 3) array, m
+        Middles of the elements, at rest.
+    """
+
+    names: tuple[str, ...]
+    strain: np.ndarray
+    stress: np.ndarray
+    von_mises: np.ndarray
+    place: np.ndarray
+
+    def largest(self) -> list[dict[str, Any]]:
+        """Largest ranges of strain and of stress of each layer, and their positions."""
+        found = []
+        for number, name in enumerate(self.names):
+            strain, stress = self.strain[:, number], self.stress[:, number]
+            at_strain, at_stress = int(np.argmax(strain)), int(np.argmax(stress))
+            found.append(
+                {
+                    "layer": name,
+                    "strain_range": float(strain[at_strain]),
+                    "strain_position": self.place[at_strain].tolist(),
+                    "stress_range": float(stress[at_stress]),
+                    "stress_position": self.place[at_stress].tolist(),
+                    "largest_von_mises": float(self.von_mises[:, number].max()),
+                }
+            )
+        return found
+
+
+def layer_ranges(orbit: Orbit) -> LayerRanges:
+    """Ranges of strain and stress of a cycle."""
+    shell, size = orbit.model.shell, orbit.model.size
+    phases = 2 * np.pi * np.arange(INSTANTS) / INSTANTS
+    fields = [layer_fields(shell, q) for q in orbit.motion.at(phases)[:, :size]]
+    strain, stress = (np.stack([getattr(field, name) for field in fields]) for name in ("strain", "stress"))
+    return LayerRanges(
+        fields[0].names,
+        np.ptp(strain, axis=0).max(axis=-1),
+        np.ptp(stress, axis=0).max(axis=-1),
+        np.max([field.von_mises for field in fields], axis=0),
+        shell.mesh.nodes[shell.mesh.quads].mean(axis=1),
+    )
+
 
 #: Distance of the second cycle from one of a file, over the range.
 AWAY = 0.02
@@ -153,6 +351,187 @@ class _Keeper:
                 "relied on; runs in time have a law for either way."
             )
         record.item(SimpleNamespace(**row))
+
+
+#: Steps of a period for ParaView.
+STEPS = 24
+
+
+class Point:
+    """A cycle of a result.
+
+    Attributes
+    ----------
+    The columns of `dbvfiv.studies.cycle.study.COLUMNS` by their names.
+    """
+
+    def __init__(self, result: CycleResult, number: int):
+        self.result, self.number = result, number
+        self.numbers = {c.name: result.record.value(CYCLES, c.name, number) for c in COLUMNS}
+
+    def __getattr__(self, name: str):
+        if name.startswith("__") or name not in self.__dict__.get("numbers", {}):
+            raise AttributeError(name)
+        return self.numbers[name]
+
+    @property
+    def stable(self) -> bool | None:
+        """True where all perturbations of the model's symmetry decay; None where stability was not asked for."""
+        return None if self.unstable < 0 else bool(self.unstable == 0)
+
+    @property
+    def exponents(self) -> np.ndarray:
+        """Leading Floquet exponents, complex, 1/s."""
+        kept = np.isfinite(self.growth_rates)
+        return (self.growth_rates + 1j * self.angular_frequencies)[kept]
+
+    @cached_property
+    def orbit(self) -> Orbit:
+        """The motion, over one period."""
+        name = PARAMETERS[self.result.parameter].system_name or self.result.parameter
+        mu = Mu.of(self.result.case).for_system() | {name: float(self.value)}
+        return Orbit(self.result.system.model(mu), mu, read_motion(self.result.record, self.number))
+
+    @cached_property
+    def ranges(self) -> LayerRanges:
+        """Ranges of strain and stress in the layers over a period."""
+        return layer_ranges(self.orbit)
+
+    def summary(self) -> dict[str, Any]:
+        """Plain SI numbers for JSON."""
+        names = (
+            "value amplitude frequency lip_least lip_largest lip_mean flow_mean flow_amplitude least_speed harmonics "
+            "tail correction trivial asked"
+        ).split()
+        plain = {name: np.asarray(self.numbers[name]).item() for name in names}
+        found = [
+            {"growth_rate": float(s.real), "angular_frequency": float(s.imag), "multiplier": [m.real, m.imag]}
+            for s, m in zip(self.exponents, np.exp(self.exponents / self.frequency))
+        ]
+        return plain | {"stable": self.stable, "unstable_dimension": int(self.unstable), "exponents": found}
+
+
+class CycleResult(StudyResult):
+    """A branch of limit cycles, in the order in which they lie on it.
+
+    Attributes
+    ----------
+    parameter : str
+    points : tuple of Point
+    special_points : list of dict
+        Kind, value of the parameter, amplitude, frequencies of the cycle and of the perturbation, whether located.
+
+    Examples
+    --------
+    >>> found = dbvfiv.load("cases/light-fluid.toml").cycle("density=25:60:8")      # doctest: +SKIP
+    >>> [(p.value, p.amplitude, p.frequency, p.stable) for p in found.points]      # doctest: +SKIP
+    """
+
+    kind = "cycle"
+
+    @property
+    def parameter(self) -> str:
+        return self.case.cycle.axis.parameter
+
+    @cached_property
+    def points(self) -> tuple[Point, ...]:
+        found = [Point(self, number) for number in range(self.record.rows(CYCLES))]
+        return tuple([p for p in found if p.leg == 1][::-1] + [p for p in found if p.leg == 0])
+
+    @cached_property
+    def special_points(self) -> list[dict[str, Any]]:
+        notes = self.record.notes(SPECIAL)
+        return [{name: value for name, value in note.items() if name != "what"} for note in notes]
+
+    @property
+    def onset(self) -> dict[str, float] | None:
+        """Value and frequency of the onset that the branch starts at."""
+        notes = self.record.notes("onset")
+        return {name: notes[-1][name] for name in ("value", "frequency")} if notes else None
+
+    @property
+    def verdict(self) -> Verdict:
+        """Stability of the steady state of the case itself."""
+        notes = self.record.notes(VERDICT)
+        return Verdict.read(notes[-1]) if notes else Verdict.undecided("The run ended before it was looked at.")
+
+    @property
+    def reason(self) -> str:
+        """Why the branch ended."""
+        reasons = [note["reason"] for note in self.record.notes(ENDED)]
+        return "; ".join(dict.fromkeys(reasons)) or "the run ended before the branch did"
+
+    @cached_property
+    def system(self) -> ValveSystem:
+        """Models for parameters."""
+        return ValveSystem(self.model, rebuilder(self.case))
+
+    def nearest(self, value: float | None = None) -> Point:
+        """The cycle at the value nearest to one of the parameter; the last one without.
+
+        Raises
+        ------
+        CaseError
+            If there is no cycle.
+        """
+        if not self.points:
+            raise CaseError("The run ended before the first cycle was found.")
+        if value is None:
+            return self.points[-1]
+        return min(self.points, key=lambda point: abs(point.value - value))
+
+    def summary(self) -> dict[str, Any]:
+        return {
+            "parameter": self.parameter,
+            "points": [point.summary() for point in self.points],
+            "special_points": self.special_points,
+            "onset": self.onset,
+            "verdict": self.verdict.summary(),
+            "reason": self.reason,
+            "fixed": fixed_conditions(self.case, self.parameter),
+            "failures": list(self.failures),
+            "warnings": list(self.warnings),
+            "interrupted": not self.complete,
+        }
+
+    def shortfall(self) -> str | None:
+        return "The branch could not be followed to the end of the range" if self.failures else None
+
+    def drawers(self) -> Iterator[tuple[str, Callable[[], Figure]]]:
+        if self.points:
+            yield from figures.draw(self)
+
+    def lines(self) -> list[str]:
+        rows = [printed_row(COLUMNS, point) for point in self.points]
+        return [f"At {describe_fixed(self.case, self.parameter)}:", *printed_head(COLUMNS), *rows, *self.remarks()]
+
+    def remarks(self) -> list[str]:
+        row = PARAMETERS[self.parameter]
+        said = []
+        if self.onset:
+            at = row.text(self.onset["value"])
+            said.append(f"The branch starts at the onset at {at}, {self.onset['frequency']:.4g} Hz.")
+        for special in self.special_points:
+            words = f"{special['kind']} at {row.text(special['value'])}, amplitude {1e3 * special['amplitude']:.4g} mm"
+            if special["perturbation_frequency"]:
+                words += f", perturbation at {special['perturbation_frequency']:.4g} Hz"
+            said.append(words[0].upper() + words[1:] + ("." if special["located"] else ", not located closely."))
+        said.append(f"The branch ends: {self.reason.rstrip('.')}.")
+        if self.points:
+            said.append("Stable means: against perturbations that are symmetric as the model is.")
+        return said
+
+    def steps(self, valve: WholeValve, value: float | None = None) -> Sequence[Step]:
+        """One period of the cycle nearest to a value of the parameter, or of the last one."""
+        orbit = self.nearest(value).orbit if self.points else None
+        if orbit is None:
+            return ()
+        found = []
+        for k in range(STEPS + 1):
+            q = orbit.motion.at([2 * np.pi * k / STEPS])[0, : orbit.model.size]
+            points = motion(self.mesh, valve, orbit.model.nodal(q))
+            found.append(Step(k / STEPS * orbit.motion.period, points, {"thickness": valve.cells(self.mesh.thickness)}))
+        return found
 
 
 STUDY = Study("cycle", tables_of, run, CycleResult, live=lambda case: print_rows(COLUMNS))

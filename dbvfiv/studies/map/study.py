@@ -16,7 +16,6 @@ from eigen.columns import DIRECT, MISSING
 
 from ...errors import SolveError
 from ...fit import outside_band
-from ...observer import Observer, Observers
 from ...record.mesh import MeshData
 from ...record.record import GrowingRecord, Record
 from ...record.table import Column, TableSpec
@@ -47,85 +46,32 @@ _CELLS = {
 ACCEPTED = 1e-6
 
 
-@dataclass(frozen=True)
-class Check:
-    """One cell, solved directly.
-
-    Attributes
-    ----------
-    x, y : float
-    law : int
-        Number of the continuity law.
-    growth_rate, frequency : float
-        Of the full pencil, 1/s and Hz.
-    error : float
-        |difference of the leading eigenvalue| over its size.
-    unstable : int
-    agrees : bool
-        Error within `ACCEPTED` and the same number of unstable eigenvalues.
+def check_cells(
+    plan: MapPlan, columns: tuple[MapColumn, ...], walk: StabilityWalk, number: int
+) -> list[dict[str, Any]]:
+    """Cells spread over the map by a sequence that fills the plane evenly, solved again with the full pencil: error of
+    the leading eigenvalue, over its size, and whether it is accepted and the number of unstable eigenvalues the same.
     """
-
-    x: float
-    y: float
-    law: int
-    growth_rate: float
-    frequency: float
-    error: float
-    unstable: int
-    agrees: bool
-
-
-def check_cells(plan: MapPlan, columns: tuple[MapColumn, ...], walk: StabilityWalk, number: int) -> tuple[Check, ...]:
-    """Check cells spread over the map by a sequence that fills the plane evenly."""
     usable = [column for column in columns if not column.failure and column.level == 0]
     if not usable:
-        return ()
+        return []
     cells, laws = len(plan.along.values), len(plan.laws)
     # steps of the golden section in both directions (Roberts' sequence)
     picks = sorted(
         (int((0.5 + 0.7548776662 * i) % 1 * len(usable)), int((0.5 + 0.5698402910 * i) % 1 * cells), i % laws)
         for i in range(number)
     )
-    return tuple(_check(plan, usable[i], j, law, walk) for i, j, law in picks)
-
-
-def _check(plan: MapPlan, column: MapColumn, j: int, law: int, walk: StabilityWalk) -> Check:
-    along = plan.along.values[j]
-    spectrum = walk.spectrum(plan.place(column.value, along, plan.laws[law]), 4)
-    kept = column.samples[law][j]
-    true = complex(spectrum.eigenvalues[0]) if len(spectrum) else complex(np.nan)
-    leading = complex(kept.eigenvalues[0]) if len(kept.eigenvalues) else complex(np.nan)
-    error = abs(leading - true) / max(abs(true), 1.0)
-    unstable = spectrum.unstable_count
-    agrees = error <= ACCEPTED and unstable == kept.unstable
-    x, y = (along, column.value) if plan.transposed else (column.value, along)
-    return Check(x, y, law, true.real, true.imag / (2 * np.pi), float(error), unstable, bool(agrees))
-
-
-@dataclass(frozen=True)
-class FoundMap:
-    """A stability map.
-
-    Attributes
-    ----------
-    plan : MapPlan
-    columns : tuple of MapColumn
-        In ascending order, those between the grid's included.
-    curves : tuple of OnsetCurve
-    checks : tuple of Check
-        Cells solved again with the full pencil.
-    warnings : tuple of str
-    """
-
-    plan: MapPlan
-    columns: tuple[MapColumn, ...]
-    curves: tuple[OnsetCurve, ...] = ()
-    checks: tuple[Check, ...] = ()
-    warnings: tuple[str, ...] = ()
-
-    def grid(self, name: str) -> np.ndarray:
-        """A quantity of the cells on the grid (laws, y, x); see `Sample.number`."""
-        return grid_of(self.plan, self.columns, name, range(len(self.plan.laws)))
+    found = []
+    for i, cell, law in picks:
+        kept = usable[i].samples[law][cell]
+        spectrum = walk.spectrum(plan.place(usable[i].value, kept.value, plan.laws[law]), 4)
+        leading, true = (complex(v[0]) if len(v) else complex(np.nan) for v in (kept.eigenvalues, spectrum.eigenvalues))
+        error, unstable = abs(leading - true) / max(abs(true), 1.0), spectrum.unstable_count
+        x, y = (kept.value, usable[i].value) if plan.transposed else (usable[i].value, kept.value)
+        numbers = {"growth_rate": true.real, "frequency": true.imag / (2 * np.pi), "error": float(error)}
+        agrees = bool(error <= ACCEPTED and unstable == kept.unstable)
+        found.append({"x": x, "y": y, "law": law} | numbers | {"unstable": unstable, "agrees": agrees})
+    return found
 
 
 #: Rounds of columns put in for the onset curves.
@@ -135,26 +81,36 @@ LEAST_ROOM = 40
 
 
 @dataclass
-class _Run:
+class _Filling:
+    """Columns found so far, and those still wanted."""
+
     plan: MapPlan
-    observer: Observer
+    record: GrowingRecord
     pool: ColumnPool
     found: dict[tuple[float, int], MapColumn] = field(default_factory=dict)
 
     def fill(self, wanted: Iterable[ColumnTask]) -> None:
-        """Columns that are not there yet: those an earlier run has found, and the others solved."""
+        """Columns that are not there yet: those an earlier run has found, and the others solved and kept."""
         wanted = [task for task in wanted if task.key not in self.found]
         for column in self.pool.columns(wanted):
             key = column.value, column.level
             self.found[key] = column
             if key not in self.pool.known:
-                self.observer.item(column)
+                keep_column(self.record, column)
+                if column.failure:
+                    self.record.fail(gap_sentence(self.plan, column))
+                self.record.item(column)
+
+    @property
+    def columns(self) -> tuple[MapColumn, ...]:
+        """In ascending order, those between the grid's included."""
+        return tuple(sorted(self.found.values(), key=lambda column: column.value))
 
     def between(self, level: int) -> list[ColumnTask]:
         """Columns to put in where the number of onsets under a law differs between neighbours."""
         across, wanted = self.plan.across, []
         for law in range(len(self.plan.laws)):
-            ordered = [column for column in _ordered(self.found) if column.has(law)]
+            ordered = [column for column in self.columns if column.has(law)]
             for a, b in zip(ordered[:-1], ordered[1:]):
                 if _pattern(a, law) != _pattern(b, law) and max(a.level, b.level) == level - 1:
                     ends = (self.plan.coordinate(across, column.value) for column in (a, b))
@@ -180,7 +136,7 @@ class _Run:
             room -= len(wanted)
             level += 1
             tasks = self._tasks(wanted, level)
-            self.observer.progress(f"onset curves, {len(tasks)} more columns")
+            self.record.progress(f"onset curves, {len(tasks)} more columns")
             self.fill(tasks)
 
     def _web(self, law: int) -> Web:
@@ -192,64 +148,7 @@ def _pattern(column: MapColumn, law: int) -> tuple[int, ...]:
     return tuple(int(row[3]) for row in column.onsets if int(row[0]) == law)
 
 
-def run_map(
-    case: Case,
-    observer: Observer | None = None,
-    workers: int | None = None,
-    known: Iterable[MapColumn] = (),
-    walk: StabilityWalk | None = None,
-) -> FoundMap:
-    """A stability map of a case.
-
-    Parameters
-    ----------
-    case : Case
-    observer : Observer, optional
-        `item` is told of every finished `MapColumn`.
-    workers : int, optional
-        Processes; those of the case by default.
-    known : iterable of MapColumn
-        Columns of an interrupted run, which are not solved again: the run repeats its decisions with them, so that it
-        ends with the numbers of one that was never interrupted.
-    walk : StabilityWalk, optional
-        Of the case.
-
-    Raises
-    ------
-    CaseError
-        If the case has nothing that a parameter could change.
-    SolveError
-        If the case has no flow, or no column was found at all.
-    """
-    plan = MapPlan.of(case)
-    check_scan(case, plan.x.parameter, plan.y.parameter)
-    observer = observer or Observer()
-    walk = walk or StabilityWalk(case)
-    observer.begin("map", len(plan.across.values))
-    with ColumnPool(plan, case.map.workers if workers is None else workers, observer.warn, walk, known) as pool:
-        run = _Run(plan, observer, pool)
-        run.fill([plan.task(value) for value in plan.across.values])
-        for level in range(1, plan.refine + 1):
-            run.fill(run.between(level))
-        if all(column.failure for column in run.found.values()):
-            raise SolveError(f"No state of the map was found: {_ordered(run.found)[0].failure}")
-        if case.map.curve:
-            run.trace()
-    columns = _ordered(run.found)
-    checks = check_cells(plan, columns, walk, case.map.checks)
-    curves = linked(plan, columns)
-    warnings = list(doubts(plan, curves)) if case.map.curve else []
-    warnings += _doubts(plan, columns, checks)
-    for sentence in warnings:
-        observer.warn(sentence)
-    return FoundMap(plan, columns, curves, checks, tuple(warnings))
-
-
-def _ordered(found) -> tuple[MapColumn, ...]:
-    return tuple(sorted(found.values(), key=lambda column: column.value))
-
-
-def _doubts(plan: MapPlan, columns: Iterable[MapColumn], checks: Iterable[Check]) -> list[str]:
+def _doubts(plan: MapPlan, columns: Iterable[MapColumn], checks: Iterable[dict[str, Any]]) -> list[str]:
     """Sentences about cells that are not certified, fail a check, or leave the band of the material data."""
     solved, said = [c for c in columns if not c.failure], []
     for prefix, parts in _variants(plan):
@@ -272,10 +171,10 @@ def _doubts(plan: MapPlan, columns: Iterable[MapColumn], checks: Iterable[Check]
             + "; modes.max_frequency chooses another end."
         )
     for check in checks:
-        if not check.agrees:
+        if not check["agrees"]:
             said.append(
-                f"At {plan.x.parameter} = {check.x:.6g}, {plan.y.parameter} = {check.y:.6g} the full pencil "
-                f"differs by {check.error:.1e}."
+                f"At {plan.x.parameter} = {check['x']:.6g}, {plan.y.parameter} = {check['y']:.6g} the full pencil "
+                f"differs by {check['error']:.1e}."
             )
     frequencies = [s.verdict.frequency for c in solved for row in c.samples.values() for s in row]
     outside = outside_band(plan.case, frequencies)
@@ -317,25 +216,6 @@ _GAP, _CURVES, _CHECKS = "gap", "curves", "checks"
 def tables_of(_mesh: MeshData | None) -> tuple[TableSpec, ...]:
     """Tables of a map. Curves and checks are notes."""
     return SAMPLE_TABLE, TableSpec(COLUMNS, _COLUMNS), TableSpec(ONSETS, _ONSETS), cycles.SPEC
-
-
-class KeepColumns(Observer):
-    """Keeps every column as soon as it is finished, and says which are gaps.
-
-    Parameters
-    ----------
-    record : GrowingRecord
-    plan : MapPlan
-    """
-
-    def __init__(self, record: GrowingRecord, plan: MapPlan):
-        self.record, self.plan = record, plan
-
-    def item(self, result: object) -> None:
-        if isinstance(result, MapColumn):
-            keep_column(self.record, result)
-            if result.failure:
-                self.record.fail(gap_sentence(self.plan, result))
 
 
 def gap_sentence(plan: MapPlan, column: MapColumn) -> str:
@@ -389,20 +269,44 @@ def rows_to_keep(known: Record, case: Case) -> dict[str, int]:
 
 
 def run(session: Session, record: GrowingRecord, workers: int | None = None) -> None:
-    """The map of `map` of the case; every column is kept as it is finished.
+    """The map of `map` of the case; every column is kept as it is finished. A run that goes on repeats the decisions of
+    the one before with its columns, so that it ends with the numbers of one that was never interrupted.
 
     Parameters
     ----------
     workers : int, optional
         Processes that share the columns; those of the case by default. Under ``mpiexec`` with mpi4py all its processes.
+
+    Raises
+    ------
+    CaseError
+        If the case has nothing that a parameter could change.
+    SolveError
+        If the case has no flow, or no column was found at all.
     """
     case, plan = session.case, MapPlan.of(session.case)
+    check_scan(case, plan.x.parameter, plan.y.parameter)
     walk = StabilityWalk(case, record, session.model)
-    keep = Observers(KeepColumns(record, plan), record)
-    found = run_map(case, keep, workers, read_columns(record, plan), walk)
-    record.note(_CHECKS, checks=[asdict(check) for check in found.checks])
-    record.note(_CURVES, curves=[asdict(curve) for curve in found.curves])
-    cycles.follow_cycles(case, record, plan, list(found.columns), walk)
+    if session.start is not None:
+        walk.give(plan.base, session.start)
+    record.begin("map", len(plan.across.values))
+    processes, known = case.map.workers if workers is None else workers, read_columns(record, plan)
+    with ColumnPool(plan, processes, record.warn, walk, known) as pool:
+        filling = _Filling(plan, record, pool)
+        filling.fill([plan.task(value) for value in plan.across.values])
+        for level in range(1, plan.refine + 1):
+            filling.fill(filling.between(level))
+        if all(column.failure for column in filling.columns):
+            raise SolveError(f"No state of the map was found: {filling.columns[0].failure}")
+        if case.map.curve:
+            filling.trace()
+    columns = filling.columns
+    checks, curves = check_cells(plan, columns, walk, case.map.checks), linked(plan, columns)
+    record.note(_CHECKS, checks=checks)
+    record.note(_CURVES, curves=[asdict(curve) for curve in curves])
+    for sentence in (*(doubts(plan, curves) if case.map.curve else ()), *_doubts(plan, columns, checks)):
+        record.warn(sentence)
+    cycles.follow_cycles(case, record, plan, list(columns), walk)
 
 
 class MapResult(StudyResult):
@@ -414,7 +318,7 @@ class MapResult(StudyResult):
         Axes and continuity laws.
     columns : tuple of MapColumn
     curves : tuple of OnsetCurve
-    checks : tuple of Check
+    checks : tuple of dict
     """
 
     kind = "map"
@@ -435,9 +339,10 @@ class MapResult(StudyResult):
         arrays = ({name: np.array(row[name], float) for name in ("x", "y", "frequency")} for row in notes[-1]["curves"])
         return tuple(OnsetCurve(**row | own) for row, own in zip(notes[-1]["curves"], arrays))
 
-    @cached_property
-    def checks(self) -> tuple[Check, ...]:
-        return tuple(Check(**row) for note in self.record.notes(_CHECKS)[-1:] for row in note["checks"])
+    @property
+    def checks(self) -> tuple[dict[str, Any], ...]:
+        """See `check_cells`."""
+        return tuple(check for note in self.record.notes(_CHECKS)[-1:] for check in note["checks"])
 
     @property
     def failures(self) -> tuple[str, ...]:
@@ -465,7 +370,7 @@ class MapResult(StudyResult):
             "x": _axis(self.plan.x),
             "y": _axis(self.plan.y),
             "fixed": fixed_conditions(self.case, *self.moved),
-            "checks": [asdict(check) for check in self.checks],
+            "checks": list(self.checks),
             "gaps": list(self.failures),
             "warnings": list(self.warnings),
             "interrupted": not self.complete,
@@ -528,8 +433,8 @@ class MapResult(StudyResult):
                 lines += cycles.sentences(self.record, self.plan, i)
         lines += [self._class_line(note) for note in self.classes]
         if self.checks:
-            worst = max(check.error for check in self.checks)
-            agreeing = sum(check.agrees for check in self.checks)
+            worst = max(check["error"] for check in self.checks)
+            agreeing = sum(check["agrees"] for check in self.checks)
             lines.append(
                 f"{agreeing} of {len(self.checks)} cells solved again with the full pencil agree; largest "
                 f"difference {worst:.1e}."

@@ -21,10 +21,9 @@ from ...model.symmetry import EQUILIBRIA, SYMMETRIES, Symmetry, symmetry_named
 from ...observer import Observer
 from ...record.table import Column
 from ..stability.dimensions import VARIANT
-from ..stability.family import ValveFamily, name_state_in_failures
 from ..stability.line import ParameterLine
 from ..stability.verdict import FLUTTERS, STABLE, UNDECIDED, Verdict, lowered, oscillates
-from ..stability.walk import StabilityWalk
+from ..stability.walk import StabilityWalk, ValveFamily, name_state_in_failures
 from ..state import State
 
 #: Structural modes in the basis behind the independent count.
@@ -211,24 +210,13 @@ class Certificate:
     @classmethod
     def of(cls, found: CertifiedSpectrum) -> Certificate:
         spectrum, count, error = found.spectrum, found.count, found.response_error
-        return cls(
-            agrees=found.agrees,
-            unstable_count=found.unstable_count,
-            unstable_count_independent=found.unstable_count_independent,
-            statement=found.statement,
-            certain=count.certain,
-            line=float(count.line),
-            counted_up_to=float(count.band),
-            distance=count.distance,
-            response_error=float("nan") if error is None else float(error),
-            status=spectrum.status,
-            asked=spectrum.asked,
-            complete_above=float(spectrum.complete_above),
-            band=float(spectrum.band),
-            rejected=spectrum.rejected,
-            frequency=count.frequencies,
-            phase=count.phase,
-        )
+        own = {name: getattr(found, name) for name in ("agrees", "unstable_count", "unstable_count_independent")}
+        own |= {name: getattr(count, name) for name in ("certain", "distance", "phase")}
+        own |= {name: getattr(spectrum, name) for name in ("status", "asked", "rejected")}
+        limits = {"complete_above": spectrum.complete_above, "band": spectrum.band, "line": count.line}
+        limits |= {"counted_up_to": count.band, "response_error": np.nan if error is None else error}
+        rest = {name: float(value) for name, value in limits.items()}
+        return cls(**own, **rest, statement=found.statement, frequency=count.frequencies)
 
     def note(self) -> dict[str, Any]:
         """All but the curve, as a note of a record."""
@@ -245,23 +233,19 @@ class Certificate:
         if len(each) == 1:
             return each[0]
         incomplete = [c.status for c in each if c.status != "complete"]
-        return cls(
-            agrees=all(c.agrees for c in each),
-            unstable_count=sum(c.unstable_count for c in each),
-            unstable_count_independent=sum(c.unstable_count_independent for c in each),
+        rules = {
+            all: ("agrees", "certain"),
+            sum: ("unstable_count", "unstable_count_independent", "asked", "rejected"),
+            max: ("line", "distance", "complete_above"),
+            min: ("counted_up_to", "band"),
+        }
+        joined = {name: rule([getattr(c, name) for c in each]) for rule, names in rules.items() for name in names}
+        return replace(
+            each[0],
+            **joined,
             statement=" ".join(f"In {name}: {lowered(c.statement)}" for name, c in parts.items()),
-            certain=all(c.certain for c in each),
-            line=max(c.line for c in each),
-            counted_up_to=min(c.counted_up_to for c in each),
-            distance=max(c.distance for c in each),
             response_error=max((c.response_error for c in each if c.response_error >= 0), default=float("nan")),
             status=incomplete[0] if incomplete else "complete",
-            asked=sum(c.asked for c in each),
-            complete_above=max(c.complete_above for c in each),
-            band=min(c.band for c in each),
-            rejected=sum(c.rejected for c in each),
-            frequency=each[0].frequency,
-            phase=each[0].phase,
         )
 
     def summary(self) -> dict[str, Any]:
@@ -395,7 +379,7 @@ def run_modes(
     observer.progress("searching")
     with name_state_in_failures(state.pressure):
         family = ValveFamily(linear, options.search.max_frequency, options.count)
-        search = family.leading_under(place, in_vacuo)
+        search = family.leading(place, in_vacuo)
         asked = replace(search.options, shifts=options.search.shifts, tolerance=options.search.tolerance)
         basis = TransferBasis(pencil, modes=max(_BASIS, options.count))
         certified = certified_spectrum(pencil, options.count, asked, basis=basis)

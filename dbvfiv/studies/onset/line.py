@@ -146,25 +146,20 @@ def known_intervals(
     # right at an onset the sign of the growth rate is that of rounding
     away = [all(abs(v - e) > BESIDE * abs(e) for e in edges) or v in (values[0], values[-1]) for v in values]
     values, growth, certified = (np.asarray(part)[np.array(away, bool)] for part in (values, growth, certified))
-    for i in range(len(values) - 1):
-        if not (certified[i] and certified[i + 1]):
-            continue
+    for i in np.flatnonzero(certified[:-1] & certified[1:]):
         marks = [values[i], *(e for e in edges if values[i] < e < values[i + 1]), values[i + 1]]
         state = bool(growth[i] > 0)
-        for a, b in zip(marks[:-1], marks[1:]):
-            if state == unstable:
-                _append(found, float(a), float(b))
-            state = not state
-    return found
+        for number, (a, b) in enumerate(zip(marks[:-1], marks[1:])):
+            if (state == unstable) == (number % 2 == 0):
+                found.append((float(a), float(b)))
+    return joined_stretches([found])
 
 
 def uncertain_intervals(values: np.ndarray, certified: np.ndarray) -> list[Interval]:
     """Intervals in which nothing is claimed, because a neighbour in the scan lacks a certificate."""
-    found: list[Interval] = []
-    for i in range(len(values) - 1):
-        if not (certified[i] and certified[i + 1]):
-            _append(found, float(values[i]), float(values[i + 1]))
-    return found
+    values = np.asarray(values, float).tolist()
+    pairs = zip(values[:-1], values[1:], certified[:-1], certified[1:])
+    return joined_stretches([[(a, b) for a, b, low, high in pairs if not (low and high)]])
 
 
 def common_stretches(parts: Sequence[Sequence[Interval]]) -> list[Interval]:
@@ -185,14 +180,6 @@ def joined_stretches(parts: Sequence[Sequence[Interval]]) -> list[Interval]:
         else:
             found.append((low, high))
     return found
-
-
-def _append(found: list[Interval], low: float, high: float) -> None:
-    """Add an interval, joined with the last one if they touch."""
-    if found and found[-1][1] == low:
-        found[-1] = (found[-1][0], high)
-    else:
-        found.append((low, high))
 
 
 def disagreements(

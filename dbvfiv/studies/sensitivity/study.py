@@ -1,27 +1,54 @@
-"""Run of the sensitivity study: finds derivatives of an eigenvalue and keeps them in a record."""
+"""Derivatives of an eigenvalue by the parameters of a valve: run, storage, and what can be read off them."""
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterator
 from dataclasses import replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from matplotlib.figure import Figure
 
 from eigen import Mode, leading_modes
 
-from ...case.parameters import Mu
+from ...case.parameters import PARAMETERS, Mu
 from ...errors import CaseError, SolveError
 from ...model.dynamics import linearise
 from ...model.equilibria import require_equilibrium
 from ...model.state import SteadyState
+from ...record.mesh import MeshData
 from ...record.record import GrowingRecord
-from ...record.states import read_states, state_row
-from ..session import Session
-from ..stability.family import ValveFamily, name_state_in_failures
-from ..stability.place import condition_of
+from ...record.states import read_states, state_row, state_table
+from ...record.table import TEXT, Column, TableSpec
+from ..result import StudyResult
+from ..session import Session, describe_surroundings
+from ..stability.place import condition_of, describe_fixed
+from ..stability.walk import ValveFamily, name_state_in_failures
+from ..state import State, states_of
 from ..study import Study
-from .derivatives import differentiate, parameters_of
-from .result import MODE, STATE, VALUES, SensitivityResult, row_of, tables_of
+from . import figures
+from .derivatives import Sensitivity, differentiate, parameters_of, unit_of
 
 #: Modes searched for beyond the one asked for, so that its rank is certain.
 _MARGIN = 3
+STATE, VALUES, MODE = "state", "sensitivities", "mode"
+_VALUES = (
+    Column("parameter", "", "Name of the parameter", TEXT),
+    Column("value", "SI", "Its value; angles in degrees"),
+    Column("growth_rate", "1/s per unit", "Derivative of the growth rate"),
+    Column("angular_frequency", "rad/s per unit", "Of the angular frequency", read=lambda found: found.derivative.imag),
+)
+_TABLE = TableSpec(VALUES, _VALUES)
+_HEAD = (
+    f"{'parameter':<24}{'value':>12} {'unit':<8}{'d growth':>12}{'d frequency':>13}{'d growth':>12}{'d frequency':>13}",
+    f"{'':<24}{'':>12} {'':<8}{'1/s a unit':>12}{'Hz a unit':>13}{'1/s a %':>12}{'Hz a %':>13}",
+)
+
+
+def tables_of(mesh: MeshData) -> tuple[TableSpec, ...]:
+    """Tables of a result on a mesh: the state, and the derivatives."""
+    return state_table(STATE, mesh), _TABLE
 
 
 def run(session: Session, record: GrowingRecord) -> None:
@@ -55,7 +82,7 @@ def run(session: Session, record: GrowingRecord) -> None:
         except SolveError as error:
             record.fail(str(error))
             continue
-        record.append(VALUES, row_of(found))
+        record.append(VALUES, _TABLE.row(found))
         record.item(found)
 
 
@@ -73,6 +100,110 @@ def _find_mode(session: Session, state: SteadyState, mu: Mu) -> Mode:
     if len(found) < number:
         raise SolveError(f"The state at {state.pressure:.6g} Pa has {len(found)} leading modes, and no mode {number}.")
     return found.mode(number - 1)
+
+
+class SensitivityResult(StudyResult):
+    """Derivatives of one eigenvalue by the parameters of a valve.
+
+    Attributes
+    ----------
+    state : State
+        The equilibrium.
+    number : int
+        Of the mode, by falling growth rate.
+    eigenvalue : complex, 1/s
+    sensitivities : tuple of Sensitivity
+        In the order asked for.
+
+    Examples
+    --------
+    >>> found = dbvfiv.load().sensitivity(["pressure", "layer 3 angle"], pressure="6 kPa")      # doctest: +SKIP
+    >>> [(s.parameter, s.growth_rate, s.frequency) for s in found.sensitivities]                # doctest: +SKIP
+    """
+
+    kind = "sensitivity"
+
+    @cached_property
+    def state(self) -> State:
+        return states_of(self, STATE)[0]
+
+    @cached_property
+    def number(self) -> int:
+        return int(self.record.notes(MODE)[-1]["number"])
+
+    @cached_property
+    def eigenvalue(self) -> complex:
+        return complex(*self.record.notes(MODE)[-1]["eigenvalue"])
+
+    @property
+    def growth_rate(self) -> float:
+        """Growth rate of the mode, 1/s."""
+        return self.eigenvalue.real
+
+    @property
+    def frequency(self) -> float:
+        """Frequency of the mode, Hz."""
+        return abs(self.eigenvalue.imag) / (2 * np.pi)
+
+    @cached_property
+    def sensitivities(self) -> tuple[Sensitivity, ...]:
+        rows = (self.record.column(VALUES, column.name).tolist() for column in _VALUES)
+        found = {row[0]: Sensitivity(row[0], row[1], complex(*row[2:])) for row in zip(*rows)}
+        asked = self.case.sensitivity.of or tuple(found)
+        return tuple(found[name] for name in dict.fromkeys(asked) if name in found)
+
+    def summary(self) -> dict[str, Any]:
+        if not self.record.notes(MODE):
+            return {"sensitivities": [], "failures": list(self.failures), "warnings": list(self.warnings)}
+        return {
+            "state": self.state.summary() | describe_surroundings(self.case),
+            "mode": {"number": self.number, "growth_rate": self.growth_rate, "frequency": self.frequency},
+            "sensitivities": [
+                {
+                    "parameter": found.parameter,
+                    "value": found.value,
+                    "unit": unit_of(found.parameter),
+                    "growth_rate": found.growth_rate,
+                    "frequency": found.frequency,
+                    "growth_rate_per_percent": found.per_percent.real,
+                    "frequency_per_percent": found.per_percent.imag / (2 * np.pi),
+                }
+                for found in self.sensitivities
+            ],
+            "failures": list(self.failures),
+            "warnings": list(self.warnings),
+            "interrupted": not self.complete,
+        }
+
+    def shortfall(self) -> str | None:
+        lost = len(self.failures)
+        return f"The eigenvalue was not differentiated by {lost} of the parameters" if lost else None
+
+    def drawers(self) -> Iterator[tuple[str, Callable[[], Figure]]]:
+        if any(found.value for found in self.sensitivities):
+            yield "sensitivity", lambda: figures.draw_bars(self)
+
+    def lines(self) -> list[str]:
+        if not self.record.notes(MODE):
+            return ["The run ended before its mode was found."]
+        mode = f"mode {self.number}, {self.growth_rate:.4f} 1/s at {self.frequency:.4f} Hz"
+        return [
+            f"At {describe_fixed(self.case)}: {mode}.",
+            *_HEAD,
+            *(_line(found) for found in self.sensitivities),
+        ]
+
+
+def _line(found: Sensitivity) -> str:
+    row = PARAMETERS.get(found.parameter)
+    value, unit = (found.value / row.scale, row.shown_unit) if row else (found.value, unit_of(found.parameter))
+    scale = row.scale if row else 1.0
+    percent = found.per_percent
+    relative = f"{percent.real:12.4g}{percent.imag / (2 * np.pi):13.4g}" if found.value else f"{'-':>12}{'-':>13}"
+    return (
+        f"{found.parameter:<24}{value:>12.6g} {unit:<8}{found.growth_rate * scale:>12.4g}"
+        f"{found.frequency * scale:>13.4g}{relative}"
+    )
 
 
 STUDY = Study("sensitivity", tables_of, run, SensitivityResult)

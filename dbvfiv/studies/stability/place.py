@@ -11,7 +11,6 @@ from ...case.parameters import OUTSIDE, PARAMETERS, PIPES, Mu
 from ...errors import CaseError, SolveError
 from ...model import ValveModel
 from ..case import Case
-from .family import condition_point, flow_law
 
 
 def condition_of(mu: Mu) -> Condition:
@@ -19,9 +18,20 @@ def condition_of(mu: Mu) -> Condition:
     return Condition(mu.density, mu.alpha, mu.beta, flow_law(mu), mu.loss_factor)
 
 
-def point_under(mu: Mu, condition: Condition) -> Mu:
-    """Parameter point of the same steady state under another condition."""
-    return Mu({name: value for name, value in mu.items() if name not in PIPES}, **condition_point(condition))
+def flow_law(mu: Mu) -> Mu:
+    """Part of a parameter point that the flow's matrices at unit density depend on.
+
+    The flow model and the pipes; the density where waves or a fixed fluid outside tell fluids apart by more than their
+    inertia.
+    """
+    outside = (OUTSIDE,) if mu.outside else ()
+    return mu.only("storage", *PIPES, *(("density",) if mu.wave_speed or outside else ()), *outside)
+
+
+def condition_point(condition: Condition) -> Mu:
+    """Parameter point of a condition."""
+    density, alpha, beta, law, loss_factor = condition
+    return Mu(law, density=density, alpha=alpha, beta=beta, loss_factor=loss_factor)
 
 
 def fixed_conditions(case: Case, *moved: str) -> dict[str, float | str]:
@@ -69,20 +79,6 @@ def moving_surroundings(case: Case) -> tuple[str, ...]:
     return tuple(name for name in ("pipe_length", "density") if why_it_moves(case, name))
 
 
-def check_flow(case: Case) -> None:
-    """Refuse a case without flow.
-
-    Raises
-    ------
-    SolveError
-    """
-    if case.drive.kind != "flow":
-        raise SolveError(
-            "Without flow nothing couples the fluid to the wall, so there is no onset to look for; "
-            "drive.kind must be 'flow'."
-        )
-
-
 def check_scan(case: Case, *names: str) -> None:
     """Refuse to ask over a parameter that this case does not have, or without flow.
 
@@ -93,7 +89,11 @@ def check_scan(case: Case, *names: str) -> None:
     SolveError
         Without flow.
     """
-    check_flow(case)
+    if case.drive.kind != "flow":
+        raise SolveError(
+            "Without flow nothing couples the fluid to the wall, so there is no onset to look for; "
+            "drive.kind must be 'flow'."
+        )
     for name in names:
         require_parameter(case, name)
 

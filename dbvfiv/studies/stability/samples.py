@@ -130,13 +130,12 @@ class Sample:
 # ----
 
 SAMPLES, _TEXT = "samples", "no sample"
-_COLUMNS = (
+#: Of these a sample is read; what follows from it stands besides for whoever reads the table.
+_OWN = (
     *VARIANT,
     Column("mesh", "", "0 for the mesh of the case, 1 for the coarser one", "i8"),
     Column("across", "SI", "Value of the parameter across in a map; NaN along a single line"),
     Column("value", "SI", "Value of the parameter"),
-    Column("growth_rates", "1/s", "Of the leading modes; NaN where there are fewer"),
-    Column("angular_frequencies", "rad/s", "Of the leading modes"),
     Column("unstable", "", "Unstable eigenvalues listed, conjugates counted apart; -1 where there is no list", "i8"),
     Column("counted", "", "The same by the argument principle; -1 where nobody asked", "i8"),
     Column("certain", "", "Whether that count, and what both rest on, can be relied on", "bool"),
@@ -144,22 +143,30 @@ _COLUMNS = (
     Column("band", "Hz", "Frequency up to which the sample is a verdict; infinite for all"),
     Column("how", "", "0 on the reduced-order model, 1 with the full matrices, 2 none; a note says why", "i8"),
 )
-SAMPLE_TABLE = TableSpec(SAMPLES, _COLUMNS, dict.fromkeys(("growth_rates", "angular_frequencies"), (KEPT,)), chunk=512)
+_FURTHER = (
+    Column("growth_rate", "1/s", "Of the leading mode"),
+    Column("frequency", "Hz", "Of the leading mode"),
+    Column("outcome", "", f"Verdict: {', '.join(f'{i} {name}' for i, name in enumerate(OUTCOMES))}", "i8"),
+)
+_MODES = (
+    Column("growth_rates", "1/s", "Of the leading modes; NaN where there are fewer", shape=(KEPT,)),
+    Column("angular_frequencies", "rad/s", "Of the leading modes", shape=(KEPT,)),
+)
+SAMPLE_TABLE = TableSpec(SAMPLES, (*_OWN, *_MODES, *_FURTHER), chunk=512)
 
 
 def keep_samples(record: GrowingRecord, samples: Sequence[Sample]) -> None:
     """Keep samples as rows; why one is missing is noted before its row, which vouches for it."""
-    modes = np.full((len(samples), KEPT), complex(np.nan, np.nan))
+    rows = []
     for number, sample in enumerate(samples, record.rows(SAMPLES)):
         if sample.is_missing:
             record.note(_TEXT, row=number, failure=sample.failure, refusal=sample.refusal)
-    for row, sample in zip(modes, samples):
-        row[: len(sample.eigenvalues)] = sample.eigenvalues[:KEPT]
-    own = ("value", "unstable", "counted", "certain", "line", "band", "how")
-    rows = {name: [getattr(sample, name) for sample in samples] for name in own}
-    rows |= {name: [getattr(sample.key, name) for sample in samples] for name in SampleKey._fields}
-    rows["symmetry"] = [CLASS_NAMES.index(name) for name in rows["symmetry"]]
-    record.extend(SAMPLES, rows | {"growth_rates": modes.real, "angular_frequencies": modes.imag})
+        modes = np.full(KEPT, complex(np.nan, np.nan))
+        modes[: len(sample.eigenvalues)] = sample.eigenvalues[:KEPT]
+        row = vars(sample) | sample.key._asdict() | {column.name: sample.number(column.name) for column in _FURTHER}
+        row |= {"symmetry": CLASS_NAMES.index(sample.key.symmetry)}
+        rows.append(row | {"growth_rates": modes.real, "angular_frequencies": modes.imag})
+    record.extend(SAMPLES, {column.name: [row[column.name] for row in rows] for column in SAMPLE_TABLE.columns})
 
 
 def read_samples(record: Record) -> list[Sample]:
@@ -167,9 +174,8 @@ def read_samples(record: Record) -> list[Sample]:
     texts = {note["row"]: {name: note[name] for name in ("failure", "refusal")} for note in record.notes(_TEXT)}
     modes = 1j * record.column(SAMPLES, "angular_frequencies")
     modes += record.column(SAMPLES, "growth_rates")
-    names = [column.name for column in _COLUMNS if column.name not in SAMPLE_TABLE.shapes]
     found = []
-    for i, row in enumerate(record.table_rows(SAMPLE_TABLE, names)):
+    for i, row in enumerate(record.table_rows(SAMPLE_TABLE, [column.name for column in _OWN])):
         row["symmetry"] = CLASS_NAMES[row["symmetry"]]
         key = SampleKey(**{name: row.pop(name) for name in SampleKey._fields})
         text = texts.get(i, {}) if row["how"] == MISSING else {}

@@ -1,31 +1,163 @@
 """Steady states and leading eigenvalues anywhere in the space of parameters, each state found from the nearest one
-known.
+known, each with the family of its pencils at any fluid density, damping and continuity law.
 """
 
 from __future__ import annotations
 
-from contextlib import suppress
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from eigen import Column, ColumnSolver, Workspace
+from eigen import (
+    Column,
+    ColumnSolver,
+    Condition,
+    CoupledPencil,
+    PencilFamily,
+    Relaxation,
+    SearchOptions,
+    Workspace,
+    lowest_frequencies,
+)
+from eigen.operator import Reach, edge_of
 
-from ...case.parameters import PARAMETERS, Mu
-from ...errors import NotValidError, SolveError
+from ...case.parameters import Mu
+from ...errors import CaseError, NotValidError, SolveError
 from ...model import ValveModel
 from ...model.classes import linearise_class
+from ...model.dynamics import LinearisedState
 from ...model.equilibria import LoadPath, SteadyOptions
-from ...model.leading import LeadingSearch
+from ...model.leading import LeadingSearch, select_search
 from ...model.material_stability import material_stability
 from ...model.state import SteadyState
-from ...model.symmetry import EQUILIBRIA, SYMMETRIES, Symmetry
+from ...model.symmetry import Symmetry, equilibria_of
 from ...observer import Observer
 from ..case import Case
-from .family import ValveFamily, name_state_in_failures
-from .place import condition_of, moving_surroundings, rebuilder
+from .place import condition_of, condition_point, moving_surroundings, rebuilder
 from .samples import Sample
 from .verdict import Verdict
+
+#: Blends of the continuity laws whose fluid is kept, and factors whose relaxation is.
+_KEPT = 256
+#: Structural frequencies in vacuo that a band holds at least.
+LEAST_MODES = 10
+
+
+class ValveFamily(PencilFamily):
+    """Conditions are (density, alpha, beta, law, loss factor); the law as `flow_law` makes it.
+
+    At unit density the fluid's unknown is the inlet velocity, at others that times the root of the density.
+
+    Parameters
+    ----------
+    linear : LinearisedState
+    max_frequency : float, optional
+        Hz; only modes up to it are searched for. Without it and without stiffness damping the band follows from the
+        structural frequencies of the state.
+    modes : int
+        Modes wanted; a band holds as many structural frequencies, ten at least, so that studies that list few modes
+        search where those do that list many.
+    workspace : Workspace, optional
+        Keeps the symbolic factorisation for those between states.
+    """
+
+    def __init__(
+        self,
+        linear: LinearisedState,
+        max_frequency: float | None = None,
+        modes: int = 10,
+        workspace: Workspace | None = None,
+    ):
+        self.linear, self.max_frequency, self._workspace = linear, max_frequency, workspace
+        self.modes = max(modes, LEAST_MODES)
+        self.mass, self.damping, self.stiffness = linear.mass, linear.structure, linear.stiffness
+        self.forces, self.slope = linear.coupling
+        self.added = 0 if linear.added is None else linear.added.rank
+        self._parts: dict[object, dict[str, np.ndarray]] = {}
+        self._relaxations: dict[float, Relaxation | None] = {}
+        self._searches: dict[tuple[float, float], LeadingSearch] = {}
+        self._frequencies = np.zeros(0)
+
+    def _lowest(self, count: int) -> np.ndarray:
+        """Structural frequencies of the state."""
+        if len(self._frequencies) < count:
+            self._frequencies = self.lowest(count)
+        if len(self._frequencies) < count:
+            structure = CoupledPencil(self.mass, 0.0 * self.mass, self.stiffness)
+            self._frequencies = lowest_frequencies(structure, count, self._workspace)
+        return self._frequencies[:count]
+
+    def search(self, condition: Condition) -> SearchOptions:
+        """Search options for the spectrum, by the rule that every study follows."""
+        return self.leading(condition_point(condition)).options
+
+    def leading(self, mu: Mu, in_vacuo: bool = False) -> LeadingSearch:
+        """Search for the leading modes, with the frequency up to which it is a verdict on the state."""
+        key = mu.beta, mu.loss_factor, in_vacuo, *mu.pipes.values()  # nothing else decides
+        if key not in self._searches:
+            asked = SearchOptions(max_frequency=self.max_frequency)
+            resolved = np.inf if in_vacuo else self.linear.model.flow.resolved(mu.pipes)
+            self._searches[key] = select_search(asked, mu, self._lowest, self.modes, resolved)
+        return self._searches[key]
+
+    def is_searched(self, values: np.ndarray, mu: Mu, band: float) -> np.ndarray:
+        """Eigenvalues in the region that every study searches, (k,) bool: beside it lie relaxations of the wall, and
+        modes of it that are slow and strongly damped; `band` is in Hz.
+        """
+        if not mu.loss_factor:
+            return np.ones(len(values), bool)
+        return Reach(-np.inf, 2 * np.pi * band, edge_of(self.relaxation(mu.loss_factor))).is_mode(values)
+
+    def relaxation(self, loss: float) -> Relaxation | None:
+        """Viscoelastic part of the stiffness, with a factor on all loss factors; None for an elastic wall."""
+        loss = float(loss)
+        if loss not in self._relaxations:
+            if len(self._relaxations) > _KEPT:
+                self._relaxations.clear()
+            self._relaxations[loss] = self.linear.relaxation(loss)
+        return self._relaxations[loss]
+
+    def parts(self, law: Mu) -> dict[str, np.ndarray]:
+        """A0 to S1 at density 1."""
+        if law not in self._parts:
+            if len(self._parts) > _KEPT:
+                self._parts.clear()
+            self._parts[law] = self._computed(law)
+        return self._parts[law]
+
+    def _computed(self, law: Mu) -> dict[str, np.ndarray]:
+        linear, flow = self.linear, self.linear.model.flow
+        line = law.pipes
+        if "wave_speed" in line:  # so that the compressibility is that of the fluid
+            line["wave_speed"] *= np.sqrt(law.density)
+        line |= flow.at_unit_density()
+        parts = linear.flow_parts(1.0, law.storage, line) if flow.has_fluid else linear.no_flow()
+        if linear.added is None:
+            return parts
+        return linear.added.parts(parts, law.outside / law.density if law.outside else 1.0)
+
+    def pencil(self, condition: Condition) -> CoupledPencil:
+        """The full pencil, with the inlet velocity itself as unknown."""
+        return self.linear.pencil(condition_point(condition))
+
+
+@contextmanager
+def name_state_in_failures(pressure: float) -> Iterator[None]:
+    """Turn what an eigenvalue search refuses into a sentence with the pressure, Pa, of the state.
+
+    Raises
+    ------
+    SolveError
+    """
+    try:
+        yield
+    except CaseError:
+        raise
+    except (ArithmeticError, ValueError) as error:
+        raise SolveError(f"The modes at {pressure:.6g} Pa were not found: {str(error).rstrip('.')}.") from error
+
 
 #: Steps over the last one up to which a cubic is trusted ahead of it.
 REACH = 2.0
@@ -82,9 +214,9 @@ class StabilityWalk:
         case: Case,
         observer: Observer | None = None,
         model: ValveModel | None = None,
-        symmetry: Symmetry = SYMMETRIES[EQUILIBRIA],
+        symmetry: Symmetry | None = None,
     ):
-        self.case, self.symmetry = case, symmetry
+        self.case, self.symmetry = case, symmetry or equilibria_of(case.part)
         self._recalled: list[Mu] = []
         self._validity: dict[tuple, str] = {}
         self._workspace = Workspace()  # for structural frequencies
@@ -145,10 +277,6 @@ class StabilityWalk:
         if isinstance(state, SteadyState):
             built.described[place.pressure], state = state, state.q
         built.known[place.pressure] = state
-
-    def is_moved_by(self, name: str) -> bool:
-        """True for a parameter that every value of has a steady state of its own."""
-        return name == "pressure" or name in self._moving or not PARAMETERS[name].surrounding
 
     def state(self, place: Mu) -> SteadyState:
         """Steady state of a place with what is read off it.
@@ -221,7 +349,7 @@ class StabilityWalk:
         ------
         SolveError
         """
-        return self.family(place).leading(condition_of(place))
+        return self.family(place).leading(place)
 
     def refusal(self, place: Mu) -> str:
         """Reason why the constants of a rubber with loss factors are unstable at a place; empty where they are not.

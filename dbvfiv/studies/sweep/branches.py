@@ -1,275 +1,101 @@
-"""Modes tracked along one parameter, such as fluid density, damping, or inlet pressure."""
+"""Modes tracked along one parameter: fluid density, damping, inlet pressure or any other."""
 
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
 from eigen import Branches, CoupledPencil, SearchOptions, Spectrum, TrackOptions, Workspace, leading_modes, track
 from eigen.pairs import with_left_vectors
 
-from ...case.axis import Axis
 from ...case.parameters import Mu
-from ...errors import CaseError, SolveError
-from ...fit import outside_band
-from ...model import ValveModel
-from ...model.equilibria import require_equilibrium
+from ...errors import SolveError
 from ...model.leading import growth_floor
-from ...model.state import SteadyState
-from ...observer import Observer
-from ..stability.dimensions import Variant, own_variant, variants
-from ..stability.family import name_state_in_failures
+from ...record.record import GrowingRecord
+from ...record.states import SUMMARY
+from ..case import Case
 from ..stability.line import ParameterLine
-from ..stability.samples import Sample, SampleKey
-from ..stability.verdict import Verdict, not_valid_at
+from ..stability.samples import Sample, SampleKey, keep_samples
+from ..stability.verdict import not_valid_at
 from ..stability.walk import StabilityWalk
 
-#: Writing what is done may take this share of the time; a sweep of small cost is written once.
+#: Writing branches so far may take this share of the time; a sweep of small cost is written once.
 _KEEPING = 0.05
 _KEEP_AFTER = 2.0
 #: Values at which the vectors of a reduced-order model are made.
 SNAPSHOTS = 6
+#: Modes computed besides those to follow, so that a mode that changes its rank is not lost.
+MARGIN = 4
+
+BRANCHES, STATES = "branches", "states"
 
 
-@dataclass(frozen=True)
-class Check:
-    """Verification of eigenvalues and their count at one value of the parameter.
+class Tracking:
+    """A walk along `sweep.over` of a case; spectra are kept, so that an interrupted one is followed as far as it came.
 
-    Attributes
-    ----------
-    value : float
-    error : float
-        Largest relative correction of the leading eigenvalues by the full matrices; largest residual where the value is
-        solved in full.
-    unstable_count, unstable_count_independent : int
-        Both eigenvalues of a pair count.
-    agrees : bool
-        The counts are equal and the independent one is certain.
-    accurate : bool
-        The error is within the tolerance.
-    """
-
-    value: float
-    error: float
-    unstable_count: int
-    unstable_count_independent: int
-    agrees: bool
-    accurate: bool
-
-    @property
-    def holds(self) -> bool:
-        return self.agrees and self.accurate
-
-
-@dataclass(frozen=True)
-class SweepOptions:
-    """Options of `run_sweep`.
-
-    Attributes
-    ----------
-    count : int
-        Leading modes to follow.
-    margin : int
-        Further modes computed, so that a mode that changes its rank is not lost.
-    checks : int
-        Values at which eigenvalues are compared with the full matrices and both counts of unstable ones.
-    tolerance : float
-        Accepted relative error of eigenvalues of the reduced-order model.
-    least_confidence : float
-        A step is halved while the match of a leading mode is less certain.
-    search : SearchOptions
-        For full solves.
-    variant : Variant, optional
-        Flow model and symmetry class; those of the case's equilibria by default.
-    """
-
-    count: int = 6
-    margin: int = 4
-    checks: int = 3
-    tolerance: float = 1e-6
-    least_confidence: float = 0.6
-    search: SearchOptions = field(default_factory=SearchOptions)
-    variant: Variant | None = None
-
-    @classmethod
-    def of(cls, case) -> SweepOptions:
-        """Options of a case file."""
-        sweep, modes = case.sweep, case.modes
-        search = SearchOptions(modes.max_frequency, tolerance=modes.tolerance)
-        return cls(
-            sweep.count,
-            checks=sweep.checks,
-            tolerance=sweep.tolerance,
-            least_confidence=sweep.least_confidence,
-            search=search,
-            variant=variants(case, "sweep")[0],
-        )
-
-
-@dataclass(frozen=True)
-class FoundBranches:
-    """Branches of modes along a parameter.
-
-    Attributes
-    ----------
-    samples : (p,) tuple of Sample
-        At the values done; fewer than asked for after an interrupt or a failure.
-    branches : Branches
-        Eigenvalues (k, p), NaN where a branch does not exist, and the confidence of each match.
-    checks : tuple of Check
-    states : tuple of SteadyState
-        One for each value over pressure, a single one otherwise.
-    notes, failures : tuple of str
-    interrupted : bool
-    """
-
-    samples: tuple[Sample, ...]
-    branches: Branches
-    checks: tuple[Check, ...]
-    states: tuple[SteadyState, ...]
-    notes: tuple[str, ...] = ()
-    failures: tuple[str, ...] = ()
-    interrupted: bool = False
-
-    @property
-    def values(self) -> np.ndarray:
-        """(p,) values done, SI."""
-        return np.array([sample.value for sample in self.samples])
-
-    @property
-    def unstable_count(self) -> np.ndarray:
-        """(p,) unstable eigenvalues, both of a pair counted; -1 where the constants of the rubber do not hold."""
-        return np.array([sample.unstable for sample in self.samples], int)
-
-    @property
-    def verdicts(self) -> tuple[Verdict, ...]:
-        """(p,) verdict on each value."""
-        return tuple(sample.verdict for sample in self.samples)
-
-    @property
-    def certified(self) -> bool:
-        """True where all checks held."""
-        return bool(self.checks) and not self.interrupted and all(check.holds for check in self.checks)
-
-
-def run_sweep(
-    model: ValveModel,
-    axis: Axis,
-    mu: Mu | None = None,
-    options: SweepOptions | None = None,
-    observer: Observer | None = None,
-    state: SteadyState | None = None,
-    keep: Callable[[FoundBranches], None] | None = None,
-) -> FoundBranches:
-    """Follow the leading modes along a parameter.
-
-    Over density and damping the steady state stays as a rule, so modes are those of one reduced-order model, checked
-    with the full matrices; over pressure, and wherever else the parameter moves the steady state, every value has its
-    own, found from the nearest one known, and its own full solve. An interrupt, or a value that has no steady state,
-    ends the sweep and keeps what was found.
+    Where the steady state stays, spectra come from one reduced-order model, as long as its error, estimated with the
+    full matrices, is within the tolerance; everywhere else each value has its own steady state, found from the nearest
+    one known, and its own full solve.
 
     Parameters
     ----------
-    model : ValveModel
-    axis : Axis
-        Parameter and values.
-    mu : Mu, optional
-        Density and damping where they are not swept; those of the case otherwise.
-    options : SweepOptions, optional
-    observer : Observer, optional
-        Gets a `Sample` for every value.
-    state : SteadyState, optional
-        Steady state at the pressure of the sweep, where it is known.
-    keep : callable, optional
-        Gets what is done so far, marked as interrupted, every few seconds, so that a sweep that is killed is not lost.
+    case : Case
+    walk : StabilityWalk
+        In the class of the motions.
+    record : GrowingRecord
+        Samples are kept as they are found; branches and states so far every few seconds, as notes "kept".
 
-    Raises
-    ------
-    CaseError
-        If the case has no flow and density is swept.
-    SolveError
-        If not even the first value was solved.
-    """
-    options = SweepOptions.of(model.case) if options is None else options
-    observer = Observer() if observer is None else observer
-    if axis.parameter == "density" and not model.flow.has_fluid:
-        raise CaseError(
-            "sweep.over ranges over density, but drive.kind is 'uniform' and there is no fluid; choose "
-            "pressure, alpha or beta."
-        )
-    variant = options.variant or own_variant(model.case)
-    walk = StabilityWalk(model.case, observer, model, variant.motion)
-    start = Mu.of(model.case).at(**(mu or {}))
-    if state is not None:
-        require_equilibrium(model, state)
-        start = start.at(pressure=state.pressure)
-        walk.give(start, state)
-    observer.begin(f"sweep over {axis.parameter}", len(axis.values))
-    run = _Run(walk, start, axis, options, observer, keep)
-    interrupted, failures = False, ()
-    try:
-        with name_state_in_failures(start.pressure):
-            run.follow()
-    except KeyboardInterrupt:
-        interrupted = True
-    except SolveError as error:
-        if not run.done:
-            observer.end(False)
-            raise
-        failures = (str(error),)
-        observer.warn(str(error))
-    result = run.result(interrupted, failures)
-    leading = [sample.verdict.frequency for sample in result.samples if sample.verdict.holds]
-    outside = outside_band(model.case, [f for f in leading if np.isfinite(f)])
-    for note in (*result.notes, *([] if outside is None else [outside])):
-        observer.warn(note)
-    observer.end(interrupted)
-    return result
-
-
-class _Run:
-    """A walk along the values; spectra are kept, so that an interrupted one can be followed as far as it came.
-
-    Where the steady state stays, spectra come from one reduced-order model, as long as its error, estimated with the
-    full matrices, is within the tolerance; everywhere else each value has its own full solve.
+    Attributes
+    ----------
+    samples : list of Sample
+        In the order found.
     """
 
-    def __init__(self, walk: StabilityWalk, start: Mu, axis: Axis, options: SweepOptions, observer: Observer, keep):
-        self.walk, self.axis, self.options, self.observer, self.keep = walk, axis, options, observer, keep
+    def __init__(self, case: Case, walk: StabilityWalk, record: GrowingRecord):
+        self.options, self.axis, self.walk, self.record = case.sweep, case.sweep.axis, walk, record
+        self.tolerance = case.modes.tolerance
         self.keep_at = time.monotonic() + _KEEP_AFTER
-        self.track = TrackOptions(options.count, options.margin, least_confidence=options.least_confidence)
+        self.track = TrackOptions(self.options.count, MARGIN, least_confidence=self.options.least_confidence)
+        start, values = Mu.of(case), tuple(map(float, self.axis.values))
+        most = {"snapshots": min(len(values), SNAPSHOTS), "count": self.options.count + MARGIN}
         key = SampleKey(start.storage, walk.symmetry.name)
-        most = {"snapshots": min(len(axis.values), SNAPSHOTS), "count": options.count + options.margin}
-        self.line = ParameterLine(walk, start, axis.parameter, axis.values, axis.log, key=key, **most)
+        self.line = ParameterLine(walk, start, self.axis.parameter, values, self.axis.log, key=key, **most)
         #: Relative errors of the reduced-order model at the values where it was checked.
         self.errors: dict[float, float] = {}
         self.pencils: dict[float, CoupledPencil] = {}
         self.values: dict[CoupledPencil, float] = {}
         self.spectra: dict[CoupledPencil, Spectrum] = {}
-        self.done: list[Sample] = []
+        self.samples: list[Sample] = []
         self.branches: Branches | None = None
         self._workspace = Workspace()
 
     def follow(self) -> None:
-        """Track the modes over the values at which the constants of the rubber hold."""
+        """Track the modes over the values at which the constants of the rubber hold.
+
+        Raises
+        ------
+        SolveError
+            If a value has no steady state; what lies before it is followed.
+        """
         sound, failure = [], None
-        for value in map(float, self.axis.values):
+        for value in self.line.values:
             try:
                 self.walk.equilibrium(self.line.place(value))
                 refusal = self.walk.refusal(self.line.place(value))
-            except SolveError as error:  # what lies before it is followed
+            except SolveError as error:
                 failure = error
                 break
             if refusal:
-                self._keep_sample(Sample(value, refusal=refusal, key=self.line.key))
+                self._keep(Sample(value, refusal=refusal, key=self.line.key))
             else:
                 sound.append(value)
         if sound:
             if self.line.stays:
-                self.observer.progress("reduced-order model")
+                self.record.progress("reduced-order model")
                 self.line.cells()
                 self.errors = {v: self._error(v) for v in self._checked(sound)} if self.line.is_reduced else {}
             self.branches = track(self._pencil, sound, self.track, solver=self._solve, observer=self._done)
@@ -305,8 +131,8 @@ class _Run:
     def _solve(self, pencil: CoupledPencil) -> Spectrum:
         """Leading modes of a pencil, with left vectors."""
         if pencil not in self.spectra:
-            place, count = self.line.place(self.values[pencil]), self.track.count + self.track.margin
-            options = replace(self.walk.search(place).options, tolerance=self.options.search.tolerance)
+            place, count = self.line.place(self.values[pencil]), self.options.count + MARGIN
+            options = replace(self.walk.search(place).options, tolerance=self.tolerance)
             self.spectra[pencil] = self._leading(pencil, count, options)
         return self.spectra[pencil]
 
@@ -321,62 +147,75 @@ class _Run:
         return leading_modes(pencil, count, replace(asked, left=True))
 
     def _done(self, value: float, _solves: int) -> None:
-        self._keep_sample(self.line.sample(value, self._solve(self._pencil(value))))
+        self._keep(self.line.sample(value, self._solve(self._pencil(value))))
 
-    def _keep_sample(self, sample: Sample) -> None:
-        self.done.append(sample)
-        self.observer.item(sample)
+    def _keep(self, sample: Sample) -> None:
+        self.samples.append(sample)
+        keep_samples(self.record, [sample])
+        self.record.item(sample)
         start = time.monotonic()
-        if self.keep is not None and start >= self.keep_at:
-            self.keep(self.result(True, ()))
+        if start >= self.keep_at:
+            self.record.note("kept", **self.tables())
             now = time.monotonic()
             self.keep_at = now + max(_KEEP_AFTER, (now - start) / _KEEPING)
 
-    def _check(self, sample: Sample) -> Check:
-        if self.is_reduced:
-            error, allowed = self.errors[sample.value], self.options.tolerance
-        else:
-            residual = self._solve(self._pencil(sample.value)).residual
-            error, allowed = float(residual.max(initial=0.0)), self.options.search.tolerance
-        return Check(
-            sample.value, error, sample.unstable, sample.counted, bool(sample.certified), bool(error <= allowed)
-        )
+    def _ordered(self) -> list[Sample]:
+        return sorted(self.samples, key=lambda sample: self.line.values.index(sample.value))
 
-    def result(self, interrupted: bool, failures: Sequence[str]) -> FoundBranches:
-        """Branches as far as they came."""
-        order = {float(value): i for i, value in enumerate(self.axis.values)}
-        samples = sorted(self.done, key=lambda sample: order[sample.value])
+    def tables(self) -> dict[str, list[dict[str, Any]]]:
+        """Rows of the tables of branches and states, as far as they came."""
+        samples, found = self._ordered(), self.branches
         sound = [sample.value for sample in samples if not sample.refusal]
-        found, checks, notes = self.branches, (), ()
         if found is None and sound:  # from the spectra kept
             found = track(self._pencil, sound, self.track, solver=self._solve)
-        if sound and not interrupted:
-            checked = self._checked(sound)
-            checks = tuple(self._check(sample) for sample in samples if sample.value in checked)
-            searches = [self.walk.search(self.line.place(value)) for value in (sound[:1] if self.line.stays else sound)]
-            notes = max(searches, key=lambda search: search.band).notes
-        if refused := {sample.value: sample.refusal for sample in samples if sample.refusal}:
-            notes = (*notes, not_valid_at(self.axis.parameter, refused))
-        branches = self._shown(found, np.array(sound), np.array([sample.value for sample in samples]))
-        places = [self.line.place(sample.value) for sample in (samples[:1] if self.line.stays else samples)]
-        states = tuple(self.walk.state(place) for place in places)
-        return FoundBranches(tuple(samples), branches, checks, states, tuple(notes), tuple(failures), interrupted)
+        states = [self.walk.state(self.line.place(s.value)) for s in (samples[:1] if self.line.stays else samples)]
+        return {
+            BRANCHES: self._rows(found, np.array(sound), [sample.value for sample in samples]) if sound else [],
+            STATES: [{c.name: getattr(state, c.name) for c in SUMMARY} for state in states],
+        }
 
-    def _shown(self, branches: Branches | None, sound: np.ndarray, values: np.ndarray) -> Branches:
-        """Branches clearly right of the limit point -1/beta, numbered from 1 by their largest growth rate; NaN at
-        values that were left out.
+    def _rows(self, branches: Branches, sound: np.ndarray, values: Sequence[float]) -> list[dict[str, Any]]:
+        """Rows of branches clearly right of the limit point -1/beta, numbered from 1 by their largest growth rate; NaN
+        at values that were left out.
         """
-        if branches is None:
-            return Branches(np.zeros(0, int), values, *np.zeros((2, 0, len(values))), 0)
-        at = np.flatnonzero(np.isin(values, sound))
-        eigenvalues = np.full((len(branches.ids), len(values)), complex(np.nan, np.nan))
-        confidence = np.full(eigenvalues.shape, np.nan)
         floor = [growth_floor(self.line.place(value).beta) for value in sound]
         there = branches.eigenvalues.real > floor
-        eigenvalues[:, at] = np.where(there, branches.eigenvalues, complex(np.nan, np.nan))
-        confidence[:, at] = np.where(there, branches.confidence, np.nan)
-        highest = np.where(np.isfinite(eigenvalues.real), eigenvalues.real, -np.inf).max(axis=1, initial=-np.inf)
-        order = np.argsort(-highest, kind="stable")
-        order = order[np.isfinite(highest[order])]
-        ids = 1 + np.arange(len(order))
-        return Branches(ids, values, eigenvalues[order], confidence[order], len(self.spectra))
+        highest = np.where(there, branches.eigenvalues.real, -np.inf).max(axis=1)
+        order = [i for i in np.argsort(-highest, kind="stable") if np.isfinite(highest[i])]
+        rows = []
+        for number, i in enumerate(order, 1):
+            for value in values:
+                at = int(np.searchsorted(sound, value)) if value in sound else -1
+                known = at >= 0 and there[i, at]
+                eigenvalue = complex(branches.eigenvalues[i, at]) if known else complex(np.nan, np.nan)
+                confidence = float(branches.confidence[i, at]) if known else np.nan
+                numbers = {"growth_rate": eigenvalue.real, "angular_frequency": eigenvalue.imag}
+                rows.append({"id": number, "value": value, "confidence": confidence} | numbers)
+        return rows
+
+    def checks(self) -> list[dict[str, Any]]:
+        """Verification of eigenvalues and their counts at some values: the largest relative correction of the leading
+        eigenvalues by the full matrices, or the largest residual where the value was solved in full; both counts.
+        """
+        found, samples = [], {sample.value: sample for sample in self._ordered() if not sample.refusal}
+        for value in self._checked(list(samples)) if samples else ():
+            sample = samples[value]
+            if self.is_reduced:
+                error, allowed = self.errors[value], self.options.tolerance
+            else:
+                error, allowed = float(self._solve(self._pencil(value)).residual.max(initial=0.0)), self.tolerance
+            counts = {"unstable_count": sample.unstable, "unstable_count_independent": sample.counted}
+            judged = {"agrees": bool(sample.certified), "accurate": bool(error <= allowed)}
+            found.append({"value": value, "error": error} | counts | judged)
+        return found
+
+    def notes(self) -> list[str]:
+        """Sentences on the region searched, of the widest one, and on values that are not valid."""
+        samples, notes = self._ordered(), []
+        sound = [self.line.place(sample.value) for sample in samples if not sample.refusal]
+        if sound:
+            searches = [self.walk.search(place) for place in (sound[:1] if self.line.stays else sound)]
+            notes += max(searches, key=lambda search: search.band).notes
+        if refused := {sample.value: sample.refusal for sample in samples if sample.refusal}:
+            notes.append(not_valid_at(self.axis.parameter, refused))
+        return notes

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
@@ -11,9 +11,11 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from ...case.axis import Axis
-from ...case.parameters import PARAMETERS
+from ...case.parameters import PARAMETERS, Mu
+from ...errors import CaseError, SolveError
+from ...fit import outside_band
+from ...model.equilibria import require_equilibrium
 from ...model.state import SteadyState
-from ...observer import Observer, Observers
 from ...record.mesh import MeshData
 from ...record.record import GrowingRecord, Record
 from ...record.states import SUMMARY
@@ -23,13 +25,13 @@ from ..result import StudyResult
 from ..session import Session, describe_surroundings
 from ..stability.dimensions import variants
 from ..stability.place import is_surrounding, require_parameter
-from ..stability.samples import SAMPLE_TABLE, SAMPLES, Sample, keep_samples, read_samples
+from ..stability.samples import SAMPLE_TABLE, SAMPLES, Sample, read_samples
 from ..stability.verdict import Verdict
+from ..stability.walk import StabilityWalk, name_state_in_failures
 from ..study import Study, nothing_to_resume
 from . import figures
-from .branches import FoundBranches, SweepOptions, run_sweep
+from .branches import BRANCHES, STATES, Tracking
 
-BRANCHES, STATES = "branches", "states"
 _BRANCHES = (
     Column("id", "", "Number of the branch, by falling largest growth rate", "i8"),
     Column("value", "SI", "Value of the parameter"),
@@ -49,52 +51,54 @@ def tables_of(_mesh: MeshData) -> tuple[TableSpec, ...]:
     return SAMPLE_TABLE, TableSpec(BRANCHES, _BRANCHES), states
 
 
-class _KeepSamples(Observer):
-    """Keeps every sample as soon as it is found."""
-
-    def __init__(self, record: GrowingRecord):
-        self.record = record
-
-    def item(self, result: object) -> None:
-        if isinstance(result, Sample):
-            keep_samples(self.record, [result])
-
-
 def run(session: Session, record: GrowingRecord) -> None:
-    """Modes along `sweep.over` of the case; samples are kept as they are found, branches so far every few seconds."""
-    case, axis = session.case, session.case.sweep.axis
+    """Modes along `sweep.over` of the case. An interrupt, or a value that has no steady state, ends the sweep and keeps
+    what was found.
+
+    Raises
+    ------
+    CaseError
+        If the case has no flow and density is swept.
+    SolveError
+        If not even the first value was solved.
+    """
+    case, model, axis = session.case, session.model, session.case.sweep.axis
     require_parameter(case, axis.parameter)
-    found = run_sweep(
-        session.model,
-        axis,
-        options=SweepOptions.of(case),
-        observer=Observers(_KeepSamples(record), record),
-        state=session.equilibrium(record) if is_surrounding(case, axis.parameter) else None,
-        keep=lambda part: record.note("kept", **_tables(part)),
-    )
-    tables = _tables(found)
+    if axis.parameter == "density" and not model.flow.has_fluid:
+        raise CaseError(
+            "sweep.over ranges over density, but drive.kind is 'uniform' and there is no fluid; choose "
+            "pressure, alpha or beta."
+        )
+    (variant,) = variants(case, "sweep")
+    walk = StabilityWalk(case, record, model, variant.motion)
+    if is_surrounding(case, axis.parameter):
+        state = session.equilibrium(record)
+        require_equilibrium(model, state)
+        walk.give(Mu.of(case), state)
+    record.begin(f"sweep over {axis.parameter}", len(axis.values))
+    tracking, interrupted = Tracking(case, walk, record), False
+    try:
+        with name_state_in_failures(case.drive.pressure):
+            tracking.follow()
+    except KeyboardInterrupt:
+        interrupted = True
+    except SolveError as error:
+        if not tracking.samples:
+            raise
+        record.fail(str(error))
+    tables = tracking.tables()
     record.note("kept", **tables)  # read while the rows are written
-    for table, every in tables.items():
-        if every:
-            record.extend(table, {name: [row[name] for row in every] for name in every[0]})
-    checks = [asdict(check) for check in found.checks]
-    record.note("over", certified=found.certified, remarks=list(found.notes), checks=checks)
-    for sentence in found.failures:
-        record.note("failure", text=sentence)
-    if found.interrupted:
+    for table, rows in tables.items():
+        if rows:
+            record.extend(table, {name: [row[name] for row in rows] for name in rows[0]})
+    checks, notes = ([], []) if interrupted else (tracking.checks(), tracking.notes())
+    record.note("over", remarks=notes, checks=checks)
+    leading = [sample.verdict.frequency for sample in tracking.samples if sample.verdict.holds]
+    outside = outside_band(case, [frequency for frequency in leading if np.isfinite(frequency)])
+    for note in (*notes, *([] if outside is None else [outside])):
+        record.warn(note)
+    if interrupted:
         raise KeyboardInterrupt
-
-
-def _tables(found: FoundBranches) -> dict[str, list[dict[str, Any]]]:
-    """Rows of the tables of branches and states."""
-    branches, rows = found.branches, []
-    for i, number in enumerate(branches.ids):
-        for k, value in enumerate(found.values):
-            eigenvalue = branches.eigenvalues[i, k]
-            imaginary = float(eigenvalue.imag) if np.isfinite(eigenvalue.real) else float("nan")
-            place = {"id": int(number), "value": float(value), "confidence": float(branches.confidence[i, k])}
-            rows.append(place | {"growth_rate": float(eigenvalue.real), "angular_frequency": imaginary})
-    return {BRANCHES: rows, STATES: [{c.name: getattr(state, c.name) for c in SUMMARY} for state in found.states]}
 
 
 def rows_to_keep(known: Record, _case: Case) -> dict[str, int]:
@@ -173,7 +177,7 @@ class SweepResult(StudyResult):
     unstable_count : (p,) int
         Both eigenvalues of a pair count.
     checks : tuple of dict
-        See `dbvfiv.studies.sweep.branches.Check`.
+        See `dbvfiv.studies.sweep.branches.Tracking.checks`.
     certified : bool
     points : tuple of dict
         States, see `dbvfiv.record.states.SUMMARY`: one for each value over pressure, a single one otherwise.
@@ -236,7 +240,7 @@ class SweepResult(StudyResult):
 
     @property
     def checks(self) -> tuple[dict[str, Any], ...]:
-        """See `dbvfiv.studies.sweep.branches.Check`."""
+        """See `dbvfiv.studies.sweep.branches.Tracking.checks`."""
         return tuple(self._over.get("checks", ()))
 
     @cached_property
@@ -247,7 +251,7 @@ class SweepResult(StudyResult):
     @property
     def certified(self) -> bool:
         """True where all checks held."""
-        return self._over.get("certified", False)
+        return bool(self.checks) and all(check["agrees"] and check["accurate"] for check in self.checks)
 
     @property
     def notes(self) -> tuple[str, ...]:

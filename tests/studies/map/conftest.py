@@ -2,8 +2,7 @@
 
 import pytest
 
-from dbvfiv.studies.map.study import run_map
-from tests.studies.map.axes import AXES
+from tests.studies.map.axes import AXES, run_map
 
 
 @pytest.fixture(scope="session")

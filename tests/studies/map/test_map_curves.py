@@ -5,10 +5,10 @@ import pytest
 
 from dbvfiv.studies.map.column import MapColumn, MapPlan
 from dbvfiv.studies.map.curves import Web, linked
-from dbvfiv.studies.map.study import run_map
 from dbvfiv.studies.stability.samples import Sample
 from dbvfiv.studies.stability.walk import StabilityWalk
 from eigen.columns import REDUCED
+from tests.studies.map.axes import run_map
 
 
 def test_linked_curves_go_through_all_onsets(whole):

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from dbvfiv.studies.case import THESIS
-from dbvfiv.studies.map.study import run_map
 from dbvfiv.studies.session import load_result
+from tests.studies.map.axes import run_map
 
 SETTINGS = {
     "map.x": "pressure=3 kPa:8 kPa:4",

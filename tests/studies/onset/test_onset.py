@@ -8,11 +8,11 @@ import pytest
 from dbvfiv.case.parameters import Mu
 from dbvfiv.errors import CaseError, SolveError
 from dbvfiv.studies.case import thesis_case
-from dbvfiv.studies.map.study import run_map
 from dbvfiv.studies.onset.search import OnsetOptions, run_onset
 from dbvfiv.studies.stability.place import condition_of
 from dbvfiv.studies.stability.walk import StabilityWalk
 from tests.small_valves import FORMER
+from tests.studies.map.axes import run_map
 
 
 @pytest.fixture(scope="module")

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from dbvfiv.case.parameters import Mu
-from dbvfiv.studies.stability.family import ValveFamily
+from dbvfiv.studies.stability.walk import ValveFamily
 from eigen import ColumnSolver, Condition, FamilyReduction
 from eigen.reduced_counts import phase_counts
 from eigen.reduction import POWERS, StaticSolver
