@@ -23,7 +23,7 @@ def orbits():
     rest = np.tile([2.0, 2.725], NODES)
     options = ContinuationOptions(eigenvalues=4, near=2.2j, limits=limits)
     hopf = continue_branch(system, rest, mu, "l", options).of_kind("hopf")[0]
-    steady = medians({"steady": lambda: equilibrium(system, 1.01 * rest, mu).required()}, 5)["steady"]
+    steady = medians({"steady": lambda: equilibrium(system, 1.01 * rest, mu)}, 5)["steady"]
     start = process_time()
     branch = orbits_from_hopf(system, hopf, "l", ContinuationOptions(limits=limits))
     taken = (process_time() - start) / len(branch)

@@ -29,7 +29,6 @@ from continuation.branches import continue_branch, resume, switch_branch
 from continuation.curves import continue_fold, continue_hopf, resume_curve
 from continuation.event_location import Event
 from continuation.linear import MatrixLinearisation
-from continuation.newton import Deflation, NewtonResult, equilibrium
 from continuation.normal_form import HopfNormalForm, fold_coefficient, hopf_normal_form
 from continuation.options import (
     ContinuationError,
@@ -39,8 +38,10 @@ from continuation.options import (
     NotABifurcation,
     NotConverged,
     OutOfDomain,
+    Reason,
     SingularSystem,
 )
+from continuation.problem import equilibrium
 from continuation.system import Linearisation, Parameters, Spectrum, System, SystemBase
 from continuation.tracer import Checkpoint, Observer
 
@@ -50,7 +51,6 @@ __all__ = [
     "ContinuationError",
     "ContinuationOptions",
     "CurvePoint",
-    "Deflation",
     "DerivativeMissing",
     "Event",
     "HopfNormalForm",
@@ -58,7 +58,6 @@ __all__ = [
     "Linearisation",
     "MatrixLinearisation",
     "NewtonOptions",
-    "NewtonResult",
     "NotABifurcation",
     "NotConverged",
     "Observer",
@@ -66,6 +65,7 @@ __all__ = [
     "OrbitOptions",
     "OutOfDomain",
     "Parameters",
+    "Reason",
     "SingularSystem",
     "SpecialPoint",
     "Spectrum",

@@ -16,8 +16,10 @@ from typing import Any
 import h5py
 import numpy as np
 
+from continuation.options import Reason, Said
+
 #: Version of the layout of files.
-FORMAT = 1
+FORMAT = 2
 #: Special points that the text of a branch lists.
 SHOWN = 7
 
@@ -127,8 +129,8 @@ class Branch:
         All parameters at the start.
     points : list of CurvePoint
     special : list of SpecialPoint
-    reason : str
-        Why it ended.
+    reason : Said
+        Sentence that says why it ended; its ``kind`` is a `Reason`.
     next_step : float
         Where the step control stood.
     restart : dict of str to ndarray
@@ -142,7 +144,7 @@ class Branch:
     fixed: dict
     points: list[CurvePoint] = field(default_factory=list)
     special: list[SpecialPoint] = field(default_factory=list)
-    reason: str = "running"
+    reason: Said = Reason.RUNNING()
     next_step: float = 0.0
     restart: dict = field(default_factory=dict)
 
@@ -192,7 +194,11 @@ class Branch:
     def reopen(self) -> Branch:
         """Copy with lists of its own, for a run that goes on from the last point."""
         return replace(
-            self, points=list(self.points), special=list(self.special), reason="running", restart=dict(self.restart)
+            self,
+            points=list(self.points),
+            special=list(self.special),
+            reason=Reason.RUNNING(),
+            restart=dict(self.restart),
         )
 
     def save(self, path: str | Path) -> None:
@@ -217,6 +223,8 @@ class Branch:
                 raise ValueError(f"{path} is not a branch file of format {FORMAT}.")
             header = json.loads(file.attrs["header"])
             header["names"], header["extra_names"] = tuple(header["names"]), tuple(header["extra_names"])
+            header["reason"] = Said(header["reason"])
+            header["reason"].kind = Reason[header.pop("end")]
             restart = {name: item[()] for name, item in file.get("restart", {}).items()}
             special = [_read_special(item) for item in file["special"].values()]
             return cls(**header, points=_read_points(file), special=special, restart=restart)
@@ -285,7 +293,8 @@ class Branch:
 def _write(file, branch: Branch) -> None:
     points, names = branch.points, ("kind", "size", "names", "extra_names", "fixed", "reason", "next_step")
     file.attrs["format"] = FORMAT
-    file.attrs["header"] = json.dumps({name: getattr(branch, name) for name in names})
+    header = {name: getattr(branch, name) for name in names} | {"end": branch.reason.kind.name}
+    file.attrs["header"] = json.dumps(header)
     for name in _NUMBERS:
         file[name] = np.array([getattr(p, name) for p in points])
     padded = np.full((len(points), max((p.eigenvalues.size for p in points), default=0)), np.nan + 0j)

@@ -7,17 +7,17 @@ import numpy as np
 from continuation.branch import Branch, SpecialPoint
 from continuation.branch_points import BranchPointMonitor
 from continuation.event_location import EventMonitor, FoldMonitor
-from continuation.options import ContinuationOptions, NotABifurcation, NotConverged
+from continuation.options import ContinuationOptions, NotABifurcation, NotConverged, Reason
 from continuation.problem import Problem
 from continuation.stability import SpectrumMonitor
-from continuation.tracer import Tracer
+from continuation.tracer import SHRINK, Tracer
 
 
 def branch_tracer(system, mu, parameter, options, events=(), spectrum=None, observers=None):
     """The tracer of a branch with the monitors the options ask for."""
     problem = Problem(system, mu, (parameter,), None, options.state_scale, options.units([parameter]))
     monitors: list = []
-    if options.folds and options.method == "arclength":
+    if options.folds:
         monitors.append(FoldMonitor())
     if options.branch_points:
         monitors.append(BranchPointMonitor())
@@ -143,7 +143,7 @@ def switch_branch(
     problem = tracer.problem
     frame = problem.frame(direction[:, None])
     step = options.step
-    reason = ""
+    reason = Reason.SINGULAR
     while step >= options.min_step:
         try:
             point = tracer.start(special.z + step * direction, direction, frame)
@@ -156,6 +156,6 @@ def switch_branch(
             if abs(problem.dot(gap, direction)) > abs(problem.dot(gap, known)):
                 branch = Branch("equilibria", system.size, (parameter,), (), dict(special.mu), [point.record()])
                 return tracer.run(branch, point, step)
-            reason = "the corrector fell back to the known branch"
-        step *= options.shrink
-    raise NotConverged(f"The other branch was not found: {reason}.", reason)
+            reason = Reason.KNOWN_BRANCH
+        step *= SHRINK
+    raise NotConverged(f"The other branch was not found: {reason.value}.", reason)

@@ -34,7 +34,7 @@ from continuation.cycle_points import (
 from continuation.cycles import Cycle, CycleSolver
 from continuation.harmonics import Harmonics
 from continuation.hill import floquet_exponents
-from continuation.options import ContinuationError, NotConverged, require
+from continuation.options import ContinuationError, NotConverged, Reason, Said, require
 from continuation.periodic import PeriodicMotion
 
 #: Share of the most harmonics allowed from which on a branch that needs more ends.
@@ -58,8 +58,8 @@ class CycleTracer:
     ----------
     points : list of CyclePoint
     special : list of SpecialCycle
-    reason : str
-        Reason of the end.
+    reason : Said
+        Why it ended.
     next_step : float
         Arclength step that the step control takes next.
     """
@@ -74,7 +74,7 @@ class CycleTracer:
         self.solver, self.parameter, self.options, self.events = solver, parameter, options, dict(events)
         self.points: list[CyclePoint] = []
         self.special: list[SpecialCycle] = []
-        self.reason, self.next_step = "running", options.step
+        self.reason, self.next_step = Reason.RUNNING(), options.step
         self._origin: list[CyclePoint] = []
         self._weight = 1.0 / (np.asarray(solver.system.scales) * options.motion_scale) ** 2
 
@@ -117,7 +117,7 @@ class CycleTracer:
 
     def run(
         self, report: Callable[[CyclePoint | SpecialCycle], None] = lambda item: None, step: float | None = None
-    ) -> str:
+    ) -> Said:
         """Go on until the parameter leaves its limits, the cycles shrink to nothing, the points are used up or no cycle
         is found; the reason of the end. `step` is the first step, that of the options by default.
         """
@@ -125,7 +125,7 @@ class CycleTracer:
         step = options.step if step is None else step
         while len(self.points) < options.max_points:
             if len(self.points) > 1 and self._is_over():
-                self.reason = f"limit of {self.parameter} reached"
+                self.reason = self._limit()
                 return self.reason
             done, step, again = self._advance(step)
             if done is None:
@@ -137,14 +137,17 @@ class CycleTracer:
             self.next_step = step
             if self._has_turned_back():
                 del self.points[-1]
-                self.reason = f"the cycles shrink to nothing beyond {self.parameter} = {self.points[-1].value:.6g}"
+                self.reason = Reason.VANISHED(name=self.parameter, value=self.points[-1].value)
                 return self.reason
             for special in self._between(self.points[-2], self.points[-1]):
                 self.special.append(special)
                 report(special)
             report(self.points[-1])
-        self.reason = f"limit of {self.parameter} reached" if self._is_over() else "points used up"
+        self.reason = self._limit() if self._is_over() else Reason.POINTS()
         return self.reason
+
+    def _limit(self) -> Said:
+        return Reason.LIMIT(name=self.parameter, value=self.points[-1].value)
 
     def _is_over(self) -> bool:
         """True when the branch has left the range, or reached its end."""
@@ -161,7 +164,7 @@ class CycleTracer:
     def _direction(self) -> float:
         return float(np.sign(self.points[-1].value - self.points[-2].value))
 
-    def _advance(self, step: float) -> tuple[CyclePoint | None, float, str]:
+    def _advance(self, step: float) -> tuple[CyclePoint | None, float, Said | None]:
         """Next point, the step after it, and why there is none; the rules for steps are those of equilibria."""
         options, reason = self.options, ""
         while step >= options.min_step:
@@ -173,7 +176,7 @@ class CycleTracer:
             except ContinuationError as error:
                 reason = str(error)
                 if (
-                    getattr(error, "reason", "") == "harmonics"
+                    getattr(error, "reason", None) is Reason.HARMONICS
                     and self._series().count > NEARLY * options.max_harmonics
                 ):
                     break
@@ -181,8 +184,8 @@ class CycleTracer:
                 continue
             grown = 2.0 if cycle.iterations <= 6 else (0.7 if cycle.iterations >= 10 else 1.0)
             grown = min(grown, 0.7 * options.max_angle / max(angle, 1e-9))
-            return point, min(max(step * grown, options.min_step), options.max_step), ""
-        return None, step, f"no further cycle was found: {reason}"
+            return point, min(max(step * grown, options.min_step), options.max_step), None
+        return None, step, Reason.NO_CYCLE(why=reason)
 
     def _checked(self, cycle: Cycle, expected: Cycle) -> Cycle:
         """The cycle itself, unless it lies so far from the one expected that it belongs to another part of the branch.
@@ -193,7 +196,7 @@ class CycleTracer:
         """
         missed, ahead = self._distance(expected, cycle), self._distance(self.points[-1].cycle, expected)
         if missed > max(0.5, np.tan(self.options.max_angle)) * ahead:
-            raise NotConverged("The corrections went far from the prediction.", "jumped")
+            raise NotConverged(Reason.JUMPED(), Reason.JUMPED)
         return cycle
 
     def _landed(self, cycle: Cycle) -> tuple[Cycle, float]:
@@ -217,7 +220,7 @@ class CycleTracer:
             cycle = self._checked(self._solved(motion, expected.mu, (), ()), expected)
         angle = self._angle(cycle) if len(self.points) > 1 else 0.0
         if angle > self.options.max_angle:
-            raise NotConverged("The branch turns too far.", "angle")
+            raise NotConverged(Reason.TURNED(), Reason.TURNED)
         return cycle, angle
 
     def _angle(self, cycle: Cycle) -> float:
@@ -278,11 +281,8 @@ class CycleTracer:
                 return cycle
             count = min(cycle.motion.harmonics_for(options.tail), options.max_harmonics)
             if count <= cycle.motion.harmonics.count:
-                raise NotConverged(
-                    f"{options.max_harmonics} harmonics are too few: the last two hold {cycle.motion.tail:.2g} of the "
-                    "motion.",
-                    "harmonics",
-                )
+                said = Reason.HARMONICS(count=options.max_harmonics, share=cycle.motion.tail)
+                raise NotConverged(said, said.kind)
             motion, mu = cycle.motion.resized(count), cycle.mu
             conditions = tuple(Condition(motion.harmonics.resized(c.row), c.extra, c.value) for c in conditions)
 

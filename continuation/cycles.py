@@ -15,7 +15,7 @@ import numpy as np
 import scipy.linalg as la
 
 from continuation.cycle_linearisation import FREQUENCY, Condition, CycleLinearisation, apply_change, free_values
-from continuation.options import NotConverged, require
+from continuation.options import NotConverged, Reason, require
 from continuation.periodic import PeriodicMotion
 
 #: Directions of a motion itself that belong to the basis: those above this share of the largest.
@@ -160,7 +160,7 @@ class CycleSolver:
                 linear.factor()
         last = sizes[-1] if sizes else np.nan
         sentence = f"{len(sizes)} corrections, the last of {last:.2g} of its size."
-        raise NotConverged(f"No periodic motion was found near the guess: {sentence}", "iterations")
+        raise NotConverged(f"No periodic motion was found near the guess: {sentence}", Reason.ITERATIONS)
 
     def unknowns(self, free: Sequence[str]) -> tuple[str, ...]:
         """Free unknowns beside the motion: the frequency first for an autonomous system."""

@@ -1,10 +1,62 @@
-"""Options, frozen and checked once, in sentences; and the errors of this package."""
+"""Options, frozen and checked once; errors; and the reasons why branches end and iterations fail, as sentences."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from enum import Enum
 from math import isfinite
+
+
+class Said(str):
+    """Sentence of a `Reason` with its details filled in; ``kind`` is the reason."""
+
+    kind: Reason
+
+
+class Reason(Enum):
+    """Why a branch ended, a step was refused or an iteration failed; each member is its sentence.
+
+    Called with its details a member gives the sentence as a `Said`.
+
+    Examples
+    --------
+    >>> Reason.LIMIT(name="D", value=0.3)
+    'ended on the limit D = 0.3'
+    >>> Reason.LIMIT(name="D", value=0.3).kind is Reason.LIMIT
+    True
+    """
+
+    RUNNING = "is still running"
+    LIMIT = "ended on the limit {name} = {value:.6g}"
+    STOPPED = "stopped at: {kind}"
+    CLOSED = "came back to its first point"
+    POINTS = "used up its points"
+    VANISHED = "shrinks to nothing beyond {name} = {value:.6g}"
+    SMALLEST_STEP = "failed with its smallest step: {why}"
+    NO_CYCLE = "found no further cycle: {why}"
+    INTERRUPTED = "was interrupted"
+    ERROR = "met an error: {why}"
+
+    CONVERGED = "converged"
+    ITERATIONS = "the iterations were used up"
+    DIVERGED = "the residual grew too far"
+    NOT_FINITE = "the residual is not finite"
+    SINGULAR = "a linear system is singular"
+    DOMAIN = "outside the domain of the model: {why}"
+    TURNED = "the tangent turns too far"
+    JUMPED = "the corrections went far from the prediction"
+    DOUBTFUL = "a {kind} was seen and not located"
+    LOST_AT_LIMIT = "the curve was lost at its limit"
+    KNOWN_BRANCH = "the corrector fell back to the known branch"
+    HARMONICS = "{count} harmonics are too few: the last two hold {share:.2g} of the motion"
+    REST = "the guess shrank to an equilibrium"
+    NOT_NORMAL = "the first orbit is not where the normal form has it"
+
+    def __call__(self, **details) -> Said:
+        said = Said(self.value.format(**details))
+        said.kind = self
+        return said
 
 
 class ContinuationError(Exception):
@@ -24,13 +76,12 @@ class NotConverged(ContinuationError):
 
     Attributes
     ----------
-    reason : str
-        One word or short phrase, e.g. ``"diverged"``.
+    reason : Reason or None
     result : object
         The unfinished result, for diagnosis only.
     """
 
-    def __init__(self, message: str, reason: str = "", result=None):
+    def __init__(self, message: str, reason: Reason | None = None, result=None):
         super().__init__(message)
         self.reason = reason
         self.result = result
@@ -61,30 +112,14 @@ class NewtonOptions:
         below which a state counts as an equilibrium.
     max_iterations : int
         Corrections at most.
-    line_search : bool
-        Halve a correction until the residual falls (Armijo); helps from poor guesses.
-    min_damping : float
-        Smallest fraction of a correction the line search tries.
-    divergence : float
-        Give up when the residual exceeds this multiple of the first one.
-    reuse_rate : float
-        Keep the factorisation as long as each correction shrinks the residual at least by
-        this factor; 0 renews it every time (full Newton).
     """
 
     tolerance: float = 1e-10
     max_iterations: int = 15
-    line_search: bool = False
-    min_damping: float = 1e-4
-    divergence: float = 1e6
-    reuse_rate: float = 0.0
 
     def __post_init__(self):
         require(self.tolerance > 0, f"The Newton tolerance must be positive, not {self.tolerance}.")
         require(self.max_iterations >= 1, "Newton needs at least one iteration.")
-        require(0 < self.min_damping <= 1, "The smallest damping must lie in (0, 1].")
-        require(self.divergence > 1, "The divergence factor must exceed 1.")
-        require(0 <= self.reuse_rate < 1, "The reuse rate must lie in [0, 1).")
 
 
 @dataclass(frozen=True)
@@ -102,16 +137,10 @@ class ContinuationOptions:
         Points to add at most.
     limits : mapping of str to (float, float)
         Range of each parameter; the branch ends exactly on the limit it meets.
-    method : {"arclength", "natural"}
-        Natural continuation steps in the parameter and cannot pass a fold.
     direction : {+1, -1}
         Sign of the first step in the parameter.
-    target_iterations : int
-        Corrections a comfortable step takes; fewer lengthen the step, more shorten it.
     max_angle : float
         Largest angle (rad, in the scaled metric) between tangents at consecutive points.
-    growth, shrink : float
-        Largest lengthening of an accepted step, shortening of a refused one.
     state_scale : float
         Unit of the state in the arclength.
     parameter_scales : mapping of str to float
@@ -124,18 +153,12 @@ class ContinuationOptions:
         points are not seen.
     near : complex or None
         Where to look for them; None leaves it to the spectrum.
-    stability_tolerance : float
-        An eigenvalue counts as unstable when its real part exceeds this.
     locate : bool
         Locate what was detected by Newton's method; otherwise it is only bracketed.
     location_tolerance : float
         Relative size of the last correction of a located point.
-    max_subdivisions : int
-        How often an interval with a contradictory count of eigenvalues is halved.
     stop_at : frozenset of str
         Kinds of special points that end the branch, e.g. ``frozenset({"hopf"})``.
-    detect_closed : bool
-        End when the branch comes back to its first point.
     newton : NewtonOptions
     """
 
@@ -144,24 +167,17 @@ class ContinuationOptions:
     max_step: float = 0.5
     max_points: int = 200
     limits: Mapping[str, tuple[float, float]] = field(default_factory=dict)
-    method: str = "arclength"
     direction: int = 1
-    target_iterations: int = 4
     max_angle: float = 0.35
-    growth: float = 1.5
-    shrink: float = 0.5
     state_scale: float = 1.0
     parameter_scales: Mapping[str, float] = field(default_factory=dict)
     folds: bool = True
     branch_points: bool = True
     eigenvalues: int = 0
     near: complex | None = None
-    stability_tolerance: float = 0.0
     locate: bool = True
     location_tolerance: float = 1e-8
-    max_subdivisions: int = 6
     stop_at: frozenset[str] = frozenset()
-    detect_closed: bool = True
     newton: NewtonOptions = field(default_factory=NewtonOptions)
 
     def units(self, names) -> dict[str, float]:
@@ -176,15 +192,8 @@ class ContinuationOptions:
             f"{self.min_step}, {self.step}, {self.max_step}.",
         )
         require(self.max_points >= 1, "A branch needs room for at least one more point.")
-        require(
-            self.method in ("arclength", "natural"),
-            f"The method must be 'arclength' or 'natural', not {self.method!r}.",
-        )
         require(self.direction in (1, -1), f"The direction is +1 or -1, not {self.direction}.")
-        require(self.target_iterations >= 1, "The target number of iterations is at least 1.")
         require(0 < self.max_angle < 1.6, "The largest angle must lie between 0 and 1.6 rad.")
-        require(self.growth >= 1, "The growth factor must be at least 1.")
-        require(0 < self.shrink < 1, "The shrink factor must lie between 0 and 1.")
         require(self.state_scale > 0, "The unit of the state must be positive.")
         for name, scale in self.parameter_scales.items():
             require(scale > 0, f"The unit of the parameter {name!r} must be positive, not {scale}.")
@@ -192,4 +201,3 @@ class ContinuationOptions:
             require(low < high, f"The limits of {name!r} must increase, not {low}, {high}.")
         require(self.eigenvalues >= 0, "The number of eigenvalues cannot be negative.")
         require(self.location_tolerance > 0, "The location tolerance must be positive.")
-        require(self.max_subdivisions >= 0, "The number of subdivisions cannot be negative.")

@@ -24,6 +24,8 @@ from continuation.options import (
     DerivativeMissing,
     NotABifurcation,
     NotConverged,
+    Reason,
+    Said,
     require,
 )
 from continuation.orbits import Orbit, OrbitOptions, OrbitSolver, add_exponents
@@ -210,7 +212,7 @@ class _Follower:
                 return self.tracer.solver.solve(first.motion, first.mu | {self.parameter: target})
             except NotConverged as error:
                 reason, step = str(error), 0.5 * step
-        raise NotConverged(f"No second orbit was found beside the first: {reason}", "first step")
+        raise NotConverged(f"No second orbit was found beside the first: {reason}", Reason.NO_CYCLE)
 
     def beside_hopf(self, special: SpecialPoint) -> tuple[Cycle, Cycle, Cycle]:
         """Equilibrium at a Hopf point as a cycle at rest, and two small orbits beside it."""
@@ -239,11 +241,11 @@ class _Follower:
                 missed = (cycles[1].mu[self.parameter] - special.mu[self.parameter] - rate * radius**2) / kept.scale
                 if abs(missed) <= 0.5 * np.hypot(a * radius, b * radius**2):
                     return cycles
-                reason = "it is not where the normal form has it"
+                reason = Reason.NOT_NORMAL.value
             except ContinuationError as error:
                 reason = str(error)
             radius *= 0.5
-        raise NotConverged(f"No orbit was found beside the Hopf point: {reason}", "first step")
+        raise NotConverged(f"No orbit was found beside the Hopf point: {reason}", Reason.NO_CYCLE)
 
     def restore(self, branch: Branch) -> None:
         """Take the points of a branch; the last one with its exponents."""
@@ -258,15 +260,15 @@ class _Follower:
         self.tracer.restore(points)
         self.tracer.options = replace(self.tracer.options, max_points=len(points) + self.options.max_points)
 
-    def run(self, steps: Callable[[], str], observers) -> Branch:
+    def run(self, steps: Callable[[], Said], observers) -> Branch:
         self.observers = as_observers(observers)
         return run_observed(self.branch, self.observers, lambda: self._until_stopped(steps))
 
-    def _until_stopped(self, steps) -> str:
+    def _until_stopped(self, steps) -> Said:
         try:
             return steps()
         except _Stop as stop:
-            return f"stopped at: {stop}"
+            return Reason.STOPPED(kind=stop)
 
     def take(self, item: CyclePoint | SpecialCycle) -> None:
         """Record a point or a special point, and notify the observers."""

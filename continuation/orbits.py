@@ -17,7 +17,7 @@ from continuation.cycles import Cycle, CycleOptions, CycleSolver
 from continuation.first_order import DirectLinearisation, FirstOrderSystem
 from continuation.harmonics import Harmonics
 from continuation.hill import Exponents, floquet_exponents
-from continuation.options import NotConverged, require
+from continuation.options import NotConverged, Reason, require
 from continuation.periodic import PeriodicMotion
 
 
@@ -199,14 +199,12 @@ def find_orbit(system, states, period: float, mu, options: OrbitOptions | None =
     while True:
         cycle = solver.solve(guess, mu)
         if np.linalg.norm(cycle.motion.coefficients[1:]) <= least:
-            raise NotConverged("The guess shrank to an equilibrium.", "equilibrium", cycle)
+            raise NotConverged("The guess shrank to an equilibrium.", Reason.REST, cycle)
         count = cycle.motion.harmonics.count
         if cycle.motion.tail <= options.tail:
             return add_exponents(solver, cycle, options)
         if count >= options.max_harmonics:
-            raise NotConverged(
-                f"{count} harmonics are too few: the last two hold {cycle.motion.tail:.2g} of the orbit.", "harmonics"
-            )
+            raise NotConverged(Reason.HARMONICS(count=count, share=cycle.motion.tail), Reason.HARMONICS)
         guess = cycle.motion.resized(min(cycle.motion.harmonics_for(options.tail), options.max_harmonics))
 
 

@@ -18,8 +18,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from continuation.linear import bordered
-from continuation.newton import residual_norm
-from continuation.options import OutOfDomain, SingularSystem
+from continuation.options import NewtonOptions, NotConverged, OutOfDomain, Reason, Said, SingularSystem
 
 
 class Problem:
@@ -101,11 +100,9 @@ class Local:
     ----------
     frame : ndarray, shape (k, n + k)
         Rows that complete ``[F_u, F_p]`` to a regular matrix.
-    reuse : Local, optional
-        Take its factors instead of new ones (conditions are not reused).
     """
 
-    def __init__(self, problem: Problem, z: np.ndarray, frame: np.ndarray, reuse=None):
+    def __init__(self, problem: Problem, z: np.ndarray, frame: np.ndarray):
         self.problem, self.z, self.frame = problem, z, frame
         system, u, mu = problem.system, problem.u(z), problem.mu(z)
         self.u, self.mu = u, mu
@@ -115,16 +112,11 @@ class Local:
         if not self.finite:
             return
         n, k = problem.n, problem.k
-        if reuse is not None:
-            self.linear, self.columns = reuse.linear, reuse.columns
-            self.solver, self.basis = reuse.solver, reuse.basis
-        else:
-            self.linear = system.linear(u, mu)
-            self.columns = [system.d_parameter(u, mu, name) for name in problem.names]
-            self.solver = bordered(self.linear, self.columns, frame)
-            unit = np.eye(n + k)[n:]
-            #: Directions along which F stays zero, shape (n + k, k).
-            self.basis = np.stack([self.solver.solve(row) for row in unit], axis=1)
+        self.linear = system.linear(u, mu)
+        self.columns = [system.d_parameter(u, mu, name) for name in problem.names]
+        self.solver = bordered(self.linear, self.columns, frame)
+        #: Directions along which F stays zero, shape (n + k, k).
+        self.basis = np.array([self.solver.solve(row) for row in np.eye(n + k)[n:]]).reshape(k, n + k).T
         self.condition = None
         if problem.condition is not None:
             self.condition = problem.condition.evaluate(system, u, mu, problem.names, self.linear, problem.extra(z))
@@ -192,6 +184,8 @@ class Local:
 
 #: Relative size of corrections that are rounding, and the share of ``F`` that such a correction leaves at least.
 ROUNDING, STALLED = 64 * np.finfo(float).eps, 0.7
+#: Growth of the residual at which an iteration is given up.
+DIVERGENCE = 1e6
 
 
 @dataclass(frozen=True)
@@ -203,9 +197,7 @@ class Correction:
     z : ndarray
     local : Local or None
         The linearisation at ``z`` when converged.
-    converged : bool
-    reason : str
-        As in `NewtonResult`.
+    reason : Said
     iterations : int
     residual : float
         Norm of ``F``.
@@ -213,10 +205,13 @@ class Correction:
 
     z: np.ndarray
     local: Local | None
-    converged: bool
-    reason: str
+    reason: Said
     iterations: int
     residual: float
+
+    @property
+    def converged(self) -> bool:
+        return self.reason.kind is Reason.CONVERGED
 
 
 def correct(problem, z, frame, newton, normal=None, step_tolerance=1e-8) -> Correction:
@@ -227,44 +222,30 @@ def correct(problem, z, frame, newton, normal=None, step_tolerance=1e-8) -> Corr
     A point whose corrections are rounding and no longer lessen ``F`` has converged too, as
     where large terms cancel; its residual says how far.
     """
-    start = z
-    reason, size = "maximum iterations", np.inf
-    local, first, previous = None, None, np.inf
-    iterations, last = 0, np.inf
+    start, size, first, last = z, np.inf, None, np.inf
     for iteration in range(newton.max_iterations + 1):
-        iterations = iteration
-        slow = size > newton.reuse_rate * previous
-        old = local if (problem.condition is None and local is not None and not slow) else None
         previous = size
         try:
-            local = Local(problem, z, frame, old)
+            local = Local(problem, z, frame)
             size = local.size
             if not local.finite:
-                reason = "not finite"
-                break
+                return Correction(z, None, Reason.NOT_FINITE(), iteration, size)
             first = size if first is None else first
             settled = problem.condition is None or last <= step_tolerance
             rounded = last <= ROUNDING and size > STALLED * previous
             if (size <= newton.tolerance and settled) or rounded:
-                if old is not None:
-                    local = Local(problem, z, frame)
-                return Correction(z, local, True, "converged", iteration, size)
-            if size > newton.divergence * max(first, newton.tolerance):
-                reason = "diverged"
-                break
+                return Correction(z, local, Reason.CONVERGED(), iteration, size)
+            if size > DIVERGENCE * max(first, newton.tolerance):
+                return Correction(z, None, Reason.DIVERGED(), iteration, size)
             if iteration == newton.max_iterations:
                 break
-            offset = 0.0 if normal is None else float(normal @ (z - start))
-            step = local.correction(normal, offset)
+            step = local.correction(normal, 0.0 if normal is None else float(normal @ (z - start)))
         except OutOfDomain as error:
-            reason = f"outside the domain of the model: {error}"
-            break
+            return Correction(z, None, Reason.DOMAIN(why=error), iteration, size)
         except (SingularSystem, ArithmeticError, np.linalg.LinAlgError):
-            reason = "singular"
-            break
+            return Correction(z, None, Reason.SINGULAR(), iteration, size)
         if not np.all(np.isfinite(step)):
-            reason = "not finite"
-            break
+            return Correction(z, None, Reason.NOT_FINITE(), iteration, size)
         # Scaled part by part: a frequency of 1e2 must not hide a parameter that moves.
         last = max(
             _relative(problem.u(step), problem.u(z), problem.state_scale),
@@ -272,10 +253,55 @@ def correct(problem, z, frame, newton, normal=None, step_tolerance=1e-8) -> Corr
             _relative(problem.extra(step), problem.extra(z), 1.0),
         )
         z = z + step
-    return Correction(z, None, False, reason, iterations, size)
+    return Correction(z, None, Reason.ITERATIONS(), iteration, size)
 
 
 def _relative(step, position, unit) -> float:
     if step.size == 0:
         return 0.0
     return float(np.max(np.abs(step) / (unit + np.abs(position).max())))
+
+
+def residual_norm(system, residual: np.ndarray) -> float:
+    """The system's own norm of a residual, or its largest entry."""
+    own = getattr(system, "residual_norm", None)
+    return float(own(residual) if own is not None else np.abs(residual).max(initial=0.0))
+
+
+def equilibrium(system, u, mu, options: NewtonOptions | None = None) -> np.ndarray:
+    """Solve ``F(u, mu) = 0`` at fixed parameters by Newton's method.
+
+    Parameters
+    ----------
+    system : System
+    u : ndarray, shape (n,)
+        Guess.
+    mu : mapping of str to float
+    options : NewtonOptions, optional
+
+    Returns
+    -------
+    ndarray, shape (n,)
+
+    Raises
+    ------
+    NotConverged
+        Its ``reason`` says why, ``result`` is the last `Correction`.
+
+    Examples
+    --------
+    >>> from continuation import JaxSystem, equilibrium
+    >>> float(equilibrium(JaxSystem(lambda u, mu: u**2 - mu["c"], 1), [1.0], {"c": 2.0})[0])  # doctest: +ELLIPSIS
+    1.41421356...
+    """
+    problem = Problem(system, dict(mu), ())
+    found = correct(problem, np.array(u, float), problem.natural_frame(), options or NewtonOptions())
+    if not found.converged:
+        where = ", ".join(f"{name} = {value:g}" for name, value in mu.items())
+        raise NotConverged(
+            f"No equilibrium was found at {where}: {found.reason} after {found.iterations} iterations, "
+            f"residual {found.residual:.3g}.",
+            found.reason.kind,
+            found,
+        )
+    return found.z

@@ -126,9 +126,9 @@ def compute_spectrum(linearisation, count, near=None) -> Spectrum:
     return shift_invert_spectrum(linearisation, count, 0.0 if near is None else near)
 
 
-def count_unstable(values, tolerance=0.0) -> int:
+def count_unstable(values) -> int:
     """Unstable eigenvalues, given one of each conjugate pair."""
-    return int(sum((2 if value.imag > 0 else 1) for value in values if value.real > tolerance))
+    return int(sum((2 if value.imag > 0 else 1) for value in values if value.real > 0))
 
 
 def match_modes(first, second) -> list[tuple[int, int]]:

@@ -15,7 +15,7 @@ from continuation.event_location import SLACK, locate_zero, solve_augmented, spe
 from continuation.normal_form import hopf_normal_form
 from continuation.options import ContinuationError, DerivativeMissing
 from continuation.spectra import count_unstable, match_modes, mode_distance
-from continuation.tracer import Monitor
+from continuation.tracer import SUBDIVISIONS, Monitor
 
 
 def hopf_borders(linear, omega, vector):
@@ -95,7 +95,7 @@ class SpectrumMonitor(Monitor):
             complete = bool(np.all(result.converged))
             point.unstable = -1
             if complete:
-                point.unstable = count_unstable(point.eigenvalues, options.stability_tolerance)
+                point.unstable = count_unstable(point.eigenvalues)
         return point.data["modes"]
 
     def measure(self, tracer, point):
@@ -120,14 +120,13 @@ class SpectrumMonitor(Monitor):
         A parabola through the growth rates at three points tells where a mode that has the
         same sign at all of them comes near the axis; there one more spectrum is computed.
         """
-        limit = tracer.options.stability_tolerance
         modes = [self.modes(tracer, point) for point in (past, before, after)]
         onward = dict(match_modes(modes[1], modes[2]))
         s = np.array([-tracer.problem.norm(before.z - past.z), 0.0, tracer.problem.norm(after.z - before.z)])
         for i, j in match_modes(modes[0], modes[1]):
             if j not in onward:
                 continue
-            y = np.array([modes[0][0][i].real, modes[1][0][j].real, modes[2][0][onward[j]].real]) - limit
+            y = np.array([modes[0][0][i].real, modes[1][0][j].real, modes[2][0][onward[j]].real])
             if not (np.all(y > 0) or np.all(y < 0)):
                 continue
             bend, slope, _ = np.polyfit(s, y, 2)
@@ -156,9 +155,8 @@ class SpectrumMonitor(Monitor):
 
     def _between(self, tracer, before, after, index, depth, found, special):
         a, b = self.modes(tracer, before), self.modes(tracer, after)
-        limit = tracer.options.stability_tolerance
         pairs = match_modes(a, b)
-        crossing = [(i, j) for i, j in pairs if (a[0][i].real > limit) != (b[0][j].real > limit)]
+        crossing = [(i, j) for i, j in pairs if (a[0][i].real > 0) != (b[0][j].real > 0)]
         oscillating = [(i, j) for i, j in crossing if a[0][i].imag > 0 and b[0][j].imag > 0]
         real = [(i, j) for i, j in crossing if a[0][i].imag == 0 and b[0][j].imag == 0]
         expected = sum(2 * _sign(b[0][j].real - a[0][i].real) for i, j in oscillating)
@@ -173,7 +171,7 @@ class SpectrumMonitor(Monitor):
             if s.kind in ("fold", "branch point") and -SLACK <= tracer.fraction(before, after, s.z)[0] <= 1 + SLACK
         ]
         hidden = len(real) >= 2 and len(real) > len(explained)
-        if (contradictory or hidden) and depth < tracer.options.max_subdivisions:
+        if (contradictory or hidden) and depth < SUBDIVISIONS:
             middle = tracer.at(before, after, 0.5)
             if middle is not None:
                 self._between(tracer, before, middle, index, depth + 1, found, special)
@@ -199,7 +197,6 @@ class SpectrumMonitor(Monitor):
         if not (tracer.options.branch_points and tracer.options.locate):
             reason = "a real eigenvalue crossed zero; branch points were not to be located"
             return [special_at(tracer, "zero eigenvalue", after, index, False, reason)]
-        limit = tracer.options.stability_tolerance
         mode_at = self._follow(tracer, before, after, i, j)
         search = BranchPointMonitor()
 
@@ -208,9 +205,7 @@ class SpectrumMonitor(Monitor):
             result = search.solve(tracer, guess, (vector, vector))
             return result if isinstance(result, str) else (result.z[:-1], result)
 
-        result, guess, reason = locate_zero(
-            tracer, before, after, lambda point: mode_at(point)[0][0].real - limit, attempt
-        )
+        result, guess, reason = locate_zero(tracer, before, after, lambda point: mode_at(point)[0][0].real, attempt)
         if result is None:
             reason = f"a real eigenvalue crossed zero; {reason}"
             return [special_at(tracer, "zero eigenvalue", guess, index, False, reason)]
@@ -249,12 +244,11 @@ class SpectrumMonitor(Monitor):
                 "location was not asked for",
                 {"omega": float(self.modes(tracer, after)[0][j].imag)},
             )
-        limit = tracer.options.stability_tolerance
         mode_at = self._follow(tracer, before, after, i, j)
 
         def attempt(guess, low, high):
             x, y = mode_at(low), mode_at(high)
-            ra, rb = x[0][0].real - limit, y[0][0].real - limit
+            ra, rb = x[0][0].real, y[0][0].real
             share = ra / (ra - rb) if ra != rb else 0.5
             omega = (1 - share) * x[0][0].imag + share * y[0][0].imag
             vector = (x if share < 0.5 else y)[1][:, 0]
@@ -274,9 +268,7 @@ class SpectrumMonitor(Monitor):
                     return "Newton's method found the same point again"
             return result.z[:-1], result
 
-        result, guess, reason = locate_zero(
-            tracer, before, after, lambda point: mode_at(point)[0][0].real - limit, attempt
-        )
+        result, guess, reason = locate_zero(tracer, before, after, lambda point: mode_at(point)[0][0].real, attempt)
         if result is None:
             return special_at(tracer, "hopf", guess, index, False, reason, {"omega": float(mode_at(before)[0][0].imag)})
         return describe_hopf(tracer, result, guess.tangent, index)
@@ -303,7 +295,7 @@ class CountMonitor(SpectrumMonitor):
         # The critical mode may lie outside of what the spectrum was asked for.
         found = abs(values[nearest] - critical) <= 1e-4 * max(1.0, abs(critical))
         rest = np.delete(values, nearest) if found else values
-        point.unstable = count_unstable(rest, tracer.options.stability_tolerance)
+        point.unstable = count_unstable(rest)
 
     def between(self, tracer, before, after, index, found):
         return []

@@ -13,9 +13,15 @@ from pathlib import Path
 import numpy as np
 
 from continuation.branch import Branch, CurvePoint
-from continuation.options import NotConverged, SingularSystem
+from continuation.options import NotConverged, Reason, Said, SingularSystem
 from continuation.problem import Local, Problem, correct
 
+#: Corrections that a comfortable step takes: fewer lengthen the next one, more shorten it.
+COMFORTABLE = 4
+#: Largest lengthening of an accepted step, shortening of a refused one.
+GROWTH, SHRINK = 1.5, 0.5
+#: Times that an interval is halved, or a step tried again, where what is seen in it is contradictory.
+SUBDIVISIONS = 6
 #: Largest distance of the curve from a chord, in chord lengths: an arc whose ends turn by 1.6 rad reaches 0.4.
 FARTHEST = 0.5
 #: Distance in chord lengths within which two located points are one.
@@ -93,7 +99,7 @@ def _observer_of(function: Callable) -> Observer:
     return observer
 
 
-def run_observed(branch, observers: list[Observer], steps: Callable[[], str]):
+def run_observed(branch, observers: list[Observer], steps: Callable[[], Said]):
     """Run the steps of a branch between its first and last call of the observers; the branch itself.
 
     The steps return why they ended.  An interruption ends the branch; an error goes on to the caller, with the branch
@@ -104,9 +110,9 @@ def run_observed(branch, observers: list[Observer], steps: Callable[[], str]):
     try:
         branch.reason = steps()
     except KeyboardInterrupt:
-        branch.reason = "interrupted"
+        branch.reason = Reason.INTERRUPTED()
     except Exception as error:
-        branch.reason = f"error: {error}"
+        branch.reason = Reason.ERROR(why=error)
         error.branch = branch
         raise
     finally:
@@ -133,7 +139,7 @@ class Tracer:
         self.observers = as_observers(observers)
         self.frame = problem.natural_frame()
         # Retries that are left, and the length of the curve for which they must do.
-        self._retries, self._doubted = options.max_subdivisions if options.locate else 0, 0.0
+        self._retries, self._doubted = SUBDIVISIONS if options.locate else 0, 0.0
 
     # -- points
 
@@ -220,7 +226,7 @@ class Tracer:
             raise NotConverged(
                 f"The first point was not found: {correction.reason} after "
                 f"{correction.iterations} iterations, residual {correction.residual:.3g}.",
-                correction.reason,
+                correction.reason.kind,
                 correction,
             )
         point = self.corrected_point(correction, direction)
@@ -242,14 +248,13 @@ class Tracer:
         """Add points to ``branch`` from a point on until something ends it; see `run_observed`."""
         return run_observed(branch, self.observers, lambda: self._steps(branch, before, step))
 
-    def _steps(self, branch, before, step) -> str:
+    def _steps(self, branch, before, step) -> Said:
         options = self.options
-        self._branch = branch
         first = branch.points[0]
         for _ in range(options.max_points):
             self._remember(branch, step)
             outcome = self._advance(branch, before, step)
-            if isinstance(outcome, str):
+            if isinstance(outcome, Said):
                 return outcome
             after, step, ending, found = outcome
             last = [s for s in found if s.values.pop("beyond", None)]
@@ -257,11 +262,11 @@ class Tracer:
                 branch.special += found
                 for special in found:
                     self._notify("found", branch, special)
-                return f"stopped at: {last[0].kind}"
+                return Reason.STOPPED(kind=last[0].kind)
             stopping = [s for s in found if s.kind in options.stop_at or s.values.get("stop")]
             if stopping:
                 after, found = self._stop_at(before, after, stopping[0], found)
-                ending = f"stopped at: {stopping[0].kind}"
+                ending = Reason.STOPPED(kind=stopping[0].kind)
             branch.points.append(after.record())
             branch.special += found
             self.frame = self.problem.frame(after.local.basis)
@@ -269,7 +274,7 @@ class Tracer:
                 self.problem.condition.adapt(after.local.condition)
             for monitor in self.monitors:
                 monitor.accept(self, before, after, found)
-            closed = options.detect_closed and self._closed(branch, first, before, after)
+            closed = self._closed(branch, first, before, after)
             before = after
             self._remember(branch, step)
             self._notify("accepted", branch)
@@ -278,8 +283,8 @@ class Tracer:
             if ending:
                 return ending
             if closed:
-                return "closed: the curve came back to its first point"
-        return "largest number of points reached"
+                return Reason.CLOSED()
+        return Reason.POINTS()
 
     def _stop_at(self, before, after, special, found):
         """Point of the curve at a special point, and what was found up to it; the point after one not located."""
@@ -307,7 +312,7 @@ class Tracer:
 
         A step is refused when its corrector fails or leaves the curve.  Test functions that contradict each other are
         a sign of that too, so a step with a special point that cannot be located is tried again, shorter; up to
-        ``max_subdivisions`` times until the curve is past that point.
+        `SUBDIVISIONS` times until the curve is past that point.
         """
         options = self.options
         while True:
@@ -325,12 +330,12 @@ class Tracer:
                 if doubtful and self._retries and used > options.min_step * (1 + 1e-9):
                     self._retries -= 1
                     self._doubted = max(self._doubted, used)
-                    trouble = f"a {doubtful[0].kind} was seen and not located"
+                    trouble = Reason.DOUBTFUL(kind=doubtful[0].kind)
                 elif left:
                     # The curve left the limits and came back within the step.
                     turn = self.at(before, after, self.fraction(before, after, left[0].z)[0])
                     if turn is None:
-                        trouble = "the curve was lost at its limit"
+                        trouble = Reason.LOST_AT_LIMIT()
                     else:
                         crossed = self._beyond(left[0].z)
                         after, ending, trouble = self._land_on_limit(before, turn, crossed, None)
@@ -339,16 +344,16 @@ class Tracer:
                 break
             self._notify("refused", branch, trouble, used)
             if used <= options.min_step * (1 + 1e-9):
-                return f"step below its minimum: {trouble}"
-            step = max(used * options.shrink, options.min_step)
+                return Reason.SMALLEST_STEP(why=trouble)
+            step = max(used * SHRINK, options.min_step)
         self._doubted -= after.step
         if self._doubted <= 0.0:
-            self._retries, self._doubted = options.max_subdivisions if options.locate else 0, 0.0
+            self._retries, self._doubted = SUBDIVISIONS if options.locate else 0, 0.0
         angle = self._angle(before, after)
-        factor = (options.target_iterations + 1) / (after.iterations + 1)
-        if angle > 0 and options.method == "arclength":
+        factor = (COMFORTABLE + 1) / (after.iterations + 1)
+        if angle > 0:
             factor = min(factor, 0.7 * options.max_angle / angle)
-        factor = float(np.clip(factor, options.shrink, options.growth))
+        factor = float(np.clip(factor, SHRINK, GROWTH))
         if ending is None:
             step = float(np.clip(used * factor, options.min_step, options.max_step))
         return after, step, ending, found
@@ -361,12 +366,11 @@ class Tracer:
         try:
             after = self.corrected_point(correction, before.tangent)
         except SingularSystem:
-            return None, "singular"
-        most = self.options.max_angle if self.options.method == "arclength" else 1.0
-        if self._angle(before, after) > most:
-            return None, "the tangent turns too far"
+            return None, Reason.SINGULAR()
+        if self._angle(before, after) > self.options.max_angle:
+            return None, Reason.TURNED()
         if self._jumped(before, after, z):
-            return None, "the corrector went far from the prediction"
+            return None, Reason.JUMPED()
         return after, None
 
     def _angle(self, before, after) -> float:
@@ -402,13 +406,6 @@ class Tracer:
         direction, used, ending = before.tangent, step, None
         normal = problem.weights * before.tangent
         normal = normal / np.abs(normal).max()
-        if options.method == "natural":
-            # The step counts in the parameter, in its own unit.
-            rate = abs(before.tangent[n]) * np.sqrt(problem.weights[n])
-            direction = before.tangent / max(rate, 1e-12)
-            used = step
-            normal = np.zeros(problem.n + problem.k + problem.e)
-            normal[n] = 1.0
         for i, name in enumerate(problem.names):
             if name not in options.limits or direction[n + i] == 0.0:
                 continue
@@ -416,7 +413,7 @@ class Tracer:
             limit = high if direction[n + i] > 0 else low
             reach = (limit - before.z[n + i]) / direction[n + i]
             if 0.0 <= reach <= used * (1 + 1e-9):
-                used, ending, last = reach, f"limit of {name} reached", (n + i, limit)
+                used, ending, last = reach, Reason.LIMIT(name=name, value=limit), (n + i, limit)
                 normal = np.eye(1, problem.n + problem.k + problem.e, n + i)[0]
         z = before.z + used * direction
         if ending:
@@ -440,10 +437,10 @@ class Tracer:
         if ending is not None:
             return after, ending, None
         (i, limit), n = crossed, self.problem.n
-        ending = f"limit of {self.problem.names[i]} reached"
+        ending = Reason.LIMIT(name=self.problem.names[i], value=limit)
         landed = self.root(before, after, lambda point: point.z[n + i] - limit)
         if landed is None:
-            return after, None, "the curve was lost at its limit"
+            return after, None, Reason.LOST_AT_LIMIT()
         start = landed.z.copy()
         start[n + i] = limit
         correction = self.correct(start, np.eye(1, start.size, n + i)[0])

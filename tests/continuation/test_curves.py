@@ -8,6 +8,7 @@ from continuation import (
     Branch,
     ContinuationOptions,
     NotABifurcation,
+    Reason,
     continue_branch,
     continue_fold,
     continue_hopf,
@@ -41,7 +42,7 @@ def test_fold_curve_through_a_cusp(cusp_fold):
     (point,) = curve.of_kind("cusp")
     assert abs(point.mu["a"]) < 1e-9 and abs(point.mu["b"]) < 1e-9
     # It starts at b = 1, passes the tip and leaves on the other side through b = 3.
-    assert a[0] > 0 > a[-1] and b[-1] == 3.0 and curve.reason == "limit of b reached"
+    assert a[0] > 0 > a[-1] and b[-1] == 3.0 and curve.reason == "ended on the limit b = 3"
 
 
 def test_fold_curve_through_a_bogdanov_takens_point(takens):
@@ -118,7 +119,7 @@ def test_curve_with_a_turning_point_in_both_parameters():
     points = branch.of_kind("hopf")
     assert len(points) == 2
     curve = continue_hopf(system, points[0], ("mu", "nu"), ContinuationOptions(max_step=0.2))
-    assert curve.reason.startswith("closed")
+    assert curve.reason.kind is Reason.CLOSED
     assert np.abs(curve.values("mu") ** 2 + curve.values("nu") ** 2 - 1).max() < 1e-9
     # It passes through the other point: the same curve, not another.
     angle = np.unwrap(np.arctan2(curve.values("nu"), curve.values("mu")))
@@ -131,7 +132,7 @@ def test_curves_are_saved_and_resumed(tmp_path, cusp_fold):
     part = continue_fold(
         cusp(), cusp_fold, ("a", "b"), ContinuationOptions(direction=-1, limits={"b": (-1.0, 3.0)}, max_points=9)
     )
-    assert part.reason == "largest number of points reached"
+    assert part.reason.kind is Reason.POINTS
     part.save(tmp_path / "curve.h5")
     longer = resume_curve(cusp(), Branch.load(tmp_path / "curve.h5"), options)
     assert len(longer) == len(whole)

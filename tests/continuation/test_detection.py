@@ -235,4 +235,3 @@ def test_matching_follows_shapes_where_values_cross():
 
 def test_counting():
     assert count_unstable([1.0, 0.5 + 1j, -1.0 + 5j, 0.0]) == 3
-    assert count_unstable([1.0, 0.5 + 1j], 0.7) == 1

@@ -13,6 +13,7 @@ from continuation import (
     NotABifurcation,
     NotConverged,
     OrbitOptions,
+    Reason,
     continue_branch,
     continue_orbits,
     find_orbit,
@@ -94,7 +95,7 @@ def test_cycles_from_a_hopf_point_follow_the_square_root():
         system, [0, 0], {**MU, "mu": -0.5}, "mu", ContinuationOptions(eigenvalues=2, limits={"mu": (-1, 1)})
     ).of_kind("hopf")[0]
     branch = orbits_from_hopf(system, hopf, "mu", ContinuationOptions(limits={"mu": (0, 0.5)}))
-    assert branch.reason == "limit of mu reached"
+    assert branch.reason.kind is Reason.LIMIT
     assert np.allclose(branch.values("period"), 2 * np.pi / (2 - 0.7 * branch.values()), rtol=1e-8)
     assert set(branch.unstable) == {0}
     assert np.isclose(orbit_at(system, branch, -1).amplitude()[0], np.sqrt(0.5), rtol=1e-7)
@@ -237,7 +238,7 @@ def test_a_branch_whose_series_grow(tmp_path):
     branch = continue_orbits(
         system, orbit, "mu", options, observers=[lambda b: seen.append(len(b)), Checkpoint(path, 2)]
     )
-    assert branch.reason == "limit of mu reached" and seen == list(range(1, len(branch) + 1))
+    assert branch.reason.kind is Reason.LIMIT and seen == list(range(1, len(branch) + 1))
     assert abs(branch.values("period")[0] - 6.380676) < 5.1e-7 and abs(branch.values("period")[-1] - 6.663287) < 5.1e-7
     assert np.all(np.diff(branch.values("harmonics")) >= 0) and np.ptp(branch.values("harmonics")) > 0
     assert branch.states.shape == Branch.load(path).states.shape and set(branch.unstable) == {0}
@@ -274,7 +275,7 @@ def test_an_orbit_of_a_discretised_equation_takes_few_sparse_factorisations(monk
     monkeypatch.setattr(linear.SparseSolver, "__init__", count)
     monkeypatch.setattr(linear.DenseSolver, "__init__", None)
     branch = orbits_from_hopf(system, hopf, "l", ContinuationOptions(limits=limits))
-    assert branch.reason == "limit of l reached" and set(branch.unstable) == {0} and not branch.special
+    assert branch.reason.kind is Reason.LIMIT and set(branch.unstable) == {0} and not branch.special
     whole = [size for size in made if size > system.size]
     assert len(whole) <= 3 * len(branch)
 

@@ -46,7 +46,7 @@ def _branch_is_right(seed):
     B, b, limit = draw.uniform(5, 25), draw.uniform(0.5, 4), 10 ** draw.uniform(-2.5, 0.5)
     options = ContinuationOptions(eigenvalues=2, limits={"D": (0.0, limit)})
     branch = continue_branch(REACTOR, [0.0, 0.0], {"D": FIRST, "B": B, "b": b}, "D", options)
-    assert branch.reason == "limit of D reached" and branch.mu(-1)["D"] == limit, (seed, branch.reason)
+    assert branch.reason == f"ended on the limit D = {limit:.6g}" and branch.mu(-1)["D"] == limit, (seed, branch.reason)
     assert all(special.located for special in branch.special), (seed, branch.special)
     found = sorted((special.kind, special.mu["D"]) for special in branch.special)
     expected = _expected(B, b, limit)

@@ -74,7 +74,7 @@ def test_cycles_are_those_of_runs_in_time(found):
 def test_values_asked_for_are_met(found):
     assert {p.value for p in found.points if p.asked} <= set(found.case.cycle.axis.values)
     assert found.points[-1].value == 230.0 and found.points[-1].asked
-    assert found.reason == "limit of density reached"
+    assert found.reason == "ended on the limit density = 230"
 
 
 def test_what_is_read_off(found):

@@ -9,7 +9,7 @@ Pipe conveying fluid: 14 and 20 modes agree; Gregory & Paidoussis (1966).
 import numpy as np
 import pytest
 
-from continuation import ContinuationOptions, NewtonOptions, continue_branch, continue_hopf
+from continuation import ContinuationOptions, NewtonOptions, Reason, continue_branch, continue_hopf
 from tests.systems.bratu import bratu_1d, bratu_chebyshev
 from tests.systems.brusselator import brusselator, brusselator_1d
 from tests.systems.lorenz import lorenz
@@ -180,7 +180,7 @@ def test_pipe_conveying_fluid_along_the_hopf_curve():
             ),
             lyapunov=False,
         )
-        assert curve.reason == "limit of beta reached"
+        assert curve.reason.kind is Reason.LIMIT
         assert abs(curve.values("u")[-1] - velocity) < 5.1e-5
         assert abs(curve.values("omega")[-1] - omega) < 5.1e-5
         assert curve.unstable[-1] == 0

@@ -11,6 +11,7 @@ from scipy.optimize import brentq
 from continuation import (
     ContinuationOptions,
     OrbitOptions,
+    Reason,
     continue_branch,
     continue_hopf,
     continue_orbits,
@@ -25,7 +26,7 @@ def follow(system, start, mu, parameter, limits, **options):
     """Branch to its limit, all of whose special points are located."""
     options = ContinuationOptions(eigenvalues=system.size, limits={parameter: limits}, **options)
     branch = continue_branch(system, start, mu, parameter, options)
-    assert branch.reason == f"limit of {parameter} reached" and all(s.located for s in branch.special), branch
+    assert branch.reason.kind is Reason.LIMIT and all(s.located for s in branch.special), branch
     return branch
 
 
@@ -163,7 +164,7 @@ def test_roessler_through_its_first_doubling():
     orbit = find_orbit(system, turn.y.T, period, mu, shape)
     assert orbit.stable
     branch = continue_orbits(system, orbit, "c", ContinuationOptions(limits={"c": (2.0, 5.7)}), shape)
-    assert branch.reason == "limit of c reached" and kinds(branch) == ["period doubling"] and branch.special[0].located
+    assert branch.reason.kind is Reason.LIMIT and kinds(branch) == ["period doubling"] and branch.special[0].located
     last = orbit_at(system, branch, -1, shape)
     assert abs(last.period - 5.88108845586) < 1e-9
     assert abs(last.nontrivial[0] + 2.403953527) < 1e-8

@@ -40,7 +40,7 @@ def branch(walk):
 
 
 def test_the_branch_reaches_its_end_without_folds(branch):
-    assert "limit of inlet" in branch.reason and branch.points[-1].z[-1] == pytest.approx(HIGHEST)
+    assert "limit inlet" in branch.reason and branch.points[-1].z[-1] == pytest.approx(HIGHEST)
     assert not branch.special
     assert np.all(np.diff(branch.values("inlet")) > 0)
 

@@ -20,7 +20,7 @@ import numpy as np
 import scipy.sparse as sp
 import scipy.sparse.linalg as spla
 
-from continuation import ContinuationOptions, MatrixLinearisation, SystemBase, continue_branch
+from continuation import ContinuationOptions, MatrixLinearisation, Reason, SystemBase, continue_branch
 from continuation import NewtonOptions as ContinuationNewton
 
 from ...contact import class_stiffness, contact_form
@@ -407,7 +407,7 @@ def follow_past_limits(
         observer.progress(f"arclength point {len(branch)} at {branch.points[-1].z[-1]:.6g} Pa")
 
     branch = continue_branch(system, q, {PARAMETER: pressure}, PARAMETER, options, observers=report)
-    if branch.reason == "interrupted":  # no end of the path: whoever goes on follows it anew
+    if branch.reason.kind is Reason.INTERRUPTED:  # no end of the path: whoever goes on follows it anew
         raise KeyboardInterrupt
     limits = []
     for special in branch.of_kind("fold"):

@@ -11,11 +11,13 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
+from continuation import Reason
 from continuation.cycle_branch import CycleTracer
 from continuation.cycle_points import CyclePoint, SpecialCycle
 from continuation.cycles import Cycle
 from continuation.harmonics import Harmonics
 from continuation.hill import Exponents
+from continuation.options import Said
 from continuation.periodic import PeriodicMotion
 
 from ...case.parameters import PARAMETERS, Mu
@@ -304,7 +306,7 @@ def _from_file(case: Case, walk: StabilityWalk, record: GrowingRecord) -> None:
             try:
                 second = follower.near(tracer.points[0].motion, float(given.value + step))
             except SolveError as error:
-                keeper.end(tracer, f"no further cycle was found: {error}")
+                keeper.end(tracer, Reason.NO_CYCLE(why=error))
                 continue
             tracer.extend(second, False, keeper.keep)
         keeper.follow(tracer)
@@ -322,12 +324,12 @@ class _Keeper:
         """Follow a leg to its end."""
         self.end(tracer, tracer.run(self.keep))
 
-    def end(self, tracer: CycleTracer, reason: str) -> None:
+    def end(self, tracer: CycleTracer, reason: Said) -> None:
         """Note why a leg ended."""
         self.record.note(ENDED, reason=reason, leg=self.leg)
-        if "no further cycle" in reason:
+        if reason.kind is Reason.NO_CYCLE:
             at = f"{self.follower.parameter} = {tracer.points[-1].value:.6g}"
-            self.record.fail(f"The branch ends at {at}: {reason.rstrip('.')}.")
+            self.record.fail(f"At {at} the branch {reason.rstrip('.')}.")
 
     def keep(self, item: CyclePoint | SpecialCycle) -> None:
         """Keep a cycle, or a special point."""
@@ -459,7 +461,7 @@ class CycleResult(StudyResult):
     def reason(self) -> str:
         """Why the branch ended."""
         reasons = [note["reason"] for note in self.record.notes(ENDED)]
-        return "; ".join(dict.fromkeys(reasons)) or "the run ended before the branch did"
+        return "; ".join(dict.fromkeys(reasons)) or "had not ended when the run did"
 
     @cached_property
     def system(self) -> ValveSystem:
@@ -516,7 +518,7 @@ class CycleResult(StudyResult):
             if special["perturbation_frequency"]:
                 words += f", perturbation at {special['perturbation_frequency']:.4g} Hz"
             said.append(words[0].upper() + words[1:] + ("." if special["located"] else ", not located closely."))
-        said.append(f"The branch ends: {self.reason.rstrip('.')}.")
+        said.append(f"The branch {self.reason.rstrip('.')}.")
         if self.points:
             said.append("Stable means: against perturbations that are symmetric as the model is.")
         return said

@@ -6,6 +6,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from continuation import Reason
 from continuation.cycle_points import CyclePoint, SpecialCycle
 
 from ...case.parameters import PARAMETERS
@@ -91,9 +92,9 @@ def cycles_along(case: Case, plan: MapPlan, column: MapColumn, law: int, walk: S
             continue
         reasons += missed
         reason = tracer.run(keep)
-        if "no further cycle" in reason:
+        if reason.kind is Reason.NO_CYCLE:
             at = PARAMETERS[plan.along.parameter].text(tracer.points[-1].value)
-            reasons.append(f"the branch ends at {at}: {reason}")
+            reasons.append(f"at {at} the branch {reason}")
     lacking = int((unstable & np.isnan(found.amplitude)).sum())
     if not lacking:
         return found
