@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 import subprocess
 import sys
@@ -15,7 +16,17 @@ def test_the_site_builds_without_a_warning(tmp_path):
     build = [sys.executable, "-m", "mkdocs", "build", "--strict", "--quiet", "--site-dir", str(tmp_path / "site")]
     done = subprocess.run(build, cwd=ROOT, capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
-    assert "duckbill valve vibrates" in (tmp_path / "site" / "index.html").read_text()
+    site = tmp_path / "site"
+    assert "duckbill valve vibrates" in (site / "index.html").read_text()
+    assert (site / "assets/tex-svg.js").stat().st_size > 1e6 and "https://" not in (site / "assets/math.js").read_text()
+    found = {entry["location"].split("#")[0] for entry in _index(site) if "Hopf" in entry["text"]}
+    assert {"stability.html", "glossary.html", "api/continuation.html"} <= found
+    for word in ("flutter", "chatter", "Shore", "Floquet"):
+        assert any(word in entry["text"] for entry in _index(site)), word
+
+
+def _index(site):
+    return json.loads((site / "search/search_index.json").read_text())["docs"]
 
 
 def test_every_page_is_in_the_contents():
