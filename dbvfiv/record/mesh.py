@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
+from dataclasses import MISSING, Field, dataclass, field, fields
+from typing import TYPE_CHECKING, Any
 
 import h5py
 import numpy as np
@@ -17,92 +17,41 @@ if TYPE_CHECKING:
     from ..model import ValveModel
 
 
-_COLUMNS = (
-    Column("nodes", "m", "Mid-surface at rest, x y z of each node"),
-    Column("quads", "", "Four nodes of each element, counter-clockwise seen from outside", "i4"),
-    Column(
-        "rows", "", "Node numbers: rows from lip to flange, columns from x = 0, of a half from y = 0, to y = 0", "i4"
-    ),
-    Column("z", "m", "Axial position of the rows (flow stations), from the lip"),
-    Column("directors", "", "Unit vectors through the wall at rest"),
-    Column("frames", "", "Two unit vectors at each node that the rotation unknowns turn the director towards"),
-    Column("free", "", "Which of the five unknowns of each node are free", "bool"),
-    Column("thickness", "m", "Wall thickness of each element"),
-    Column("layer_names", "", "Materials of the layers, inside to outside", TEXT),
-    Column("layer_angles", "deg", "Angle of material axis 1 from the valve's axis"),
-    Column("layer_fractions", "", "Share of each layer in the wall"),
-)
-#: There where the wall relaxes.
-_RELAXING = (
-    Column("relaxing", "", "Groups of layers that relax alike, by their materials", TEXT),
-    Column("branch_group", "", "Which of them each Maxwell branch belongs to, from 0", "i4"),
-    Column("branch_time", "s", "Its relaxation time"),
-    Column("branch_strength", "", "Its modulus over that of the slow law"),
-)
-#: There where waves run in the line.
-_LINE = (
-    Column("line_places", "", "Where the velocities in an elastic line are, from its far end (0) to the flange (1)"),
-)
-#: There where the fluid in the valve is compressed.
-_GAS = (Column("gas_unknowns", "", "Number of unknowns of a fluid that is compressed", "i4"),)
-#: There where inner faces touch.
-_FACES = (Column("face_nodes", "", "Nodes whose inner face may touch the closing plane", "i4"),)
-#: There where more than a quarter is computed.
-_PART = (Column("part_name", "", "Part of the valve that the mesh is", TEXT),)
+def _kept(units: str, words: str, dtype: str = "f8", default: Any = MISSING) -> Any:
+    """Field of a mesh that a file keeps; one with a default is left out of files where it is that."""
+    look = {"default_factory": lambda: np.zeros(0, dtype)} if default is None else {"default": default}
+    return field(metadata={"column": (units, words, dtype)}, **look)
 
 
 @dataclass(frozen=True)
 class MeshData:
-    """Mesh of the part of the valve that is computed.
-
-    Attributes
-    ----------
-    nodes : (nn, 3) m
-    quads : (ne, 4) int
-    rows : (m, columns) int
-        Node numbers, the lip first; column 0 on x = 0, of a half on y = 0, the last on y = 0.
-    z : (m,) m
-    directors : (nn, 3)
-    frames : (nn, 2, 3)
-    free : (nn, c) bool
-        Unknowns that no support holds: displacements and rotations.
-    thickness : (ne,) m
-    layer_names : (nl,) tuple of str, inside to outside
-    layer_angles : (nl,) degrees
-    layer_fractions : (nl,)
-    relaxing : (g,) tuple of str
-        Groups of layers that relax alike; none where the case leaves the wall elastic.
-    branch_group, branch_time, branch_strength : (b,) arrays
-        Maxwell branches: group, relaxation time (s), and modulus over that of the slow law.
-    line_places : (k + 1,) array
-        Where the velocities in an elastic line are; empty without one.
-    gas_unknowns : (1,) int array
-        Number of unknowns of a fluid that is compressed; empty without one.
-    face_nodes : (k,) int array
-        Nodes whose inner face may touch the closing plane; none where the lips have stops.
-    part_name : (1,) tuple of str
-        Part of the valve that the mesh is.
+    """Mesh of the part of the valve that is computed: nn nodes, ne elements, m rows, nl layers; the metadata of each
+    field say what it holds.
     """
 
-    nodes: np.ndarray
-    quads: np.ndarray
-    rows: np.ndarray
-    z: np.ndarray
-    directors: np.ndarray
-    frames: np.ndarray
-    free: np.ndarray
-    thickness: np.ndarray
-    layer_names: tuple[str, ...]
-    layer_angles: np.ndarray
-    layer_fractions: np.ndarray
-    relaxing: tuple[str, ...] = ()
-    branch_group: np.ndarray = field(default_factory=lambda: np.zeros(0, np.int32))
-    branch_time: np.ndarray = field(default_factory=lambda: np.zeros(0))
-    branch_strength: np.ndarray = field(default_factory=lambda: np.zeros(0))
-    line_places: np.ndarray = field(default_factory=lambda: np.zeros(0))
-    gas_unknowns: np.ndarray = field(default_factory=lambda: np.zeros(0, np.int32))
-    face_nodes: np.ndarray = field(default_factory=lambda: np.zeros(0, np.int32))
-    part_name: tuple[str, ...] = (QUARTER.name,)
+    nodes: np.ndarray = _kept("m", "Mid-surface at rest, x y z of each node (nn, 3)")
+    quads: np.ndarray = _kept("", "Nodes of each element (ne, 4), counter-clockwise seen from outside", "i4")
+    rows: np.ndarray = _kept(
+        "", "Node numbers: rows from lip to flange, columns from x = 0, of a half from y = 0, to y = 0", "i4"
+    )
+    z: np.ndarray = _kept("m", "Axial position of the rows (m,), the flow stations, from the lip")
+    directors: np.ndarray = _kept("", "Unit vectors (nn, 3) through the wall at rest")
+    frames: np.ndarray = _kept("", "Two unit vectors at each node (nn, 2, 3) that rotations turn the director towards")
+    free: np.ndarray = _kept("", "Which of the five unknowns of each node (nn, 5) no support holds", "bool")
+    thickness: np.ndarray = _kept("m", "Wall thickness of each element (ne,)")
+    layer_names: tuple[str, ...] = _kept("", "Materials of the layers (nl,), inside to outside", TEXT)
+    layer_angles: np.ndarray = _kept("deg", "Angle of material axis 1 from the valve's axis (nl,)")
+    layer_fractions: np.ndarray = _kept("", "Share of each layer in the wall (nl,)")
+    relaxing: tuple[str, ...] = _kept("", "Groups of layers that relax alike, by their materials", TEXT, ())
+    branch_group: np.ndarray = _kept("", "Which of them each Maxwell branch belongs to, from 0", "i4", None)
+    branch_time: np.ndarray = _kept("s", "Its relaxation time", default=None)
+    branch_strength: np.ndarray = _kept("", "Its modulus over that of the slow law", default=None)
+    line_places: np.ndarray = _kept(
+        "", "Where the velocities in an elastic line are, from its far end (0) to the flange (1)", default=None
+    )
+    gas_unknowns: np.ndarray = _kept("", "Number of unknowns of a fluid that is compressed", "i4", None)
+    face_nodes: np.ndarray = _kept("", "Nodes whose inner face may touch the closing plane", "i4", None)
+    part_name: tuple[str, ...] = _kept("", "Part of the valve that the mesh is", TEXT, (QUARTER.name,))
 
     @classmethod
     def of(cls, model: ValveModel) -> MeshData:
@@ -174,22 +123,28 @@ class MeshData:
         return np.repeat(np.arange(self.shape[1]), self.shape[0])
 
 
+_COLUMNS = {Column(f.name, *f.metadata["column"]): f for f in fields(MeshData)}
+
+
 def write_mesh(file: h5py.File, mesh: MeshData) -> None:
     """Write a mesh into a result file."""
     group = file.create_group("mesh")
-    fluid = (*(_LINE if len(mesh.line_places) else ()), *(_GAS if len(mesh.gas_unknowns) else ()))
-    faces = _FACES if len(mesh.face_nodes) else ()
-    part = () if mesh.part.is_quarter else _PART
-    for column in (*_COLUMNS, *(_RELAXING if mesh.relaxing else ()), *fluid, *faces, *part):
-        write_array(group, column, getattr(mesh, column.name))
+    for column, declared in _COLUMNS.items():
+        value = getattr(mesh, column.name)
+        usual = isinstance(value, tuple) and value == declared.default
+        if not _is_optional(declared) or (len(value) and not usual):
+            write_array(group, column, value)
 
 
 def read_mesh(file: h5py.File) -> MeshData:
     """Read the mesh of a result file."""
     group = file["mesh"]
-    further = (*_RELAXING, *_LINE, *_GAS, *_FACES, *_PART)
-    columns = (*_COLUMNS, *(column for column in further if column.name in group))
-    return MeshData(**{column.name: read_array(group, column) for column in columns})
+    held = [column for column, declared in _COLUMNS.items() if not _is_optional(declared) or column.name in group]
+    return MeshData(**{column.name: read_array(group, column) for column in held})
+
+
+def _is_optional(declared: Field) -> bool:
+    return declared.default is not MISSING or declared.default_factory is not MISSING
 
 
 @dataclass(frozen=True)

@@ -119,19 +119,7 @@ class Verdict:
 
     def summary(self) -> dict[str, Any]:
         """Plain SI numbers for JSON; what is not a number is None."""
-        numbers = {
-            "mean": self.mean,
-            "amplitude": self.amplitude,
-            "frequency": self.frequency,
-            "period": self.period,
-            "periodicity_error": self.periodicity_error,
-            "periodicity_trend": self.periodicity_trend,
-            "amplitude_trend": self.amplitude_trend,
-            "rms": self.rms,
-            "smallest": self.smallest,
-            "largest": self.largest,
-            "noise": self.noise,
-        }
+        numbers = {name: getattr(self, name) for name in _NUMBERS}
         return {
             "verdict": self.name,
             "decided": bool(self.decided),
@@ -144,6 +132,9 @@ class Verdict:
         }
 
 
+#: Numbers of a verdict by their keys in JSON.
+_NUMBERS = ("mean", "amplitude", "frequency", "period", "periodicity_error", "periodicity_trend", "amplitude_trend")
+_NUMBERS += ("rms", "smallest", "largest", "noise")
 _SHARE, _FEWEST_OF_NOISE = 0.2, 64
 _BANDS = 16
 #: Smallest share of the band up to half the sampling rate that noise fills.
@@ -155,23 +146,8 @@ _LINE = 7.0
 _LEVEL = 4.0
 
 
-@dataclass(frozen=True)
-class Noise:
-    """Noise about a level.
-
-    Attributes
-    ----------
-    level : float
-    rms : float
-        Root mean square about the level.
-    """
-
-    level: float
-    rms: float
-
-
-def noise_at_end(series: Series) -> Noise | None:
-    """Level and noise of the last fifth of a series; None if that is anything but noise about a constant level.
+def noise_at_end(series: Series) -> tuple[float, float] | None:
+    """Level of the last fifth of a series and root mean square of the noise about it; None if it is anything else.
 
     Noise has no memory: its spectrum (Hann window) fills at least a third of what the sampling shows, holds no line,
     and its level and its strength stay within what chance explains.
@@ -196,54 +172,41 @@ def noise_at_end(series: Series) -> Noise | None:
     even = max(halves) <= 1.5 * min(halves)
     if filled < _FILLED or line > np.log(len(power)) + _LINE or moved > _LEVEL * chance or not even:
         return None
-    return Noise(level, rms)
+    return level, rms
 
 
 def without_cycles(series: Series, options: JudgeOptions, size: float, residual: float | None, at_end: dict) -> Verdict:
     """Verdict on a signal without cycles, from its size and from mean, amplitude and rms of its end."""
-    tail = series.last(0.2 * series.duration).values
-    thirds = [part.mean() for part in np.array_split(tail, 3)]
+
+    def found(name: str, decided: bool, words: str) -> Verdict:
+        return Verdict(name, bool(decided), words, **at_end)
+
+    thirds = [part.mean() for part in np.array_split(series.last(0.2 * series.duration).values, 3)]
     first, second = thirds[1] - thirds[0], thirds[2] - thirds[1]
     to_come = abs(second) / (1.0 - min(abs(second / first), 0.99)) if first and abs(second) > 1e-13 * size else 0.0
     if 2.0 * at_end["amplitude"] <= options.steady * size and to_come <= options.steady * size:
         if residual is not None and not residual <= options.residual:
-            return Verdict(
-                "undecided",
-                False,
-                (
-                    f"The signal stands still but its system does not (residual "
-                    f"{residual:.2g}): it may be sampled at its own period."
-                ),
-                **at_end,
-            )
-        return Verdict(
-            "steady", True, f"It changes by less than {options.steady:g} of its size, and little is to come.", **at_end
-        )
-    ranges = np.array([np.ptp(part) for part in np.array_split(series.values, 8)])
-    levels = np.array([part.mean() for part in np.array_split(series.values, 8)])
+            still = f"The signal stands still but its system does not (residual {residual:.2g})"
+            return found("undecided", False, f"{still}: it may be sampled at its own period.")
+        words = f"It changes by less than {options.steady:g} of its size, and little is to come."
+        return found("steady", True, words)
+    parts = np.array_split(series.values, 8)
+    ranges = np.array([np.ptp(part) for part in parts])
     late = ranges[-4:]
-    falling, rising = np.all(np.diff(late) < 0), np.all(np.diff(late) > 0)
-    if falling and late[-1] < 0.6 * late[0]:
-        return Verdict(
-            "decaying", bool(late[-1] < 0.1 * ranges.max()), "Its changes become smaller and smaller.", **at_end
-        )
-    if rising and late[-1] > 1.5 * late[0] and ranges[-1] == ranges.max():
-        return Verdict(
-            "growing", bool(late[-1] > 10 * max(late[0], 1e-300)), "Its changes become larger and larger.", **at_end
-        )
-    steps = np.diff(levels[-5:])
-    if np.all(steps > 0) or np.all(steps < 0):
-        if np.ptp(levels[-5:]) > 2.0 * np.median([_scatter(part) for part in np.array_split(series.values, 8)[-4:]]):
-            shrinking = abs(steps[-1]) < 0.5 * abs(steps[0])
-            return Verdict(
-                "decaying" if shrinking else "growing",
-                False,
-                "It drifts one way" + (", slower and slower." if shrinking else "."),
-                **at_end,
-            )
+    if np.all(np.diff(late) < 0) and late[-1] < 0.6 * late[0]:
+        return found("decaying", late[-1] < 0.1 * ranges.max(), "Its changes become smaller and smaller.")
+    if np.all(np.diff(late) > 0) and late[-1] > 1.5 * late[0] and ranges[-1] == ranges.max():
+        return found("growing", late[-1] > 10 * max(late[0], 1e-300), "Its changes become larger and larger.")
+    levels = np.array([part.mean() for part in parts[-5:]])
+    steps = np.diff(levels)
+    drifts = np.all(steps > 0) or np.all(steps < 0)
+    if drifts and np.ptp(levels) > 2.0 * np.median([_scatter(part) for part in parts[-4:]]):
+        if abs(steps[-1]) < 0.5 * abs(steps[0]):
+            return found("decaying", False, "It drifts one way, slower and slower.")
+        return found("growing", False, "It drifts one way.")
     if swings(series) < options.cycles:
-        return Verdict("undecided", False, "It moves, and too few swings have been seen to tell how.", **at_end)
-    return Verdict("irregular", True, "It moves without a period.", **at_end)
+        return found("undecided", False, "It moves, and too few swings have been seen to tell how.")
+    return found("irregular", True, "It moves without a period.")
 
 
 def _scatter(part: np.ndarray) -> float:
@@ -256,13 +219,14 @@ def within_noise(series: Series, options: JudgeOptions, residual: float | None, 
     noise = noise_at_end(series)
     if noise is None or (residual is not None and not residual <= options.residual):
         return None
-    facts = at_end | {"mean": noise.level, "rms": noise.rms, "noise": noise.rms}
-    share = noise.rms / abs(noise.level) if noise.level else np.inf
-    if noise.rms <= options.noise * abs(noise.level):
-        words = f"It is constant within noise of {noise.rms:.3g} (root mean square, {100 * share:.2g} % of its level)."
+    level, rms = noise
+    facts = at_end | {"mean": level, "rms": rms, "noise": rms}
+    share = rms / abs(level) if level else np.inf
+    if rms <= options.noise * abs(level):
+        words = f"It is constant within noise of {rms:.3g} (root mean square, {100 * share:.2g} % of its level)."
         return Verdict("steady", True, words, **facts)
-    level = f"{100 * share:.3g} % of its level" if share < 10 else f"its level is {noise.level:.2g}"
-    words = f"It is noise of {noise.rms:.3g} (root mean square, {level}) without a period: too much to call it steady."
+    size = f"{100 * share:.3g} % of its level" if share < 10 else f"its level is {level:.2g}"
+    words = f"It is noise of {rms:.3g} (root mean square, {size}) without a period: too much to call it steady."
     return Verdict("irregular", True, words, **facts)
 
 
@@ -342,10 +306,8 @@ def _judge(series: Series, options: JudgeOptions, residual: float | None, closed
     if at_end["amplitude"] > 1e-9 * size:
         fast = undersampled(series)
         if fast:
-            words = (
-                f"It swings at {fast:.4g} Hz, and {1.0 / (fast * series.step):.2g} samples a cycle are "
-                f"too few to judge by."
-            )
+            samples = f"{1.0 / (fast * series.step):.2g} samples a cycle"
+            words = f"It swings at {fast:.4g} Hz, and {samples} are too few to judge by."
             return Verdict("undecided", False, words, **at_end)
         found = _oscillation(series, options, size)
         if found is not None and (found.decided and found.name != "irregular"):
@@ -389,60 +351,51 @@ def _oscillation(series: Series, options: JudgeOptions, size: float) -> Verdict 
 def _name(
     series: Series, cycles: Cycles, recent: Cycles, facts: dict, direction: str, options: JudgeOptions
 ) -> Verdict:
-    error, count = facts["periodicity_error"], len(cycles)
-    rate = abs(facts["amplitude_trend"])
-    if error > options.noisy and direction in ("growing", "decaying") and rate < 0.5 * error:
-        direction = ""  # the amplitudes wander because nothing repeats
-    if (
-        direction in ("growing", "decaying")
-        and error > options.periodic
-        and rate < 0.2 * error
-        and not _noise_on_cycle(cycles, options)
-    ):
-        direction = ""  # growth as slow as that does not make cycles so different
-    if direction in ("growing", "decaying"):
+    """Verdict on cycles by the first rule that holds."""
+
+    def irregular(words: str) -> Verdict:
+        return Verdict("irregular", True, words, **facts)
+
+    def undecided(words: str) -> Verdict:
+        return Verdict("undecided", False, words, **facts)
+
+    error, count, rate = facts["periodicity_error"], len(cycles), abs(facts["amplitude_trend"])
+    noisy = error > options.periodic
+    moves = direction in ("growing", "decaying")
+    # amplitudes may wander because nothing repeats, and slow growth does not make cycles so different
+    if moves and error > options.noisy and rate < 0.5 * error:
+        moves = False
+    if moves and noisy and rate < 0.2 * error and not _noise_on_cycle(cycles, options):
+        moves = False
+    if moves:
         return _growth(cycles, recent, facts, direction, options)
     enough = (1.5 if error > options.noisy else 4.0) * options.cycles  # swings without a return
-    if count < options.cycles and error > options.periodic and swings(series) >= enough:
-        return Verdict(
-            "irregular",
-            True,
-            f"After {swings(series)} swings it still repeats within {100 * error:.2g} % only.",
-            **facts,
-        )
+    if count < options.cycles and noisy and swings(series) >= enough:
+        return irregular(f"After {swings(series)} swings it still repeats within {100 * error:.2g} % only.")
     if count < options.cycles:
-        return Verdict(
-            "undecided", False, f"Only {count} cycles have been seen and {options.cycles} are needed.", **facts
-        )
+        return undecided(f"Only {count} cycles have been seen and {options.cycles} are needed.")
     if error > options.noisy:
-        return Verdict("irregular", True, f"Nothing repeats: the periodicity error is {error:.2g}.", **facts)
-    if error > options.periodic and not _noise_on_cycle(cycles, options):
-        return Verdict(
-            "irregular", True, f"Cycles differ from one to the next by {100 * error:.2g} %, and not by noise.", **facts
-        )
-    noisy = error > options.periodic
+        return irregular(f"Nothing repeats: the periodicity error is {error:.2g}.")
+    if noisy and not _noise_on_cycle(cycles, options):
+        return irregular(f"Cycles differ from one to the next by {100 * error:.2g} %, and not by noise.")
     band = max(options.band, 6.0 * trend_of(recent.spread).scatter) if noisy else options.band
     if comes_and_goes(cycles.spread[-max(options.cycles, 3 * count // 4) :], band if noisy else 0.5 * options.band):
-        return Verdict("irregular", True, "The amplitude comes and goes: beats.", **facts)
+        return irregular("The amplitude comes and goes: beats.")
     still = settled(cycles.spread, band)
     if still < max(options.cycles, count // 5):
-        return Verdict("undecided", False, f"The amplitude has been settled for {still} cycles only.", **facts)
+        return undecided(f"The amplitude has been settled for {still} cycles only.")
     if direction == "settling":
-        return Verdict("undecided", False, "The amplitude still settles.", **facts)
-    pace = cycles.pace()
-    if len(pace) >= 6 and trend_of(pace).significant and abs(trend_of(pace).change) > options.drift:
-        return Verdict(
-            "undecided", False, f"The period still changes by {100 * trend_of(pace).slope:+.2g} % a cycle.", **facts
-        )
+        return undecided("The amplitude still settles.")
+    pace = trend_of(cycles.pace()) if count > 6 else None
+    if pace is not None and pace.significant and abs(pace.change) > options.drift:
+        return undecided(f"The period still changes by {100 * pace.slope:+.2g} % a cycle.")
     means = cycles.last(options.cycles).mean
     if np.ptp(means) > max(10 * options.drift, (1.5 if noisy else 0.5) * error) * recent.spread.mean():
         if trend_of(np.exp((means - means.mean()) / np.ptp(means))).significant:
-            return Verdict("undecided", False, "The mean of the cycles still moves.", **facts)
-        return Verdict("irregular", True, "The mean of the cycles comes and goes.", **facts)
-    words = f"{still} cycles of equal amplitude, repeating within {100 * error:.2g} %" + (
-        ", the difference being noise." if noisy else "."
-    )
-    return Verdict("limit cycle", True, words, **facts)
+            return undecided("The mean of the cycles still moves.")
+        return irregular("The mean of the cycles comes and goes.")
+    words = f"{still} cycles of equal amplitude, repeating within {100 * error:.2g} %"
+    return Verdict("limit cycle", True, words + (", the difference being noise." if noisy else "."), **facts)
 
 
 def _growth(cycles: Cycles, recent: Cycles, facts: dict, direction: str, options: JudgeOptions) -> Verdict:
