@@ -1,5 +1,5 @@
 """Pages of the site that are no files of docs/: the README as its first page, the notebooks of the gallery, the public
-names of each package, and the copy of MathJax that draws the equations without a network.
+names of each package; and what colours code and draws equations without a network.
 """
 
 from __future__ import annotations
@@ -12,16 +12,19 @@ from pathlib import Path
 
 import mathjax
 from mkdocs.structure.files import File, Files
+from pygments.formatters import HtmlFormatter
 
 ROOT = Path(__file__).resolve().parent.parent
 MATHJAX = Path(mathjax.__path__[0]) / "static/mathjax/es5/tex-svg.js"
 
 
 def on_files(files: Files, config) -> Files:
-    """Add the README as index.md, a page for each notebook, and MathJax."""
+    """Add the README as index.md, a page for each notebook, colours of code, and MathJax."""
     files.append(File.generated(config, "index.md", content=first_page((ROOT / "README.md").read_text())))
     for notebook in sorted((ROOT / "docs/gallery").glob("*.ipynb")):
         files.append(File.generated(config, f"gallery/{notebook.stem}.md", content=notebook_page(notebook)))
+    colours = HtmlFormatter(style="friendly").get_style_defs([".codehilite", ".highlight"])
+    files.append(File.generated(config, "assets/code.css", content=colours))
     files.append(File.generated(config, "assets/tex-svg.js", abs_src_path=str(MATHJAX)))
     return files
 
