@@ -28,7 +28,7 @@ def damping_figure(report: DampingReport) -> Figure:
             at, tan_delta = material.data
             marks = {"ls": "--", "lw": 0.9, "marker": ""} if len(at) == 2 else {"ls": "", "marker": look["marker"]}
             upper.plot(at, report.factor * tan_delta, color=look["color"], mfc="white", ms=4.5, **marks)
-        lower.plot(frequency, series.modulus(2j * np.pi * frequency).real, color=look["color"])
+        lower.plot(frequency, report.stiffening(material, frequency), color=look["color"])
     damping = report.case.damping
     if not damping.relaxes:
         words = f"Rayleigh, α = {damping.alpha:g} 1/s, β = {damping.beta:g} s"

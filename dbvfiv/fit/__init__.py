@@ -1,10 +1,10 @@
 """Constants of materials from their tests: rubbers, plies and loss factors; laws and damping of a case's materials."""
 
 from dbvfiv.fit.cards import MaterialDamping, damping_of, law_from_card, law_from_case, relaxation_from_case
-from dbvfiv.fit.curves import TensionTest, read_tension_test
+from dbvfiv.fit.curves import TensionTest
 from dbvfiv.fit.damping import DampingReport, describe_damping, outside_band
 from dbvfiv.fit.prony import PronyFit, fit_constant, fit_moduli, fit_relaxation, fit_tan_delta
-from dbvfiv.fit.rubber import RubberFit, fit_mooney_rivlin, fit_rubber, form_of, uniaxial_stress
+from dbvfiv.fit.rubber import RubberFit, fit_rubber, form_of, uniaxial_stress
 
 __all__ = [
     "DampingReport",
@@ -16,7 +16,6 @@ __all__ = [
     "describe_damping",
     "fit_constant",
     "fit_moduli",
-    "fit_mooney_rivlin",
     "fit_relaxation",
     "fit_rubber",
     "fit_tan_delta",
@@ -24,7 +23,6 @@ __all__ = [
     "law_from_card",
     "law_from_case",
     "outside_band",
-    "read_tension_test",
     "relaxation_from_case",
     "uniaxial_stress",
 ]

@@ -87,21 +87,6 @@ class TensionTest:
             object.__setattr__(self, name, values)
 
 
-def read_tension_test(path: str | Path) -> TensionTest:
-    """Read a uniaxial tension test; see `read_curves`.
-
-    Raises
-    ------
-    MaterialError
-        Also if the table holds other tests, or several cycles.
-    """
-    curves = read_curves(path)
-    if len(curves) > 1 or curves[0].mode != "uniaxial":
-        held = ", ".join(c.mode + ("" if c.cycle is None else f" (cycle {c.cycle})") for c in curves)
-        raise MaterialError(f"Tension test {path}: it must hold one uniaxial test, but it holds {held}.")
-    return curves[0]
-
-
 def read_curves(path: str | Path, mode: str | None = None) -> list[TensionTest]:
     """Read tests of a rubber.
 

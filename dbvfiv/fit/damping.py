@@ -23,14 +23,7 @@ if TYPE_CHECKING:
 
 
 def rayleigh_ratio(frequency, alpha: float, beta: float):
-    """Damping ratio of a mode under Rayleigh damping.
-
-    Parameters
-    ----------
-    frequency : array_like
-        Hz, positive.
-    alpha, beta : float
-        1/s and s.
+    """Damping ratio of a mode of a frequency, Hz, under Rayleigh damping by alpha, 1/s, and beta, s.
 
     Examples
     --------
@@ -47,17 +40,7 @@ def rayleigh_constants(ratios: tuple[float, float], frequencies: tuple[float, fl
     Between the frequencies the damping is lower, beyond them higher. One constant is negative where the ratios
     differ by more than the frequencies do, and then no Rayleigh damping meets both.
 
-    Parameters
-    ----------
-    ratios : tuple of float
-        Damping ratios, half the loss factors.
-    frequencies : tuple of float
-        Hz; positive, and different.
-
-    Returns
-    -------
-    alpha, beta : float
-        1/s and s.
+    Ratios are half the loss factors, frequencies in Hz, positive and different; alpha comes in 1/s and beta in s.
 
     Raises
     ------
@@ -89,18 +72,8 @@ _SHARE = 1e-9
 
 @dataclass(frozen=True)
 class RayleighMatch:
-    """Rayleigh's constants that damp as a material does at two frequencies.
-
-    Attributes
-    ----------
-    name : str
-        Of the material.
-    frequencies : tuple of float
-        Hz.
-    ratios : tuple of float
-        Damping ratios there, half the loss factors.
-    alpha, beta : float
-        1/s and s; negative where no Rayleigh damping meets both.
+    """Rayleigh's constants, 1/s and s, that damp as a material does at two frequencies, Hz; one is negative where no
+    Rayleigh damping meets both damping ratios.
     """
 
     name: str
@@ -147,17 +120,18 @@ class DampingReport:
         """Damping ratio of what consists of one material alone: half its loss factor."""
         return 0.5 * self.series(material).loss_factor(frequency)
 
+    def stiffening(self, material: MaterialDamping, frequency) -> np.ndarray:
+        """Storage modulus of a material over its slow one."""
+        return self.series(material).modulus(2j * np.pi * np.asarray(frequency, float)).real
+
     def rayleigh(self, frequency) -> np.ndarray:
         """Damping ratio by alpha and beta of the case."""
         return rayleigh_ratio(frequency, self.case.damping.alpha, self.case.damping.beta)
 
     def matches(self, at: tuple[float, float]) -> tuple[RayleighMatch, ...]:
         """Rayleigh's constants for each material at two frequencies, Hz."""
-        found = []
-        for material in self.materials:
-            ratios = tuple(float(x) for x in self.material_ratio(material, np.array(at)))
-            found.append(RayleighMatch(material.name, tuple(at), ratios, *rayleigh_constants(ratios, at)))
-        return tuple(found)
+        ratios = {m.name: tuple(float(x) for x in self.material_ratio(m, np.array(at))) for m in self.materials}
+        return tuple(RayleighMatch(name, tuple(at), own, *rayleigh_constants(own, at)) for name, own in ratios.items())
 
     def summary(self, at: tuple[float, float] | None = None) -> dict[str, Any]:
         """Plain numbers for JSON."""
@@ -188,8 +162,8 @@ class DampingReport:
             "note": material.note,
             "strengths": series.strengths,
             "times": series.times,
-            "damping_ratio": 0.5 * series.loss_factor(frequency),
-            "storage_over_slow": series.modulus(2j * np.pi * frequency).real,
+            "damping_ratio": self.material_ratio(material, frequency),
+            "storage_over_slow": self.stiffening(material, frequency),
         }
 
     def lines(self, at: tuple[float, float] | None = None) -> list[str]:
@@ -210,18 +184,15 @@ class DampingReport:
         return [*lines, "", *self._ratio_lines(), *(self._match_lines(at) if at is not None else [])]
 
     def _ratio_lines(self) -> list[str]:
-        frequency = self.table_frequencies
-        columns = {"Hz": [f"{f:g}" for f in frequency]}
-        if self.case.damping.alpha or not self.case.damping.relaxes:
-            columns["alpha, beta" if not self.case.damping.relaxes else "alpha"] = _shown(self.rayleigh(frequency))
-        stiff = {"Hz": columns["Hz"]}
-        for material in self.materials:
-            series = self.series(material)
-            columns[material.name] = _shown(0.5 * series.loss_factor(frequency))
-            stiff[material.name] = _shown(series.modulus(2j * np.pi * frequency).real)
-        lines = ["Damping ratio over frequency (half the loss factor of a material):", *_columns(columns)]
+        frequency, damping = self.table_frequencies, self.case.damping
+        own = {}
+        if damping.alpha or not damping.relaxes:
+            own["alpha" if damping.relaxes else "alpha, beta"] = self.rayleigh(frequency)
+        own |= {m.name: self.material_ratio(m, frequency) for m in self.materials}
+        lines = ["Damping ratio over frequency (half the loss factor of a material):", *_columns(frequency, own)]
         if self.materials:
-            lines += ["", "Storage modulus over the slow one:", *_columns(stiff)]
+            stiff = {m.name: self.stiffening(m, frequency) for m in self.materials}
+            lines += ["", "Storage modulus over the slow one:", *_columns(frequency, stiff)]
         return lines
 
     def _match_lines(self, at: tuple[float, float]) -> list[str]:
@@ -251,19 +222,10 @@ def describe_damping(case: Case) -> DampingReport:
 
 
 def outside_band(case: Case, frequencies: Iterable[float]) -> str | None:
-    """Warning where frequencies leave the band in which the loss factors of a case hold.
+    """Warning where frequencies, Hz, leave the band in which the loss factors of a case hold.
 
-    Parameters
-    ----------
-    case : Case
-    frequencies : iterable of float
-        Hz; zero (no oscillation) and non-finite values are left out.
-
-    Returns
-    -------
-    str or None
-        A sentence; None where all lie within, under Rayleigh damping, and where every material is a series given
-        outright.
+    Zero (no oscillation) and non-finite values are left out. None where all lie within, under Rayleigh damping, and
+    where every material is a series given outright.
     """
     names = {layer.material for layer in case.layers}
     cards = [case.materials.loss(name) for name in names]
@@ -310,12 +272,10 @@ def _fit_row(material: MaterialDamping) -> tuple[str, str, str, str]:
     return material.name, *errors, material.source
 
 
-def _shown(values: np.ndarray) -> list[str]:
-    return [f"{value:.4g}" for value in values]
-
-
-def _columns(columns: dict[str, list[str]]) -> list[str]:
-    return _table(tuple(columns), list(zip(*columns.values())))
+def _columns(frequency: np.ndarray, columns: dict[str, np.ndarray]) -> list[str]:
+    """Lines of a table over frequencies."""
+    shown = [[f"{value:.4g}" for value in values] for values in columns.values()]
+    return _table(("Hz", *columns), list(zip([f"{f:g}" for f in frequency], *shown)))
 
 
 def _table(titles: Sequence[str], rows: Sequence[Sequence[str]]) -> list[str]:

@@ -26,15 +26,8 @@ _SOFTEST, _STIFFEST = 1e-3, 0.5
 
 @dataclass(frozen=True)
 class StripTest:
-    """A strip of the ply pulled in one direction.
-
-    Attributes
-    ----------
-    direction : str
-        "warp", "weft" or "bias" (45 degrees).
-    test : TensionTest
-    across : numpy.ndarray, shape (n,), or None
-        Engineering strain across the strip.
+    """A strip of the ply pulled along "warp", "weft" or "bias" (45 degrees), with the engineering strain (n,) across it
+    where that was measured.
     """
 
     direction: str
@@ -178,18 +171,7 @@ def _matrix_poisson(nu12: float, fibre_poisson: float, fraction: float) -> float
 
 @dataclass(frozen=True)
 class PlyFit:
-    """A ply from its tests.
-
-    Attributes
-    ----------
-    tests : tuple of StripTest
-    constituents : Constituents
-        By Halpin-Tsai backwards.
-    ply : OrthotropicPly
-        Measured constants; those that were not measured from the constituents.
-    measured : tuple of str
-        Which of its constants were measured.
-    """
+    """A ply from its tests: constants measured, or else from the constituents by Halpin-Tsai backwards."""
 
     tests: tuple[StripTest, ...]
     constituents: Constituents

@@ -19,20 +19,8 @@ STABILISED = 0.02
 
 @dataclass(frozen=True)
 class FitReport:
-    """Fits to the same tests.
-
-    Attributes
-    ----------
-    tests : tuple of TensionTest
-        As they were fitted.
-    cycles : list of CycleReport
-    fits : list of RubberFit
-    refused : dict of str
-        Forms that could not be fitted, and why.
-    chosen : RubberFit
-        That told in full.
-    first : RubberFit or None
-        The same form fitted to the first loading, where there are several cycles and the last is the one fitted.
+    """Fits to the same tests: of every form, with those refused and why; the one told in full, and the same form
+    fitted to the first loading, where there are several cycles and the last is the one fitted.
     """
 
     tests: tuple[TensionTest, ...]
@@ -51,16 +39,10 @@ class FitReport:
 
     def lines(self, name: str, density: float) -> list[str]:
         """Lines of the report as text."""
-        return [
-            *self._of_tests(),
-            "",
-            *self._of_cycles(),
-            *self._of_forms(),
-            "",
-            *self._of_chosen(),
-            "",
-            *toml_table(self.chosen, name, density, self.loss_factor),
-        ]
+        tests = [f"{t.mode} {t.strain.min():.1%} to {t.strain.max():.1%} in {t.stress.size} points" for t in self.tests]
+        table = toml_table(self.chosen, name, density, self.loss_factor)
+        head = ["Tests: " + "; ".join(tests) + ".", ""]
+        return [*head, *self._of_cycles(), *self._of_forms(), "", *self._of_chosen(), "", *table]
 
     def summary(self, name: str, density: float) -> dict[str, Any]:
         """For programs; strains are fractions, stresses Pa."""
@@ -74,13 +56,6 @@ class FitReport:
             "first_loading": None if self.first is None else _summary(self.first),
             "toml": "\n".join(toml_table(self.chosen, name, density, self.loss_factor)),
         }
-
-    def _of_tests(self) -> list[str]:
-        rows = [
-            f"{test.mode} {test.strain.min():.1%} to {test.strain.max():.1%} in {test.stress.size} points"
-            for test in self.tests
-        ]
-        return ["Tests: " + "; ".join(rows) + "."]
 
     def _of_cycles(self) -> list[str]:
         if not self.cycles:
@@ -141,12 +116,8 @@ class FitReport:
                 f"{left[worst] / 1e6:.3g} MPa at {test.strain[worst]:.1%}"
             )
         span = fit.stable_range
-        for name, (low, high) in (
-            ("uniaxial", span.uniaxial),
-            ("planar", span.pure_shear),
-            ("biaxial", span.equibiaxial),
-        ):
-            rows.append(f"  stable in {name} stretch from {low:.4g} to {high:.4g}")
+        for name, ends in (("uniaxial", span.uniaxial), ("planar", span.pure_shear), ("biaxial", span.equibiaxial)):
+            rows.append("  stable in {} stretch from {:.4g} to {:.4g}".format(name, *ends))
         if span.equivalent_strain < fit.reach:
             rows.append(
                 "  Beware: these constants lose stability within the strains of the tests, in states that were not "
@@ -171,15 +142,9 @@ def describe_fits(
 ) -> FitReport:
     """Fit every form, and tell one in full.
 
-    Parameters
-    ----------
-    curves : list of TensionTest
-        Of `curves.read_tests`.
-    law, terms : optional
-        The form told in full; the softening rubber if not given and the tests suffice for it, else of those but Ogden's
-        that are stable as far as the tests reach the one of least residual.
-    constraint, stable_to, error, cycle
-        See `rubber.fit_rubber` and `curves.loading_tests`.
+    `law` and `terms` are the form told in full; the softening rubber if not given and the tests suffice for it, else of
+    those but Ogden's that are stable as far as the tests reach the one of least residual. For the other options see
+    `rubber.fit_rubber` and `curves.loading_tests`.
 
     Raises
     ------
@@ -240,12 +205,9 @@ def toml_table(fit: RubberFit, name: str, density: float, loss_factor: float | N
 def _constants(fit: RubberFit) -> str:
     names = [*fit.form.names, *fit.form.exponent_names]
     errors = fit.standard_errors
-    told = []
-    for i, name in enumerate(names):
-        if i < fit.constants.size:
-            told.append(f"{name} = {fit.constants[i] / 1e6:.6g} +- {errors[i] / 1e6:.2g} MPa")
-        else:
-            told.append(f"{name} = {fit.exponents[i - fit.constants.size]:.6g} +- {errors[i]:.2g}")
+    told = [f"{n} = {c / 1e6:.6g} +- {e / 1e6:.2g} MPa" for n, c, e in zip(names, fit.constants, errors)]
+    count = len(told)
+    told += [f"{n} = {c:.6g} +- {e:.2g}" for n, c, e in zip(names[count:], fit.exponents, errors[count:])]
     return ", ".join(told)
 
 

@@ -274,13 +274,6 @@ class RubberFit:
         return (Yeoh if self.form.name == "yeoh" else MooneyRivlin)(*three, density)
 
 
-def fit_mooney_rivlin(
-    test: TensionTest, terms: int = 3, constraint: str = "none", stable_to: float | None = None
-) -> RubberFit:
-    """Fit two or three constants to a tension test; see `fit_rubber`."""
-    return fit_rubber([test], form_of("mooney-rivlin", terms), constraint, stable_to)
-
-
 def fit_rubber(
     tests: Sequence[TensionTest],
     form: Form,

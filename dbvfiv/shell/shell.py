@@ -195,10 +195,6 @@ class Shell:
         assemble_mass(self.mesh.quads, self.inertia_integrals, d1, self.dofs.slots, data)
         return data
 
-    def convective_inertia(self, q: np.ndarray, rate: np.ndarray) -> np.ndarray:
-        """Inertia force (n,) quadratic in the velocities, from the turning of the directors."""
-        return self.inertia(q, rate, np.zeros(self.size))
-
     def inertia(self, q: np.ndarray, rate: np.ndarray, acceleration: np.ndarray) -> np.ndarray:
         """Inertia force (n,) at velocities and accelerations (n,): M(q) a and what is quadratic in the velocities."""
         nodal = self.dofs.expand(q)

@@ -221,33 +221,6 @@ def test_the_best_form_for_a_wall_is_told_and_its_table_can_be_pasted(treloar):
     assert report.first is None and not report.cycles
 
 
-HEAD = "test, stretch [-], nominal_stress [MPa]\n"
-
-
-@pytest.mark.parametrize(
-    "text, words",
-    [
-        (HEAD + "shear, 1.1, 2\n", "line 2: column test must hold one of uniaxial, planar, biaxial, but 'shear'"),
-        (HEAD + ", 1.1, 2\n", "column test.*''"),
-        ("cycle, " + HEAD + "0, planar, 1.1, 2\n", "column cycle must hold a whole number from 1, but '0'"),
-        ("cycle, " + HEAD + "1.5, planar, 1.1, 2\n", "whole number"),
-        ("cycle, " + HEAD + "x, planar, 1.1, 2\n", "whole number.*'x'"),
-        (HEAD + "planar, 1.1\n", "line 2: column nominal_stress must hold a finite number, but ''"),
-        (HEAD + "planar, 0, 1\n", "greater than -1"),
-        (HEAD + "planar, 1.1, 1\nplanar, 1.2, nan\n", "line 3.*'nan'"),
-        (HEAD, "no row of numbers"),
-        ("test, stretch, nominal_stress [MPa]\n", "no unit is given"),
-        ("test, stretch [-]\nplanar, 1.1\n", "nominal_stress"),
-    ],
-)
-def test_bad_tables_are_refused_with_the_place(tmp_path, text, words):
-    path = tmp_path / "bad.csv"
-    path.write_text(text)
-    with pytest.raises(MaterialError, match=words) as caught:
-        read_tests(path)
-    assert str(path) in str(caught.value) and "\n" not in str(caught.value)
-
-
 def test_bad_questions_are_refused(tmp_path, treloar):
     with pytest.raises(MaterialError, match="neo-hookean, softening, mooney-rivlin, yeoh, ogden, but 'gent'"):
         form_of("gent")
