@@ -6,6 +6,8 @@ import sys
 from collections.abc import Callable
 from typing import Any
 
+from .effects import with_effect
+
 
 class Observer:
     """Does nothing; override what is of interest. Any method may raise KeyboardInterrupt to stop a run between two
@@ -98,7 +100,7 @@ class Progress(Observer):
     def warn(self, sentence: str) -> None:
         if sentence not in self._warned:
             self._warned.add(sentence)
-            self._print(f"Warning: {sentence}", sys.stderr)
+            self._print(f"Warning: {with_effect(sentence)}", sys.stderr)
 
     def end(self, interrupted: bool) -> None:
         if self._bar is not None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 from pathlib import Path
 from typing import Annotated
 
@@ -24,54 +23,52 @@ def report(
             "--runs", metavar="DIR", help="Folder for the results that it rests on; beside the page without it."
         ),
     ] = None,
-    cells: Annotated[int, typer.Option("--cells", min=4, max=200, help="Values along each axis of the map.")] = 20,
-    workers: Annotated[int, typer.Option("--workers", min=1, max=1024, help="Processes that share the map.")] = 1,
+    pdf: Annotated[bool, typer.Option("--pdf", help="Also print it to a PDF beside the page.")] = False,
+    workers: Annotated[int, typer.Option("--workers", min=1, max=64, help="Processes that share the heads.")] = 1,
     without: Annotated[
         list[str] | None,
         typer.Option(
             "--without",
-            metavar="RUN",
-            help="Leave out steady, modes, classes, onset, map, cycle or closure; may be repeated.",
+            metavar="PART",
+            help="Leave out steady, heads, pipe, onset, law, mesh, levels, closure or cycle; may be repeated.",
         ),
     ] = None,
     overrides: Override = None,
     as_json: AsJson = False,
 ) -> None:
-    """One HTML page: how far the valve opens, whether it vibrates, whether it shuts, and how far to trust each answer.
+    """A report on one page: does the valve open, chatter, close and seal at its heads, and how sure is each answer?
 
-    dbvfiv report my.toml -o my.html
+    The heads are report.heads of the case, the back pressures go up to 1.5 times closure.rated_pressure.
+
+    dbvfiv report my.toml -o my.html --pdf
     """
-    from ..report import Runs, gather, write_page
-    from ..report.gather import RUNS
-    from ..report.page import answers
+    from ..report import gather, write_page, write_pdf
+    from ..report.answers import answers
+    from ..report.gather import PARTS
     from ..studies.case import load_case
 
     for name in without or ():
-        if name not in RUNS:
-            raise CaseError(f"--without is given as {name!r}, which is none of {', '.join(RUNS)}.")
+        if name not in PARTS:
+            raise CaseError(f"--without is given as {name!r}, which is none of {', '.join(PARTS)}.")
     case = load_case(case_file, overrides or ())
     name = case_file.stem if case_file else "dbv12"
     page = output or Path(f"{name}-report.html")
-
-    def observe(kind: str) -> Progress:
-        if not as_json:
-            print(f"{kind} ...", file=sys.stderr, flush=True)
-        return Progress(quiet=as_json)
-
-    wanted = Runs(cells=cells, workers=workers, leave_out=tuple(without or ()))
-    found = gather(case, name, runs or page.with_suffix(""), wanted, observe)
+    found = gather(case, name, runs or page.with_suffix(""), tuple(without or ()), workers, as_json)
     write_page(found, page)
+    written = [page, *([write_pdf(page, page.with_suffix(".pdf"))] if pdf else [])]
     answered = answers(found)
     if as_json:
-        said = [{"question": question, "sentences": sentences} for question, sentences in answered]
+        said = [one.summary() for one in answered]
         print_json({"page": str(page), "answers": said, "missing": found.missing})
     else:
-        for question, sentences in answered:
-            print("\n".join([question, *(f"  {line}" for line in sentences if line)]))
-        print(f"Page in {page}.")
-    failed = [f"no result of {kind}: {why}" for kind, why in found.missing.items() if kind not in found.not_asked]
+        for one in answered:
+            print(found.case.units.say(f"{one.question} {one.answer.capitalize()}. {one.text}"))
+            if one.margin:
+                print(f"  margin: {one.margin}")
+        print(f"{found.seconds:.0f} s of processor time. {' and '.join(map(str, written))} written.")
+    failed = found.failed
     if failed:
-        raise SolveError("; ".join(failed))
+        raise SolveError("; ".join(f"no result of {name}: {why.rstrip('.')}" for name, why in failed.items()) + ".")
 
 
 def reproduce(
@@ -111,7 +108,7 @@ def reproduce(
             failures.append(f"{entry.label}: {error}")
             continue
         parts.append(entry.part(outcome))
-        write_parts(page, "The thesis, figure by figure", workshop.setting, (), parts)
+        write_parts(page, "The thesis, figure by figure", workshop.setting, parts)
         numbers = [number.summary() for number in outcome.numbers]
         done.append({"name": entry.name, "title": entry.title, "numbers": numbers, "sentences": outcome.sentences})
         if not as_json:

@@ -99,7 +99,7 @@ def kilopascals(pressure: float) -> str:
 
 def driven(case: Case, pressure: float) -> str:
     """A pressure that drives the flow as it stands in titles, with the place where it is."""
-    return f"{kilopascals(pressure)} {case.pressure_at}"
+    return f"{case.units.pressure(pressure)} {case.pressure_at}"
 
 
 def pressure_name(case: Case) -> str:

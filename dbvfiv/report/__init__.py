@@ -1,10 +1,10 @@
-"""One page that a person reads: whether, where and how a valve vibrates, and how far to trust each answer.
+"""One page that a person reads: whether a valve opens, chatters, closes and seals, and how far to trust each answer.
 
-`gather` runs the studies, each into a file beside the page; `parts` turn their results into headings, sentences,
-tables and figures; `page` puts them into one HTML file that needs no network.
+`gather` runs the studies, each into a file beside the page; `answers` answers the four questions; `parts` turn results
+into headings, sentences, tables and figures; `page` puts them into one HTML file that needs no network.
 """
 
-from .gather import Gathered, Runs, gather
-from .page import write_page, write_parts
+from .gather import Gathered, gather
+from .page import write_page, write_parts, write_pdf
 
-__all__ = ["Gathered", "Runs", "gather", "write_page", "write_parts"]
+__all__ = ["Gathered", "gather", "write_page", "write_parts", "write_pdf"]

@@ -1,116 +1,254 @@
-"""The studies that a report rests on, each in a file of its own: a report made again computes nothing twice."""
+"""The studies that a report rests on, each in a file of its own: a report made again computes nothing twice.
+
+The valve is solved once at each head; its modes start from those states. A second mesh of half the elements each way,
+and two strain levels on it, say how sure the answers are.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import os
+import re
+import sys
+import time
+from collections.abc import Callable, Iterator
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from contextlib import suppress
 from dataclasses import dataclass, field
+from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
 
-from ..case.parameters import PARAMETERS, Mu
-from ..errors import CaseError, SolveError
-from ..observer import Observer
-from ..studies.case import Case
-from ..studies.closure.study import ClosureResult
-from ..studies.cycle.study import CycleResult
-from ..studies.map.study import MapResult
-from ..studies.modes.study import ModesResult
-from ..studies.onset.study import OnsetResult
-from ..studies.session import Session, kept_run
-from ..studies.steady.study import SteadyResult
+import numpy as np
 
-#: What runs for a report, in this order, and of which study it is.
-RUNS = {
-    "steady": "steady",
-    "modes": "modes",
-    "classes": "modes",
-    "onset": "onset",
-    "map": "map",
-    "cycle": "cycle",
-    "closure": "closure",
-}
+from ..case.parameters import Mu
+from ..effects import with_effect
+from ..errors import CaseError, SolveError
+from ..observer import Observer, is_watched
+from ..studies.case import Case
+from ..studies.session import Session, kept_run
+from ..studies.stability.place import why_it_moves
+
+#: What a report can leave out.
+PARTS = ("steady", "heads", "pipe", "onset", "law", "mesh", "levels", "closure", "cycle")
+#: Heads examined where none are asked for, over the largest pressure of the case: closer where the lips just open.
+_HEADS = (0.02, 0.05, 0.1, 0.2, 0.4, 0.7, 1.0)
+#: Back pressures examined, over the rated one.
+_BACK = (0.1, 0.5, 1.0, 1.5)
+#: Strain levels on both sides of those of the case, and lengths of the pipe over its own.
+_LEVELS, _LENGTHS = (0.10, 0.20), (0.2, 5.0, 6)
 
 
 @dataclass(frozen=True)
-class Runs:
-    """Amount of computation for a report.
+class Run:
+    """A study that is asked for.
 
     Attributes
     ----------
-    cells : int
-        Values along each axis of the stability map.
-    values : int
-        Values of the scan for onsets.
-    workers : int
-        Processes that share the columns of the map.
-    leave_out : tuple of str
-        Names among `RUNS` that are not wanted.
+    name : str
+        Of its file.
+    kind : str
+        Of the study.
+    label : str
+        For the bar.
+    changes : dict
+        Keys of the case.
+    share : float
+        Processor time it is expected to take, s on 28 x 48 elements.
     """
 
-    cells: int = 20
-    values: int = 24
-    workers: int = 1
-    leave_out: tuple[str, ...] = ()
+    name: str
+    kind: str
+    label: str
+    changes: dict[str, Any]
+    share: float
+
+    @property
+    def part(self) -> str:
+        """Part of the report it belongs to."""
+        return self.name.partition("-")[0]
 
 
 @dataclass
 class Gathered:
-    """Results of a case by the names of `RUNS`, and what is missing.
+    """Results of a case by the names of their runs, and what is missing.
 
     Attributes
     ----------
     case : Case
+        With settled strain levels.
     name : str
+    heads : tuple of float, Pa
+        Pressures at which the valve was examined.
     results : dict of StudyResult
     missing : dict of str
-        Those that gave no result, and why, in a sentence.
+        Runs that gave no result, and why, in a sentence.
     not_asked : set of str
         Those among them that were left out, or have nothing to say of this valve.
+    seconds : float
+        Processor time that it took.
     """
 
     case: Case
     name: str
+    heads: tuple[float, ...]
     results: dict[str, Any] = field(default_factory=dict)
     missing: dict[str, str] = field(default_factory=dict)
     not_asked: set[str] = field(default_factory=set)
+    seconds: float = 0.0
+
+    def get(self, name: str) -> Any:
+        """A result by the name of its run; None without one."""
+        return self.results.get(name)
+
+    def why(self, part: str) -> str:
+        """Why a part has no result, in a sentence."""
+        found = (text for name, text in self.missing.items() if name.partition("-")[0] == part)
+        return next(found, "It was not asked for.")
 
     @property
-    def steady(self) -> SteadyResult | None:
-        return self.results.get("steady")
+    def modes(self) -> dict[float, Any]:
+        """Modes by the pressure, Pa, of those heads at which they were found."""
+        named = {pressure: self.get(f"heads-{i}") for i, pressure in enumerate(self.heads, 1)}
+        return {pressure: result for pressure, result in named.items() if result is not None}
 
     @property
-    def modes(self) -> ModesResult | None:
-        return self.results.get("modes")
+    def pipes(self) -> dict[float, Any]:
+        """Sweeps over the length of the pipe by the pressure, Pa."""
+        return {r.case.drive.pressure: r for name, r in self.results.items() if name.startswith("pipe-")}
 
     @property
-    def classes(self) -> ModesResult | None:
-        """Modes in all classes of motion under the law of the case."""
-        return self.results.get("classes")
+    def worst(self) -> float | None:
+        """Pressure, Pa, at which the valve is nearest to chatter or beyond it."""
+        rates = {p: _nearness(result.verdict) for p, result in self.modes.items()}
+        return max(rates, key=rates.__getitem__) if rates else None
+
+    def state(self, pressure: float, name: str = "steady") -> Any:
+        """Steady state at a pressure, Pa; None where it was not found."""
+        states = self.get(name).states if self.get(name) is not None else ()
+        return next((s for s in states if np.isclose(s.pressure, pressure, rtol=1e-9)), None)
 
     @property
-    def onset(self) -> OnsetResult | None:
-        return self.results.get("onset")
+    def failed(self) -> dict[str, str]:
+        """Runs that were asked for and gave no result, and why."""
+        return {name: why for name, why in self.missing.items() if name not in self.not_asked}
 
-    @property
-    def map(self) -> MapResult | None:
-        return self.results.get("map")
 
-    @property
-    def cycle(self) -> CycleResult | None:
-        """Limit cycles from the onset to this state; there where the state is unstable."""
-        return self.results.get("cycle")
+def is_on_own_mesh(name: str) -> bool:
+    """True for a run on the mesh of the case, by its name."""
+    return name.partition("-")[0] not in ("mesh", "levels")
 
-    @property
-    def closure(self) -> ClosureResult | None:
-        return self.results.get("closure")
+
+def _nearness(verdict) -> float:
+    """How near a state is to chatter: negative least damping ratio."""
+    return -verdict.damping_ratio if np.isfinite(verdict.damping_ratio) else -np.inf
+
+
+def heads_of(case: Case) -> tuple[float, ...]:
+    """Pressures, Pa, that a report examines: those of report.heads, else shares of the largest one of the case."""
+    if case.report.heads:
+        return tuple(sorted(set(case.report.heads)))
+    rest = case.rest_pressure
+    given = case.steady.pressures if "pressures" in case.steady.model_fields_set else ()
+    top = max([case.drive.pressure, *given])
+    return tuple(float(f"{rest + share * (top - rest):.9g}") for share in _HEADS)
+
+
+def second_mesh(case: Case) -> dict[str, Any]:
+    """Keys of a mesh with half the elements each way."""
+    return {"mesh.around": max(4, round(case.mesh.around / 2)), "mesh.along": max(6, round(case.mesh.along / 2))}
+
+
+def planned(case: Case) -> Iterator[Run]:
+    """Runs that every report begins with."""
+    heads, flows = heads_of(case), case.drive.kind == "flow"
+    given = case.steady.pressures if "pressures" in case.steady.model_fields_set else ()
+    asked = {*heads, case.drive.pressure, *given}
+    yield Run("steady", "steady", "opening and flow", {"steady.pressures": sorted(asked - {case.rest_pressure})}, 12)
+    classes = {"modes.symmetry": "all", "modes.continuity": "case", "modes.in_vacuo": not flows}
+    for i, pressure in enumerate(heads, 1):
+        label = f"vibration at {case.units.pressure(pressure)}"
+        yield Run(f"heads-{i}", "modes", label, classes | {"drive.pressure": pressure}, 12)
+    yield Run("closure", "closure", "back pressure", closure_keys(case), 60)
+    coarse, top = second_mesh(case), heads[-1]
+    yield Run("mesh-steady", "steady", "second mesh", coarse | {"steady.pressures": sorted({*heads})}, 4)
+    yield Run("mesh-closure", "closure", "second mesh under back pressure", coarse | closure_keys(case), 12)
+    for level, keys in _other_levels(case).items():
+        keys = coarse | keys | {"steady.pressures": [top]}
+        yield Run(f"levels-steady-{level:g}", "steady", f"strain level {level:.0%}", keys, 2)
+
+
+def _other_levels(case: Case) -> dict[float, dict[str, Any]]:
+    """Keys of other strain levels for all rubbers that have levels; nothing without such rubbers."""
+    used = case.materials.levels({layer.material for layer in case.layers})
+    return {level: case.materials.at_levels(dict.fromkeys(used, level)) for level in _LEVELS} if used else {}
+
+
+def closure_keys(case: Case) -> dict[str, Any]:
+    """Back pressures up to 1.5 times the rated one; those of the case where none is rated. Nothing is followed beyond
+    the first limit.
+    """
+    rated = case.closure.rated_pressure
+    keys: dict[str, Any] = {"closure.arclength": False}
+    if rated is None:
+        return keys
+    step = max(case.closure.max_step, 1.5 * rated / 20)
+    given = set(case.closure.pressures) if "pressures" in case.closure.model_fields_set else set()
+    pressures = sorted({*given, *(float(f"{share * rated:.9g}") for share in _BACK[:2]), rated, _BACK[3] * rated})
+    return keys | {"closure.pressures": pressures, "closure.max_step": step}
+
+
+def following(found: Gathered) -> Iterator[Run]:
+    """Runs that depend on what the heads have shown."""
+    case, worst = found.case, found.worst
+    if worst is None or case.drive.kind != "flow":
+        return
+    classes = {"modes.symmetry": "all", "modes.continuity": "case", "drive.pressure": worst}
+    yield Run("mesh-modes", "modes", "vibration on the second mesh", second_mesh(case) | classes, 5)
+    for level, keys in _other_levels(case).items():
+        keys = second_mesh(case) | classes | keys
+        yield Run(f"levels-modes-{level:g}", "modes", f"vibration at a strain level of {level:.0%}", keys, 5)
+    if case.continuity:
+        other = "quasi-steady" if case.fluid.continuity == "storage" else "storage"
+        if not (other == "quasi-steady" and case.is_compressed):
+            keys = classes | {"modes.symmetry": "SS", "fluid.continuity": other}
+            yield Run("law", "modes", f"vibration with {other} flow", keys, 8)
+    if case.has_line and not case.upstream.pieces:
+        low, high, count = _LENGTHS
+        length = case.upstream.length
+        span = f"pipe_length={low * length:.6g}:{high * length:.6g}:{count}:log"
+        heads = [worst] if why_it_moves(case, "pipe_length") else sorted({found.heads[0], worst, found.heads[-1]})
+        for i, pressure in enumerate(heads, 1):
+            keys = {"drive.pressure": pressure, "sweep.over": span}
+            yield Run(f"pipe-{i}", "sweep", f"length of the pipe at {case.units.pressure(pressure)}", keys, 5)
+    changed = [
+        pair
+        for pair in zip(found.modes.items(), list(found.modes.items())[1:])
+        if pair[0][1].stable != pair[1][1].stable and None not in (pair[0][1].stable, pair[1][1].stable)
+    ]
+    if changed:
+        low, high = changed[0][0][0], changed[-1][1][0]
+        keys = {"onset.over": f"pressure={low:.9g}:{high:.9g}:{2 + len(changed)}", "onset.continuity": "case"}
+        yield Run("onset", "onset", "head at which chatter begins", keys | {"onset.symmetry": "all"}, 40)
+
+
+def cycle_run(found: Gathered) -> Iterator[Run]:
+    """A branch of limit cycles from the nearest onset to the state of the case, where it chatters beside one."""
+    onset, here = found.get("onset"), Mu.of(found.case)["pressure"]
+    nearest = min(found.modes, key=lambda p: abs(p - here), default=None)
+    if onset is None or nearest is None or found.modes[nearest].stable is not False:
+        return
+    beside = [p for p in onset.points if p["edge"] and (p["value"] < here) == p["gains"] and p["frequency"] > 0]
+    if not beside:
+        return
+    begins = min(beside, key=lambda point: abs(point["value"] - here))
+    low, high = sorted((here, begins["value"] + 0.1 * (begins["value"] - here)))
+    start = "first" if begins["gains"] else "last"
+    keys = {"cycle.over": f"pressure={max(low, 0.5 * here):.9g}:{high:.9g}:4", "cycle.start": start}
+    yield Run("cycle", "cycle", "limit cycle", keys, 200)
 
 
 def gather(
-    case: Case,
-    name: str,
-    folder: Path,
-    runs: Runs = Runs(),
-    observer: Callable[[str], Observer] = lambda _: Observer(),
+    case: Case, name: str, folder: Path, leave_out: tuple[str, ...] = (), workers: int = 1, quiet: bool = False
 ) -> Gathered:
     """Run the studies, or take them from the files of an earlier report of the same case.
 
@@ -121,9 +259,12 @@ def gather(
         For titles.
     folder : path
         Of the result files, NAME-RUN.h5.
-    runs : Runs
-    observer : callable
-        From the name of a run to who is told of its progress.
+    leave_out : tuple of str
+        Names among `PARTS` that are not wanted.
+    workers : int
+        Processes that share the runs.
+    quiet : bool
+        Show no bar.
 
     Raises
     ------
@@ -132,77 +273,190 @@ def gather(
     """
     session = Session(case, name)
     session.mesh  # a case that gives no model is told before anything runs
-    if case.seeks_levels:
-        session = session.settle(observer("strain levels"))
-        case = session.case
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise CaseError(f"The folder {str(folder)!r} cannot be written ({error.strerror or error}).") from error
-    found = Gathered(case, name)
-    for name_of_run, kind in RUNS.items():
-        if name_of_run in runs.leave_out:
-            found.missing[name_of_run] = "It was left out."
-            found.not_asked.add(name_of_run)
-            continue
-        changes = way_to_the_cycle(found) if name_of_run == "cycle" else changes_of(name_of_run, case, runs)
-        if changes is None:
-            found.missing[name_of_run] = (
-                "The steady state is not known to be unstable beside an onset, so none was sought."
-            )
-            found.not_asked.add(name_of_run)
-            continue
-        try:
-            asked = session.replace(changes)
-            choices = {"workers": runs.workers} if kind == "map" else {}
-            path = folder / f"{name}-{name_of_run}.h5"
-            found.results[name_of_run] = kept_run(kind, asked, path, observer(name_of_run), **choices)
-        except (CaseError, SolveError) as error:
-            found.missing[name_of_run] = str(error)
+    bar, started = Bar(case.units.say, quiet), _processor_time()
+    if case.meets_pump("modes"):
+        path = folder / f"{name}-operating-point.h5"
+        point = kept_run("steady", session, path, bar.of("operating point")).states[0].pressure
+        session = session.replace({"drive.pressure": point})
+    bar.expect([Run("settled", "levels", "strain levels", {}, 12), *planned(session.case)])
+    session = session.settle(bar.of("settled"))
+    bar.done("settled")
+    found = Gathered(session.case, name, heads_of(session.case))
+    found.missing = dict.fromkeys(leave_out, "It was left out.")
+    found.not_asked = set(leave_out)
+    studies = _Studies(found, session, folder, workers, bar)
+    for runs in (planned, following, cycle_run):
+        studies.make([run for run in runs(found.case if runs is planned else found) if run.part not in leave_out])
+    bar.close()
+    found.seconds = _processor_time() - started
     return found
 
 
-def changes_of(run: str, case: Case, runs: Runs) -> dict[str, Any]:
-    """Keys that a report sets for one of `RUNS`: both laws side by side, all classes, grids of its own size."""
-    both = {f"{run}.continuity": "both"}
-    if run == "steady":
-        asked = {*case.steady_pressures(), case.drive.pressure} - {case.rest_pressure}
-        return {"steady.pressures": sorted(asked)}
-    if run == "modes":
-        return {} if case.modes.in_vacuo else both | {"modes.symmetry": "SS"}
-    if run == "classes":
-        return {"modes.symmetry": "all", "modes.continuity": "case"}
-    if run == "onset":
-        axis = case.onset.axis
-        return both | {"onset.over": spelled(axis.parameter, axis, runs.values)}
-    if run == "map":
-        x, y = case.map.axes
-        return both | {
-            "map.x": spelled(x.parameter, x, runs.cells, around=case.drive.pressure),
-            "map.y": spelled(y.parameter, y, runs.cells, around=case.fluid.density),
-        }
-    return {}
+def _processor_time() -> float:
+    """Processor time of this process and those that it started and that have ended, s."""
+    return sum(os.times()[:4])
 
 
-def way_to_the_cycle(found: Gathered) -> dict[str, Any] | None:
-    """Keys of a branch of cycles from the nearest onset to the state of the case; None where no cycle is expected."""
-    if found.modes is None or found.modes.stable is not False or found.onset is None:
-        return None
-    parameter = found.onset.parameter
-    here = Mu.of(found.case)[parameter]
-    beside = [p for p in found.onset.points if p["edge"] and (p["value"] < here) == p["gains"] and p["frequency"] > 0]
-    if not beside:
-        return None
-    nearest = min(beside, key=lambda point: abs(point["value"] - here))
-    low, high = sorted((here, nearest["value"] + 0.1 * (nearest["value"] - here)))
-    start = "first" if nearest["gains"] else "last"
-    return {"cycle.over": f"{parameter}={max(low, 0.5 * here):.9g}:{high:.9g}:4", "cycle.start": start}
+@dataclass
+class _Studies:
+    """Runs of one report, from their files where these are there."""
+
+    found: Gathered
+    session: Session
+    folder: Path
+    workers: int
+    bar: Bar
+
+    def make(self, runs: list[Run]) -> None:
+        """Make runs; the steady states first, from which modes start, and the others by several processes."""
+        self.bar.expect(runs)
+        first = [run for run in runs if run.name == "steady"]
+        for run in first:
+            self._make(run)
+        rest = [run for run in runs if run not in first]
+        if self.workers > 1 and len(rest) > 1:
+            self._share(rest)
+        for run in rest:
+            self._make(run)
+
+    def _asked(self, run: Run) -> Session:
+        """Session of a run, with the steady state it starts from where that is known."""
+        asked = self.session.replace(run.changes)
+        if "mesh.around" not in run.changes and "drive.pressure" in run.changes:
+            state = self.found.state(run.changes["drive.pressure"])
+            asked.start = None if state is None else state.solution()
+        return asked
+
+    def _path(self, run: Run) -> Path:
+        return self.folder / f"{self.found.name}-{run.name}.h5"
+
+    def _make(self, run: Run) -> None:
+        try:
+            result = kept_run(run.kind, self._asked(run), self._path(run), self.bar.of(run.name))
+            self.found.results[run.name] = result
+        except (CaseError, SolveError) as error:
+            self.found.missing[run.name] = str(error)
+        self.bar.done(run.name)
+
+    def _share(self, runs: list[Run]) -> None:
+        """Let several processes fill the files of runs; what fails there is told when the run is made here."""
+        longest_first = sorted(runs, key=lambda run: -run.share)
+        with ProcessPoolExecutor(min(self.workers, len(runs)), get_context("spawn")) as pool:
+            try:
+                jobs = {}
+                for run in longest_first:
+                    with suppress(CaseError):
+                        jobs[pool.submit(_fill, run.kind, self._asked(run), self._path(run))] = run.name
+                for job in as_completed(jobs):
+                    self.bar.done(jobs[job])
+            except BaseException:
+                pool.shutdown(wait=False, cancel_futures=True)
+                raise
 
 
-def spelled(parameter: str, axis, count: int, around: float | None = None) -> str:
-    """An axis of a case with another number of values, widened until it holds a pressure or a density of interest."""
-    low, high = axis.values[0], axis.values[-1]
-    if around is not None and parameter in ("pressure", "density") and around > 0:
-        row = PARAMETERS[parameter]
-        low, high = min(low, 0.5 * around), max(high, min(1.5 * around, row.high))
-    return f"{parameter}={low:.9g}:{high:.9g}:{count}" + (":log" if axis.log else "")
+def _fill(kind: str, session: Session, path: Path) -> None:
+    """Make a run in a process of its own."""
+    with suppress(CaseError, SolveError):
+        kept_run(kind, session, path)
+
+
+class Bar:
+    """One bar over all runs, with the time that is left; lines where nobody watches a terminal.
+
+    Parameters
+    ----------
+    say : callable
+        Puts the numbers of a sentence into the units of choice.
+    quiet : bool
+        Show nothing but warnings.
+    """
+
+    def __init__(self, say: Callable[[str], str], quiet: bool = False):
+        self._say, self._quiet = say, quiet
+        self._runs: dict[str, Run] = {}
+        self._done: dict[str, float] = {}
+        self._warned: set[str] = set()
+        self._started, self._bar = time.monotonic(), None
+        if is_watched() and not quiet:
+            from tqdm import tqdm
+
+            form = "{desc}: {percentage:3.0f} % |{bar}| {postfix}"
+            self._bar = tqdm(total=1.0, bar_format=form, file=sys.stderr, leave=False, dynamic_ncols=True)
+
+    def expect(self, runs: list[Run]) -> None:
+        """Count further runs in."""
+        self._runs |= {run.name: run for run in runs}
+
+    def of(self, name: str) -> Observer:
+        """Observer of one run."""
+        if not self._quiet and self._bar is None and name in self._runs:
+            print(f"{self._runs[name].label} ... ({self.left()})", file=sys.stderr, flush=True)
+        self._show(name)
+        return _Part(self, name)
+
+    def move(self, name: str, share: float) -> None:
+        """Say how much of a run is done."""
+        self._done[name] = max(min(share, 0.95), self._done.get(name, 0.0))
+        self._show(name)
+
+    def done(self, name: str) -> None:
+        """Say that a run is done."""
+        self._done[name] = 1.0
+        self._show(name)
+
+    def left(self) -> str:
+        """Time that is left, in words, from what the part that is done has taken."""
+        part = self.part
+        if part < 0.02:
+            return "time left not known yet"
+        left = (time.monotonic() - self._started) * (1 - part) / part
+        return f"{left:.0f} s left" if left < 100 else f"{left / 60:.0f} min left"
+
+    @property
+    def part(self) -> float:
+        """Part of all runs that is done."""
+        whole = sum(run.share for run in self._runs.values())
+        return sum(self._done.get(name, 0.0) * run.share for name, run in self._runs.items()) / whole if whole else 0.0
+
+    def _show(self, name: str) -> None:
+        if self._bar is not None:
+            label = self._runs[name].label if name in self._runs else name
+            self._bar.n = self.part
+            self._bar.set_description_str(label, refresh=False)
+            self._bar.set_postfix_str(self.left())
+
+    def warn(self, sentence: str) -> None:
+        """Print a warning, once a report."""
+        kind = re.sub(r"[\d.]+", "#", sentence)  # the same at another head is the same warning
+        if kind not in self._warned:
+            self._warned.add(kind)
+            if self._bar is not None:
+                self._bar.clear()
+            print(f"Warning: {self._say(with_effect(sentence))}", file=sys.stderr, flush=True)
+
+    def close(self) -> None:
+        """Take the bar away."""
+        if self._bar is not None:
+            self._bar.close()
+
+
+class _Part(Observer):
+    """Observer of one run of a report."""
+
+    def __init__(self, bar: Bar, name: str):
+        self._bar, self._name, self._total, self._items = bar, name, None, 0
+
+    def begin(self, study: str, total: int | None) -> None:
+        self._total, self._items = self._total or total, self._items
+
+    def item(self, result: object) -> None:
+        self._items += 1
+        self._bar.move(self._name, self._items / (self._total or 4))
+
+    def warn(self, sentence: str) -> None:
+        if is_on_own_mesh(self._name):
+            self._bar.warn(sentence)

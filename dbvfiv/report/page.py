@@ -1,11 +1,14 @@
-"""One HTML file that needs no network."""
+"""One HTML file that needs no network, and the same as a PDF."""
 
 from __future__ import annotations
 
+import shutil
+import subprocess
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from datetime import datetime
 from importlib.resources import files
+from importlib.util import find_spec
 from pathlib import Path
 
 from jinja2 import Environment, StrictUndefined
@@ -15,9 +18,33 @@ from ..case.write import case_toml
 from ..errors import CaseError
 from ..studies.stability.place import describe_fixed
 from . import live
-from .content import Part
+from .answers import UNKNOWN, Answer, answers, trade
+from .content import Part, Picture
 from .gather import Gathered
-from .parts import PARTS, cycles, onsets, opening, shutting, stability
+from .parts import MAKERS, first_pictures
+
+
+@dataclass(frozen=True)
+class First:
+    """Content of the first page.
+
+    Attributes
+    ----------
+    sheet : tuple of (str, str)
+        Project, customer, tag and the like.
+    answers : tuple of Answer
+    trade : tuple of (str, str)
+        Names and numbers that a buyer asks for.
+    open : tuple of str
+        Questions without an answer and studies that failed, each with its reason.
+    pictures : tuple of Picture
+    """
+
+    sheet: tuple[tuple[str, str], ...]
+    answers: tuple[Answer, ...]
+    trade: tuple[tuple[str, str], ...]
+    open: tuple[str, ...]
+    pictures: tuple[Picture, ...]
 
 
 def write_page(found: Gathered, path: Path) -> Path:
@@ -28,17 +55,13 @@ def write_page(found: Gathered, path: Path) -> Path:
     CaseError
         If the file cannot be written.
     """
-    parts = _told_once([part for part in (make(found) for make in PARTS) if part is not None])
-    return write_parts(path, found.name, setting(found), answers(found), parts, case_toml(found.case))
+    first = First(sheet(found), tuple(answers(found)), tuple(trade(found)), unanswered(found), first_pictures(found))
+    parts = _told_once([part for part in (make(found) for make in MAKERS) if part is not None])
+    return write_parts(path, found.name, setting(found), parts, case_toml(found.case), first)
 
 
 def write_parts(
-    path: Path,
-    title: str,
-    setting: str,
-    answers: Sequence[tuple[str, Sequence[str]]],
-    parts: Sequence[Part],
-    case: str = "",
+    path: Path, title: str, setting: str, parts: Sequence[Part], case: str = "", first: First | None = None
 ) -> Path:
     """Write a page of parts.
 
@@ -47,11 +70,11 @@ def write_parts(
     path : path
     title, setting : str
         Its heading, and what it is about, in a line.
-    answers : sequence of (str, sequence of str)
-        Questions and the sentences that answer them, which stand on top.
     parts : sequence of Part
     case : str
         Text of a case file that stands at the end.
+    first : First, optional
+        The first page.
 
     Raises
     ------
@@ -60,14 +83,15 @@ def write_parts(
     """
     environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
     template = environment.from_string(files(__package__).joinpath("page.html").read_text(encoding="utf-8"))
+    pictures = [*(first.pictures if first else ()), *(picture for part in parts for picture in part.pictures)]
     text = template.render(
         name=title,
         setting=setting,
-        answers=answers,
+        first=first,
         parts=parts,
-        figures=_numbers(parts),
+        figures={picture.name: number for number, picture in enumerate(pictures, start=1)},
         case=case,
-        library=live.library() if any(picture.live for part in parts for picture in part.pictures) else "",
+        library=live.library() if any(picture.live for picture in pictures) else "",
         version=__version__,
     )
     try:
@@ -78,26 +102,29 @@ def write_parts(
     return path
 
 
-def answers(found: Gathered) -> list[tuple[str, tuple[str, ...]]]:
-    """The questions a reader comes with, each with its sentences."""
-    asked = (
-        ("How far does it open, what flows?", opening(found)),
-        ("Does it vibrate?", stability(found)),
-        ("Where does that begin?", onsets(found)),
-        ("What does it grow into?", cycles(found)),
-        ("Does it shut?", shutting(found)),
-    )
-    return [(question, told) for question, told in asked if any(told)]
+def sheet(found: Gathered) -> tuple[tuple[str, str], ...]:
+    """Project, customer, tag, revision, author and date, those that are given; the date of today else."""
+    project = found.case.project
+    names = ("project", "customer", "tag", "revision", "author")
+    given = [(name, getattr(project, name)) for name in names if getattr(project, name)]
+    return (*given, ("date", project.date or f"{datetime.now().astimezone():%Y-%m-%d}"))
+
+
+def unanswered(found: Gathered) -> tuple[str, ...]:
+    """Questions without an answer and studies that failed, each with its reason."""
+    say = found.case.units.say
+    questions = [f"{a.question} {say(a.text)}" for a in answers(found) if a.answer == UNKNOWN]
+    return (*questions, *(f"The study {name} failed: {say(why)}" for name, why in found.failed.items()))
 
 
 def setting(found: Gathered) -> str:
     """Conditions that the report's answers hold for, in a line."""
     case, mesh = found.case, found.case.mesh
     words = [
-        describe_fixed(case),
+        describe_fixed(case, "pressure"),
         f"{mesh.around * case.part.quarters} x {mesh.along} elements on a {case.part.name} of the valve",
     ]
-    return f"At {', '.join(words)}. Made {datetime.now().astimezone():%Y-%m-%d %H:%M}."
+    return f"At {', '.join(words)}."
 
 
 def _told_once(parts: list[Part]) -> list[Part]:
@@ -110,7 +137,32 @@ def _told_once(parts: list[Part]) -> list[Part]:
     return kept
 
 
-def _numbers(parts: Sequence[Part]) -> dict[str, int]:
-    """Numbers of the figures by their names."""
-    names = [picture.name for part in parts for picture in part.pictures]
-    return {name: number for number, name in enumerate(names, start=1)}
+#: Browsers that print, by the names they have on Debian and elsewhere.
+_BROWSERS = ("chromium", "chromium-browser", "google-chrome", "chrome")
+
+
+def write_pdf(page: Path, path: Path) -> Path:
+    """Print a page on A4.
+
+    Raises
+    ------
+    CaseError
+        If neither a browser nor WeasyPrint is there, or neither wrote the file.
+    """
+    browser = next(filter(None, map(shutil.which, _BROWSERS)), None)
+    if browser is not None:
+        options = ("--headless", "--no-sandbox", "--disable-gpu", "--no-pdf-header-footer", f"--print-to-pdf={path}")
+        subprocess.run([browser, *options, page.absolute().as_uri()], capture_output=True, timeout=300, check=False)
+    elif find_spec("weasyprint") is not None:
+        from weasyprint import HTML  # optional
+
+        HTML(str(page)).write_pdf(str(path))
+    else:
+        raise CaseError(
+            f"{str(path)!r} needs the browser chromium (apt-get install chromium) or the package weasyprint "
+            f"(pip install dbvfiv[report]), and neither is there; the page is in {str(page)!r} and prints from any "
+            "browser."
+        )
+    if not path.is_file():
+        raise CaseError(f"{str(path)!r} was not written: {browser or 'weasyprint'} gave no file.")
+    return path

@@ -42,7 +42,11 @@ class _CaseOfStudies(PhysicsCase):
         """Largest pressures, Pa, that the case names: as drive.pressure, None for the operating point of a pump alone,
         and of the closed valve, None where no key says one.
         """
-        opening = None if self.meets_pump("steady") else max(self.drive.pressure, *self.steady_pressures())
+        opening = (
+            None
+            if self.meets_pump("steady")
+            else max(self.drive.pressure, *self.steady_pressures(), *self.report.heads)
+        )
         closed = {"rated_pressure", "pressures"} & self.closure.model_fields_set
         return opening, (self.closure.rated_pressure or max(self.closure.pressures)) if closed else None
 

@@ -300,7 +300,8 @@ def kept_run(kind: str, session: Session, path: Path, observer: Observer | None 
     """
     session = session.settle(observer)
     kept = _load_if_readable(path)
-    if kept is not None and kept.kind == kind and kept.case == session.case:
+    sheet = {name: getattr(session.case, name) for name in ("project", "report")}  # these compute nothing
+    if kept is not None and kept.kind == kind and kept.case.model_copy(update=sheet) == session.case:
         if kept.complete or kept.failures:
             return kept
         result = resume_result(path, observer, **choices)

@@ -1,0 +1,328 @@
+"""Answers on the first page: opens, chatters, closes, seals; each with its margin and how sure it is.
+
+An answer is "yes" or "no" where every head of the case was examined and every verdict is certain, and "not examined"
+with a reason anywhere else.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+
+from ..materials.shipped import shipped_loss, shipped_loss_names
+from ..studies.closure.safety import rated_verdict
+from .gather import Gathered, second_mesh
+
+YES, NO, UNKNOWN = "yes", "no", "not examined"
+#: Flow of the law over that in three dimensions, on the 12-inch valve; docs/three-dimensions.md.
+_FLOW = "flow 6 % high against three dimensions (12-inch valve)"
+
+
+@dataclass(frozen=True)
+class Answer:
+    """Answer to one question.
+
+    Attributes
+    ----------
+    question : str
+    answer : str
+        "yes", "no" or "not examined".
+    text : str
+        What was found, or why nothing was.
+    margin : str
+    uncertainty : tuple of str
+    """
+
+    question: str
+    answer: str
+    text: str
+    margin: str = ""
+    uncertainty: tuple[str, ...] = ()
+
+    def summary(self) -> dict[str, Any]:
+        """Plain data for JSON."""
+        return asdict(self)
+
+
+def answers(found: Gathered) -> list[Answer]:
+    """The four questions of page one."""
+    return [opens(found), chatters(found), closes(found), seals(found)]
+
+
+def span(found: Gathered) -> str:
+    """Heads that were examined, "0.05 m to 1 m"."""
+    return f"{found.case.units.pressure(found.heads[0], 3)} to {found.case.units.pressure(found.heads[-1], 3)}"
+
+
+def opens(found: Gathered) -> Answer:
+    """Answer on opening: cracked within the heads of the case."""
+    question, steady, units = f"Does it open from {span(found)}?", found.get("steady"), found.case.units
+    top = found.heads[-1]
+    state = found.state(top)
+    if state is None or found.case.drive.kind != "flow":
+        why = found.why("steady") if found.case.drive.kind == "flow" else "No fluid flows: drive.kind is 'uniform'."
+        return Answer(question, UNKNOWN, why if steady is None or not steady.failures else steady.failures[0])
+    crack = steady.cracking
+    if crack is None or crack.pressure is None:
+        return Answer(question, NO, f"The lips do not crack up to {units.pressure(top)}.")
+    text = (
+        f"Cracks at {units.pressure(crack.pressure, 3)}; at {units.pressure(top)} the opening is "
+        f"{units.text_of('size', state.lip_opening, 3)}, {units.text_of('flow', state.volume_flow, 3)} flow with a jet "
+        f"of {units.text_of('velocity', state.outlet_velocity, 3)} and a head loss of "
+        f"{units.text_of('head', state.hydraulics.head_loss, 3)}."
+    )
+    ratio = (top - found.case.rest_pressure) / crack.pressure if crack.pressure > 0 else np.inf
+    margin = f"{ratio:.3g} times the cracking head" if np.isfinite(ratio) else "open at rest by its weight"
+    return Answer(question, YES, text, margin, (*_mesh_of_flow(found, state), *_levels_of_flow(found), _FLOW))
+
+
+def _mesh_of_flow(found: Gathered, state) -> Iterable[str]:
+    other = found.state(state.pressure, "mesh-steady")
+    if other is None:
+        return (_not_there(found, "mesh", "mesh"),)
+    return (
+        f"second mesh ({_mesh(found)}): opening {_apart(other.lip_opening, state.lip_opening)}, flow "
+        f"{_apart(other.volume_flow, state.volume_flow)}",
+    )
+
+
+def _levels_of_flow(found: Gathered) -> Iterable[str]:
+    top = found.heads[-1]
+    base, levels = found.state(top, "mesh-steady"), _by_level(found, "steady")
+    states = {level: found.state(top, f"levels-steady-{level}") for level in levels}
+    if base is None or not levels or None in states.values():
+        return ()
+    said = ", ".join(f"{float(x):.0%}: {_apart(s.volume_flow, base.volume_flow)}" for x, s in states.items())
+    return (f"flow with rubber of another strain level, {said}",)
+
+
+def chatters(found: Gathered) -> Answer:
+    """Answer on chatter: verdicts of the modes study at every head."""
+    question, units, modes = f"Does it chatter from {span(found)}?", found.case.units, found.modes
+    verdicts = {p: result.verdict for p, result in modes.items()}
+    bad = [p for p, verdict in verdicts.items() if verdict.stable is False]
+    unknown = [p for p in found.heads if p not in verdicts or verdicts[p].stable is None]
+    if found.case.drive.kind != "flow":
+        return Answer(question, UNKNOWN, "No fluid flows: drive.kind is 'uniform'.")
+    if bad:
+        worst = verdicts[max(bad, key=lambda p: verdicts[p].growth_rate)]
+        kind = "flutters" if worst.outcome == "flutters" else "diverges, without oscillating,"
+        text = f"It {kind} at {listed(units.pressure(p, 3) for p in bad)}"
+        text += f", at {worst.frequency:.3g} Hz at most" if worst.frequency else ""
+        return Answer(question, YES, f"{text}. {_onsets(found)}".strip(), _factor(verdicts), _sure(found, verdicts))
+    if unknown:
+        p = unknown[0]
+        why = verdicts[p].reason if p in verdicts else _missing_head(found, p)
+        at = listed(units.pressure(p, 3) for p in unknown)
+        return Answer(question, UNKNOWN, f"No certain verdict at {at}: {why}", _factor(verdicts))
+    least = min(verdicts.values(), key=lambda v: v.damping_ratio)
+    text = (
+        f"Stable at all {len(verdicts)} heads in every class of motion; the least damped mode has a damping ratio of "
+        f"{100 * least.damping_ratio:.2g} %, at {units.pressure(found.worst, 3)}."
+    )
+    return Answer(question, NO, text, _factor(verdicts), _sure(found, verdicts))
+
+
+def _missing_head(found: Gathered, pressure: float) -> str:
+    return found.missing.get(f"heads-{found.heads.index(pressure) + 1}", "It was not examined.")
+
+
+def _onsets(found: Gathered) -> str:
+    onset = found.get("onset")
+    if onset is None or not onset.points:
+        return "" if "onset" not in found.missing else f"Where it begins is not examined: {found.missing['onset']}"
+    units, said = found.case.units, []
+    for point in (p for p in onset.points if p["edge"]):
+        sure = "" if not point["uncertainty"] else f" ± {units.pressure(point['uncertainty'], 1)} (second mesh)"
+        word = "begins" if point["gains"] else "ends"
+        said.append(f"{word} at {units.pressure(point['value'], 3)}{sure}, {point['frequency']:.3g} Hz")
+    return f"Chatter {listed(said)}." if said else ""
+
+
+def _factor(verdicts: dict) -> str:
+    """Margin in damping: the factor on the damping of the wall at which the verdict changes, at the worst head."""
+    factors = [v.critical_damping_factor for v in verdicts.values() if np.isfinite(v.critical_damping_factor)]
+    if any(v.stable is False for v in verdicts.values()):
+        return f"quiet with {max(factors):.2g} times the damping" if factors else "no damping in reach quiets it"
+    return (
+        f"chatter begins at {max(factors):.2g} times the damping"
+        if factors
+        else "lips stable down to 0.05 times the damping"
+    )
+
+
+def _sure(found: Gathered, verdicts: dict) -> tuple[str, ...]:
+    """How sure the verdict is: second mesh, range of the loss factors, strain levels."""
+    said, worst = [], found.worst
+    own = verdicts[worst]
+    other = found.get("mesh-modes")
+    if other is None:
+        said.append(_not_there(found, "mesh", "mesh"))
+    else:
+        ratios = f"damping ratio {100 * other.verdict.damping_ratio:.2g} against {100 * own.damping_ratio:.2g} %"
+        said.append(f"second mesh ({_mesh(found)}): {_verdict(other.verdict)}, {ratios}")
+    spread = loss_range(found.case)
+    factors = [v.critical_damping_factor for v in verdicts.values() if np.isfinite(v.critical_damping_factor)]
+    if spread is not None:
+        low, high = spread
+        holds = not any(low <= factor <= high for factor in factors)
+        word = "holds" if holds else "does not hold"
+        said.append(f"over the range of the loss factors, {low:.2g} to {high:.2g} times: the verdict {word}")
+    for level in _by_level(found, "modes"):
+        said.append(f"strain level {float(level):.0%}: {_verdict(found.get(f'levels-modes-{level}').verdict)}")
+    return tuple(said)
+
+
+def loss_range(case) -> tuple[float, float] | None:
+    """Ends of the range of the shipped loss factors over those of the case; None where it has none of them."""
+    if not case.damping.relaxes:
+        return None
+    known = [shipped_loss(layer.material) for layer in case.layers if layer.material in shipped_loss_names()]
+    rubbers = [one for one in known if one.value]
+    if not rubbers:
+        return None
+    return min(one.range[0] / one.value for one in rubbers), max(one.range[1] / one.value for one in rubbers)
+
+
+def closes(found: Gathered) -> Answer:
+    """Answer on closing: shut at every back pressure examined that is not beyond a limit."""
+    result, question, units = found.get("closure"), "Does it close under back pressure?", found.case.units
+    if result is None or not result.states:
+        return Answer(question, UNKNOWN, found.why("closure") if result is None else _first(result.failures))
+    rated = found.case.closure.rated_pressure or max(s.pressure for s in result.states)
+    states = [s for s in result.states if not s.beyond_limit and s.pressure <= rated * (1 + 1e-9)]
+    if not states:
+        return Answer(question, UNKNOWN, _first(result.failures))
+    shut = [s.pressure for s in states if s.closed]
+    text = f"Shut at {units.pressure(shut[0], 3)}" if shut else f"Open up to {units.pressure(states[-1].pressure, 3)}"
+    text += f" and at {len(shut) - 1} more back pressures up to {units.pressure(shut[-1], 3)}" if len(shut) > 1 else ""
+    answer = YES if shut and states[-1].closed else NO
+    return Answer(question, answer, text + ".", _margin(result, units), _closure_mesh(found))
+
+
+def seals(found: Gathered) -> Answer:
+    """Answer on sealing at the rated back pressure: no gap left."""
+    case, result = found.case, found.get("closure")
+    rated = case.closure.rated_pressure
+    if rated is None:
+        return Answer("Does it seal?", UNKNOWN, "No rated back pressure is given: closure.rated_pressure.")
+    question = f"Does it seal at its rated {case.units.pressure(rated, 3)}?"
+    told = None if result is None else rated_verdict(result)
+    beyond = None if result is None else _limit_below(result, rated)
+    if beyond is not None:
+        at = case.units.pressure(beyond, 3)
+        text = f"The wall collapses at {at}, below the rated back pressure."
+        return Answer(question, NO, text, _margin(result, case.units), _closure_mesh(found))
+    if told is None or told["sealed"] is None:
+        why = (
+            found.why("closure") if result is None else result.walk_failure or "The lips are held shut by the supports."
+        )
+        return Answer(question, UNKNOWN, why)
+    still = " at most, as fluid.viscosity is none" if told["leak"] and not case.fluid.dynamic_viscosity else ""
+    text = f"{_seal(told).capitalize()}, leak {told['leak'] * 3.6e6:.3g} L/h{still}."
+    if told["buckles_at"] is not None:
+        text += f" It buckles at {case.units.pressure(told['buckles_at'], 3)}."
+    return Answer(question, YES if told["sealed"] else NO, text, _margin(result, case.units), _closure_mesh(found))
+
+
+#: Part of the stiffness at the start below which a path that ends has come to its limit point.
+_SPENT = 0.1
+
+
+def _limit_below(result, rated: float) -> float | None:
+    """Back pressure, Pa, below the rated one at which the wall buckles, or its path ends with its stiffness spent."""
+    buckles = result.critical_pressure
+    if buckles is not None and buckles < rated:
+        return buckles
+    walked = [point for point in result.walk if np.isfinite(point.lowest_eigenvalue)]
+    if result.walk_failure is None or not walked or walked[-1].pressure >= rated:
+        return None
+    spent = walked[-1].lowest_eigenvalue < _SPENT * walked[0].lowest_eigenvalue
+    return walked[-1].pressure if spent else None
+
+
+def _seal(told: dict[str, Any]) -> str:
+    return "sealed" if told["sealed"] else "shut" if told["shut"] else "open"
+
+
+def _margin(result, units) -> str:
+    safety = result.safety
+    if safety is None:
+        return ""
+    least = "at least " if safety.at_least else ""
+    limit = "" if safety.at_least else f", then {safety.limit}"
+    return f"{least}{safety.factor:.2f} times {units.pressure(safety.rated_pressure, 3)}{limit}"
+
+
+def _closure_mesh(found: Gathered) -> tuple[str, ...]:
+    other, rated = found.get("mesh-closure"), found.case.closure.rated_pressure
+    if other is None or other.safety is None:
+        return (_not_there(found, "mesh", "mesh"),)
+    told = rated_verdict(other)
+    seal = "not examined there, " if rated is not None else ""
+    if told is not None and told["sealed"] is not None:
+        seal = f"{_seal(told)}, leak {told['leak'] * 3.6e6:.2g} L/h, "
+    return (f"second mesh ({_mesh(found)}): {seal}{_margin(other, found.case.units)}",)
+
+
+def trade(found: Gathered) -> list[tuple[str, str]]:
+    """Names and numbers that a buyer asks for, at the largest head."""
+    units, case, rows = found.case.units, found.case, []
+    state, steady = found.state(found.heads[-1]), found.get("steady")
+    if found.results:
+        mesh = next(iter(found.results.values())).mesh
+        width, height = (units.text_of("size", mesh.extent(0, axis), 4) for axis in (0, 1))
+        rows += [("bill, width x height at the lip", f"{width} x {height}")]
+    bore = 2 * (case.valve.inlet_radius - case.valve.flange_wall_deduction)
+    rows += [("bore", units.text_of("size", bore, 4))]
+    if steady is not None and steady.cracking is not None and steady.cracking.pressure is not None:
+        rows += [("cracking head", units.pressure(steady.cracking.pressure, 3))]
+    if state is not None and state.hydraulics is not None:
+        at = f"at {units.pressure(state.pressure, 3)}"
+        rows += [
+            (f"opening {at}", units.text_of("size", state.lip_opening, 3)),
+            (f"flow {at}", units.text_of("flow", state.volume_flow, 3)),
+            (f"head loss {at}", units.text_of("head", state.hydraulics.head_loss, 3)),
+            (f"jet velocity {at}", units.text_of("velocity", state.outlet_velocity, 3)),
+        ]
+    if case.closure.rated_pressure is not None:
+        rows += [("rated back pressure", units.pressure(case.closure.rated_pressure, 4))]
+        told = None if found.get("closure") is None else rated_verdict(found.get("closure"))
+        leak = "not examined" if told is None or told["leak"] is None else f"{told['leak'] * 3.6e6:.3g} L/h"
+        rows += [("leak rate there", leak)]
+    return rows
+
+
+def listed(words: Iterable[str]) -> str:
+    """Words of a sentence, "a, b and c"."""
+    found = list(words)
+    return f"{', '.join(found[:-1])} and {found[-1]}" if len(found) > 1 else "".join(found)
+
+
+def _verdict(verdict) -> str:
+    return {"flutters": "chatters", "diverges": "diverges", "stable": "stable"}.get(verdict.outcome, verdict.outcome)
+
+
+def _apart(value: float, base: float) -> str:
+    return f"{100 * (value / base - 1):+.2g} %" if base else "not known"
+
+
+def _mesh(found: Gathered) -> str:
+    mesh = second_mesh(found.case)
+    return f"{mesh['mesh.around']} x {mesh['mesh.along']}"
+
+
+def _not_there(found: Gathered, part: str, word: str) -> str:
+    return f"{word}: not examined ({found.why(part)})"
+
+
+def _by_level(found: Gathered, kind: str) -> list[str]:
+    prefix = f"levels-{kind}-"
+    return [name.removeprefix(prefix) for name in found.results if name.startswith(prefix)]
+
+
+def _first(failures) -> str:
+    return failures[0] if failures else "Nothing was found."

@@ -1,0 +1,90 @@
+"""Figures of a report, in the units of its case: head loss and opening over flow, vibration over head and pipe."""
+
+from __future__ import annotations
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from ..drawing.style import COMPUTED, DANGER, PUBLISHED, STABLE, UNSTABLE, new_figure
+from .answers import loss_range
+from .gather import Gathered
+
+
+def headloss_figure(found: Gathered) -> Figure:
+    """Head loss and opening over the flow."""
+    units = found.case.units
+    states = [s for s in sorted(found.get("steady").states, key=lambda s: s.pressure) if s.hydraulics is not None]
+    flow = [s.volume_flow / units.factor("flow") for s in states]
+    figure = new_figure(8.4, 3.1)
+    loss, opening = figure.subplots(1, 2)
+    loss.plot(flow, [s.hydraulics.head_loss / units.factor("head") for s in states], "o-", color=COMPUTED)
+    opening.plot(flow, [s.lip_opening / units.factor("size") for s in states], "o-", color=COMPUTED)
+    for axes, name, quantity in ((loss, "Head loss", "head"), (opening, "Opening", "size")):
+        axes.set_xlabel(f"Flow, {units.name('flow')}")
+        axes.set_ylabel(f"{name}, {units.name(quantity)}")
+        axes.set_xlim(left=0)
+        axes.set_ylim(bottom=0)
+    return figure
+
+
+def vibration_figure(found: Gathered) -> Figure:
+    """Least damping ratio over the head, and the factor on the damping of the wall at which chatter begins."""
+    row, verdicts = found.case.units.parameter("pressure"), {p: r.verdict for p, r in found.modes.items()}
+    head = np.array(list(verdicts)) / row.scale
+    figure = new_figure(8.4, 3.3)
+    ratio, factor = figure.subplots(1, 2)
+    damping = np.array([100 * v.damping_ratio for v in verdicts.values()])
+    ratio.plot(head, damping, "-", color=COMPUTED, lw=1.2)
+    for at, value, verdict in zip(head, damping, verdicts.values()):
+        look = {True: ("o", STABLE), False: ("X", UNSTABLE)}.get(verdict.stable, ("s", "0.6"))
+        ratio.plot(at, value, look[0], color=look[1], ms=8 if verdict.stable is False else 6)
+    ratio.axhspan(min(0.0, np.nanmin(damping, initial=0.0)) - 0.5, 0.0, color=DANGER, lw=0)
+    ratio.set_ylabel("Damping ratio of the least damped mode, %")
+    _factors(found, factor, head, [v.critical_damping_factor for v in verdicts.values()])
+    for axes in (ratio, factor):
+        axes.set_xlabel(f"Head, {row.shown_unit}" if found.case.units.heads else f"Inlet pressure, {row.shown_unit}")
+        axes.set_xlim(left=0)
+    return figure
+
+
+def _factors(found: Gathered, axes, head, factors) -> None:
+    """Neutral curve over head and damping; without one the lowest factor that was looked at."""
+    at = np.array(factors)
+    known = np.isfinite(at)
+    low, high = 0.05, 2.0
+    if known.any():
+        axes.fill_between(head[known], low, at[known], color=DANGER, lw=0)
+        axes.plot(head[known], at[known], "o-", color=UNSTABLE, label="chatter below")
+        low, high = min(low, at[known].min() / 1.5), max(high, 1.5 * at[known].max())
+    if not known.all():
+        axes.plot(head[~known], np.full(int((~known).sum()), low), "v", color=STABLE, label="none found down to here")
+    axes.axhline(1.0, color="0.2", lw=1.0, ls="--", label="this case")
+    spread = loss_range(found.case)
+    if spread is not None:
+        axes.axhspan(*spread, color=COMPUTED, alpha=0.08, lw=0, label="range of the loss factors")
+    axes.set_yscale("log")
+    axes.set_ylim(0.8 * low, high)
+    axes.yaxis.set_major_formatter(lambda value, _: f"{value:g}")
+    axes.set_ylabel("Times the damping of the wall")
+    axes.legend(loc="best", fontsize=8)
+
+
+def pipe_figure(found: Gathered, sweeps: dict) -> Figure:
+    """Least damping ratio over the length of the pipe, at several heads."""
+    units = found.case.units
+    figure = new_figure(7.0, 3.2)
+    axes = figure.add_subplot()
+    lowest = 0.0
+    for number, (pressure, result) in enumerate(sweeps.items()):
+        damping = np.array([100 * v.damping_ratio for v in result.verdicts])
+        colour = (COMPUTED, PUBLISHED, "#6a8f3c")[number % 3]
+        axes.plot(result.values, damping, "o-", color=colour, label=units.pressure(pressure, 3))
+        lowest = min(lowest, np.nanmin(damping, initial=0.0))
+    axes.axhspan(lowest - 0.5, 0.0, color=DANGER, lw=0)
+    axes.axvline(found.case.upstream.length, color="0.2", lw=1.0, ls="--", label="this pipe")
+    axes.set_xscale("log")
+    axes.xaxis.set_major_formatter(lambda value, _: f"{value:g}")
+    axes.set_xlabel("Length of the pipe, m")
+    axes.set_ylabel("Damping ratio of\nthe least damped mode, %")
+    axes.legend(loc="best", fontsize=8)
+    return figure
