@@ -37,12 +37,14 @@ from continuation.options import (
     NewtonOptions,
     NotABifurcation,
     NotConverged,
+    OrbitOptions,
     OutOfDomain,
     Reason,
     SingularSystem,
 )
 from continuation.problem import equilibrium
-from continuation.system import Linearisation, Parameters, Spectrum, System, SystemBase
+from continuation.spectra import Spectrum
+from continuation.system import System
 from continuation.tracer import Checkpoint, Observer
 
 __all__ = [
@@ -55,7 +57,6 @@ __all__ = [
     "Event",
     "HopfNormalForm",
     "JaxSystem",
-    "Linearisation",
     "MatrixLinearisation",
     "NewtonOptions",
     "NotABifurcation",
@@ -64,13 +65,11 @@ __all__ = [
     "Orbit",
     "OrbitOptions",
     "OutOfDomain",
-    "Parameters",
     "Reason",
     "SingularSystem",
     "SpecialPoint",
     "Spectrum",
     "System",
-    "SystemBase",
     "continue_branch",
     "continue_fold",
     "continue_hopf",
@@ -91,7 +90,6 @@ __all__ = [
 _LATE = {
     "JaxSystem": "continuation.jax_system",
     "Orbit": "continuation.orbits",
-    "OrbitOptions": "continuation.orbits",
     "find_orbit": "continuation.orbits",
     "continue_orbits": "continuation.orbit_branches",
     "orbit_at": "continuation.orbit_branches",

@@ -9,7 +9,7 @@ from continuation.conditions import BranchPointCondition, generic_borders, null_
 from continuation.event_location import locate_zero, solve_augmented, special_at
 from continuation.linear import Bordered
 from continuation.options import SingularSystem
-from continuation.system import SystemBase
+from continuation.system import System
 from continuation.tracer import Monitor
 
 
@@ -167,7 +167,7 @@ def branch_directions(problem, value, tangent):
     return lines
 
 
-class Unfolded(SystemBase):
+class Unfolded(System):
     """``F + beta p``, with ``beta`` as one more parameter."""
 
     name = "unfolding of the branch point"

@@ -18,7 +18,6 @@ from continuation.cycle_points import (
     FOLD,
     POINTS,
     TORUS,
-    CycleBranchOptions,
     CyclePoint,
     SpecialCycle,
     change_between,
@@ -34,7 +33,15 @@ from continuation.cycle_points import (
 from continuation.cycles import Cycle, CycleSolver
 from continuation.harmonics import Harmonics
 from continuation.hill import floquet_exponents
-from continuation.options import ContinuationError, NotConverged, Reason, Said, require
+from continuation.options import (
+    ContinuationError,
+    ContinuationOptions,
+    NotConverged,
+    OrbitOptions,
+    Reason,
+    Said,
+    require,
+)
 from continuation.periodic import PeriodicMotion
 
 #: Share of the most harmonics allowed from which on a branch that needs more ends.
@@ -50,7 +57,13 @@ class CycleTracer:
     ----------
     solver : CycleSolver
     parameter : str
-    options : CycleBranchOptions
+    options : ContinuationOptions
+        Used are the steps, ``max_points`` (of the whole branch), ``max_angle``, ``limits``, the scales and
+        ``location_tolerance``.
+    shape : OrbitOptions
+        Used are ``max_harmonics``, ``tail`` and ``exponents``.
+    values : sequence of float
+        Values of the parameter at which a cycle is wanted.
     events : mapping of str to callable
         Functions of a `Cycle` whose zeros are special points of that name.
 
@@ -68,15 +81,20 @@ class CycleTracer:
         self,
         solver: CycleSolver,
         parameter: str,
-        options: CycleBranchOptions = CycleBranchOptions(),
+        options: ContinuationOptions,
+        shape: OrbitOptions = OrbitOptions(),
+        values: Sequence[float] = (),
         events: Mapping[str, Callable[[Cycle], float]] = {},
     ):
-        self.solver, self.parameter, self.options, self.events = solver, parameter, options, dict(events)
+        self.solver, self.parameter, self.options, self.shape = solver, parameter, options, shape
+        self.values, self.events = tuple(values), dict(events)
+        self.scale = options.units([parameter])[parameter]
+        self._limits = options.limits.get(parameter, (-np.inf, np.inf))
         self.points: list[CyclePoint] = []
         self.special: list[SpecialCycle] = []
         self.reason, self.next_step = Reason.RUNNING(), options.step
         self._origin: list[CyclePoint] = []
-        self._weight = 1.0 / (np.asarray(solver.system.scales) * options.motion_scale) ** 2
+        self._weight = 1.0 / (np.asarray(solver.system.scales) * options.state_scale) ** 2
 
     # -- the branch
     # ----
@@ -151,7 +169,7 @@ class CycleTracer:
 
     def _is_over(self) -> bool:
         """True when the branch has left the range, or reached its end."""
-        (low, high), ahead, value = self.options.limits, self._direction(), self.points[-1].value
+        (low, high), ahead, value = self._limits, self._direction(), self.points[-1].value
         return bool((value <= low and ahead < 0) or (value >= high and ahead > 0))
 
     def _has_turned_back(self) -> bool:
@@ -172,12 +190,12 @@ class CycleTracer:
             try:
                 cycle, expected = self._step(step, target)
                 cycle, angle = self._landed(self._checked(cycle, expected))
-                point = self._accept(cycle, cycle.mu[self.parameter] in options.values)
+                point = self._accept(cycle, cycle.mu[self.parameter] in self.values)
             except ContinuationError as error:
                 reason = str(error)
                 if (
                     getattr(error, "reason", None) is Reason.HARMONICS
-                    and self._series().count > NEARLY * options.max_harmonics
+                    and self._series().count > NEARLY * self.shape.max_harmonics
                 ):
                     break
                 step *= 0.4
@@ -208,7 +226,7 @@ class CycleTracer:
             The branch turns too far, or is lost at the limit.
         """
         last, value = self.points[-1].cycle, cycle.mu[self.parameter]
-        limit = float(np.clip(value, *self.options.limits))
+        limit = float(np.clip(value, *self._limits))
         if limit != value:
             start = last.mu[self.parameter]
             share = (limit - start) / (value - start)
@@ -234,8 +252,8 @@ class CycleTracer:
         """The next value that is asked for, or the limit, where it lies within the step."""
         now, ahead = self.points[-1].value, self._direction()
         reach = (self._value_at(step) - now) * ahead
-        wanted = [v for v in (*self.options.values, *self.options.limits) if np.isfinite(v)]
-        wanted = [v for v in wanted if 1e-9 * self.options.scale < (v - now) * ahead <= 1.5 * reach]
+        wanted = [v for v in (*self.values, *self._limits) if np.isfinite(v)]
+        wanted = [v for v in wanted if 1e-9 * self.scale < (v - now) * ahead <= 1.5 * reach]
         return min(wanted, key=lambda v: abs(v - now)) if wanted else None
 
     def _value_at(self, step: float) -> float:
@@ -274,7 +292,7 @@ class CycleTracer:
         return self._solved(motion, mu, free, conditions), replace(last.cycle, motion=motion, mu=mu)
 
     def _solved(self, motion, mu, free, conditions) -> Cycle:
-        options = self.options
+        options = self.shape
         while True:
             cycle = self.solver.solve(motion, mu, free, conditions)
             if cycle.motion.tail <= options.tail:
@@ -298,7 +316,7 @@ class CycleTracer:
 
     def _series(self) -> Harmonics:
         """Series of the next motion: longer where the last one nearly needed it."""
-        last, options = self.points[-1].motion, self.options
+        last, options = self.points[-1].motion, self.shape
         if last.tail > 0.4 * options.tail and last.harmonics.count + 2 <= options.max_harmonics:
             return Harmonics(last.harmonics.count + 2)
         return last.harmonics
@@ -309,8 +327,8 @@ class CycleTracer:
         c = motion.coefficients
         row = (c - motion.harmonics.resized(last.motion.coefficients)) * self._weight
         extra = np.zeros(len(self.solver.unknowns((self.parameter,))))
-        extra[-1] = (value - last.value) / self.options.scale**2
-        size = np.sqrt(np.sum(row**2 / self._weight) + (extra[-1] * self.options.scale) ** 2)
+        extra[-1] = (value - last.value) / self.scale**2
+        size = np.sqrt(np.sum(row**2 / self._weight) + (extra[-1] * self.scale) ** 2)
         return Condition(row / size, extra / size, float(np.vdot(row, c) + extra[-1] * value) / size)
 
     # -- points
@@ -326,9 +344,9 @@ class CycleTracer:
         """A cycle with its exponents and what events make of it; `after` is the point it follows, the last without."""
         after = self.points[-1] if after is None and self.points else after
         exponents = None
-        if self.options.exponents:
+        if self.shape.exponents:
             linear = self.solver.linearise(cycle.motion, cycle.mu, perturbed=True)
-            exponents = floquet_exponents(self.solver, linear, self.options.exponents)
+            exponents = floquet_exponents(self.solver, linear, self.shape.exponents)
         value = cycle.mu[self.parameter]
         tests = {name: float(event(cycle)) for name, event in self.events.items()}
         length = 0.0 if after is None else after.arclength + self._distance(after.cycle, cycle)
@@ -337,7 +355,7 @@ class CycleTracer:
     def _distance(self, one: Cycle, other: Cycle) -> float:
         h = max(one.motion.harmonics, other.motion.harmonics, key=lambda h: h.count)
         change = h.resized(other.motion.coefficients) - h.resized(one.motion.coefficients)
-        moved = (other.mu[self.parameter] - one.mu[self.parameter]) / self.options.scale
+        moved = (other.mu[self.parameter] - one.mu[self.parameter]) / self.scale
         return float(np.sqrt(np.sum(change**2 * self._weight) + moved**2))
 
     # -- special points
@@ -348,7 +366,7 @@ class CycleTracer:
         if len(self.points) > 2:
             before = self.points[-3]
             turns = (a.value - before.value) * (b.value - a.value) < 0
-            if turns and max(abs(a.value - before.value), abs(b.value - a.value)) > STILL * self.options.scale:
+            if turns and max(abs(a.value - before.value), abs(b.value - a.value)) > STILL * self.scale:
                 found.append(self._fold(before, a, b))
         for name in self.events:
             if a.tests[name] * b.tests[name] < 0:
@@ -367,7 +385,9 @@ class CycleTracer:
             fit = np.polyfit(s - s[1], [p.value for p in near], 2)
             at = -0.5 * fit[1] / fit[0]
             new = float(np.polyval(fit, at))
-            located = abs(new - value) <= max(1e-4 * self.options.located, 1e-12) * max(abs(value), self.options.scale)
+            located = abs(new - value) <= max(1e-4 * self.options.location_tolerance, 1e-12) * max(
+                abs(value), self.scale
+            )
             value = new
             if located:
                 break
@@ -388,7 +408,7 @@ class CycleTracer:
         first, last = near[0], near[-1]
         row = h.resized(last.motion.coefficients) - h.resized(first.motion.coefficients)
         extra = np.zeros(len(self.solver.unknowns((self.parameter,))))
-        extra[-1] = (last.value - first.value) / self.options.scale**2
+        extra[-1] = (last.value - first.value) / self.scale**2
         condition = Condition(row * self._weight, extra, float(np.vdot(row * self._weight, c) + extra[-1] * value))
         mu = near[0].cycle.mu | {self.parameter: value}
         try:
@@ -444,9 +464,9 @@ class CycleTracer:
                 flow, high, fhigh = 0.5 * flow, point, f
             if low.arclength > high.arclength:
                 low, high, flow, fhigh = high, low, fhigh, flow
-            if min(abs(f) for f, _ in met) <= 0.1 * self.options.located * max(
+            if min(abs(f) for f, _ in met) <= 0.1 * self.options.location_tolerance * max(
                 abs(fa), abs(fb)
-            ) or high.arclength - low.arclength <= (self.options.located * width):
+            ) or high.arclength - low.arclength <= (self.options.location_tolerance * width):
                 located = True
                 break
         met.sort(key=lambda one: abs(one[0]))

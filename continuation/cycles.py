@@ -26,41 +26,12 @@ NEAR = 0.1
 MOST_LEARNT, LEARNT = 6, 0.05
 #: Contraction that is counted on at most.
 LEAST_CONTRACTION = 0.15
-
-
-@dataclass(frozen=True)
-class CycleOptions:
-    """Options of the corrections.
-
-    Attributes
-    ----------
-    tolerance : float
-        Error that the last correction leaves, over the size of the motion about its mean: the size of the next one, by
-        the contraction seen.
-    max_iterations : int
-        Corrections.
-    linear : float
-        Share of its linear equations that a correction may leave.
-    krylov : int
-        Most Krylov iterations for a correction.
-    renew_at : float
-        Contraction of two corrections above which the linearisation is renewed.
-    basis, perturbations : int
-        Most directions that are learnt of corrections, and of perturbations.
-    """
-
-    tolerance: float = 1e-5
-    max_iterations: int = 25
-    linear: float = 3e-2
-    krylov: int = 40
-    renew_at: float = 0.3
-    basis: int = 16
-    perturbations: int = 24
-
-    def __post_init__(self):
-        require(0 < self.tolerance < 0.1, "The tolerance of cycles lies between 0 and 0.1.")
-        require(self.max_iterations >= 1 and self.krylov >= 1, "At least one iteration is needed.")
-        require(min(self.basis, self.perturbations) >= 0, "The number of directions cannot be negative.")
+#: Corrections; share of its linear equations that one may leave; Krylov iterations for it.
+CORRECTIONS, LINEAR, KRYLOV = 25, 3e-2, 40
+#: Contraction of two corrections above which the linearisation is renewed.
+RENEWED = 0.3
+#: Most directions that are learnt of corrections, and of perturbations.
+FROM_CORRECTIONS, FROM_PERTURBATIONS = 16, 24
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,11 +63,14 @@ class CycleSolver:
     system : continuation.periodic.PeriodicSystem
     basis : (n, r) array
         Directions to start with, see the module.
-    options : CycleOptions
+    tolerance : float
+        Error that the last correction leaves, over the size of the motion about its mean: the size of the next one, by
+        the contraction seen.
     """
 
-    def __init__(self, system, basis: np.ndarray, options: CycleOptions = CycleOptions()):
-        self.system, self.options = system, options
+    def __init__(self, system, basis: np.ndarray, tolerance: float = 1e-5):
+        require(0 < tolerance < 0.1, "The tolerance of cycles lies between 0 and 0.1.")
+        self.system, self.tolerance = system, tolerance
         self._given = la.orth(np.asarray(basis, float) / np.asarray(system.scales)[:, None])
         self._learnt = np.zeros((len(self._given), 0))
         self._of_perturbations = np.zeros((len(self._given), 0))
@@ -129,9 +103,9 @@ class CycleSolver:
         if self.system.autonomous:
             conditions = (self._phase(guess, len(free)), *conditions)
         require(len(free) == len(conditions), "Each free unknown needs a condition.")
-        options, sizes, spent = self.options, [], 0
+        sizes, spent = [], 0
         motion, mu, linear = guess, dict(mu), None
-        while len(sizes) < options.max_iterations:
+        while len(sizes) < CORRECTIONS:
             unbalance = self._unbalance(motion, mu, free, conditions)
             shape = motion.coefficients.shape
             if not np.isfinite(unbalance).all():
@@ -139,7 +113,7 @@ class CycleSolver:
             if linear is None:
                 linear, steps = self._for_corrections(motion, mu), []
                 linear.prepare(free, conditions, unbalance[: motion.coefficients.size].reshape(shape))
-            change, used, missed = linear.solve(-unbalance, options.linear, options.krylov)
+            change, used, missed = linear.solve(-unbalance, LINEAR, KRYLOV)
             change = _update_correction(change, steps, linear.units)
             spent += used
             sizes.append(self._size(change, motion))
@@ -152,11 +126,11 @@ class CycleSolver:
             if motion.omega <= 0:
                 break
             learnt = self.learn(change[: motion.coefficients.size].reshape(shape))
-            if _remaining_error(sizes[-len(steps) :]) <= options.tolerance:
+            if _remaining_error(sizes[-len(steps) :]) <= self.tolerance:
                 return Cycle(motion, mu, sizes[-1], len(sizes), spent)
-            if _is_slow(sizes[-len(steps) :], options.renew_at) or sizes[-1] > 0.5 or missed > 0.5:
+            if _is_slow(sizes[-len(steps) :], RENEWED) or sizes[-1] > 0.5 or missed > 0.5:
                 linear = None
-            elif sizes[-1] > 100 * options.tolerance and learnt.shape[1] and linear.extend(learnt):
+            elif sizes[-1] > 100 * self.tolerance and learnt.shape[1] and linear.extend(learnt):
                 linear.factor()
         last = sizes[-1] if sizes else np.nan
         sentence = f"{len(sizes)} corrections, the last of {last:.2g} of its size."
@@ -223,13 +197,13 @@ class CycleSolver:
         of those added before give way. They take effect with the next linearisation.
         """
         added = self._beyond(rows, (self._given, self._learnt))
-        self._learnt = _append_directions(self._learnt, added, self.options.basis)
+        self._learnt = _append_directions(self._learnt, added, FROM_CORRECTIONS)
         return added
 
     def learn_perturbations(self, rows: np.ndarray) -> np.ndarray:
         """Add leading directions (n, k) of what perturbations (k, n) lack to the basis for them, and return these."""
         added = self._beyond(rows, (self._given, self._learnt, self._of_perturbations))
-        self._of_perturbations = _append_directions(self._of_perturbations, added, self.options.perturbations)
+        self._of_perturbations = _append_directions(self._of_perturbations, added, FROM_PERTURBATIONS)
         return added
 
     def _beyond(self, rows: np.ndarray, knowns: Sequence[np.ndarray]) -> np.ndarray:

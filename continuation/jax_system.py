@@ -17,10 +17,10 @@ import numpy as np  # noqa: E402
 import scipy.sparse as sp  # noqa: E402
 
 from continuation.linear import MatrixLinearisation  # noqa: E402
-from continuation.system import SystemBase  # noqa: E402
+from continuation.system import System  # noqa: E402
 
 
-class JaxSystem(SystemBase):
+class JaxSystem(System):
     """``B(u, mu) u' = F(u, mu)`` with ``F`` (and ``B``) as JAX functions.
 
     Parameters

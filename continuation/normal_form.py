@@ -16,7 +16,7 @@ scales with ``|q|^2``; its sign, the amplitude of the motion and the orbit do no
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import NamedTuple, Protocol
+from typing import NamedTuple
 
 import numpy as np
 
@@ -121,41 +121,10 @@ class Motion(NamedTuple):
     vector: np.ndarray
 
 
-class MotionForms(Protocol):
-    """Residual of a system about an equilibrium, for exponential motions.
-
-    Attributes
-    ----------
-    rest : ndarray, shape (k,)
-        The equilibrium, as `state` gives it.
-    """
-
-    rest: np.ndarray
-
-    def pencil(self, s: complex):
-        """``T(s)``, with ``matvec``, ``rmatvec``, ``solve`` and ``solve_transpose``."""
-
-    def slope(self, motion: Motion) -> np.ndarray:
-        """``T'(s) a``, shape (n,)."""
-
-    def second(self, a: Motion, b: Motion) -> np.ndarray:
-        """Second form, shape (n,), complex."""
-
-    def third(self, a: Motion, b: Motion, c: Motion) -> np.ndarray:
-        """Third form, shape (n,), complex."""
-
-    def state(self, motion: Motion) -> np.ndarray:
-        """State of a motion, shape (k,), linear in its vector: its norm is the unit of the amplitude."""
-
-    def parameter_slope(self, name: str) -> np.ndarray:
-        """Derivative of the residual at the equilibrium, shape (n,), by a parameter."""
-
-    def mixed(self, motion: Motion, name: str) -> np.ndarray:
-        """Derivative of ``T(s) a``, shape (n,), by a parameter at a fixed state."""
-
-
 class SystemForms:
-    """`MotionForms` of ``F(u, mu) - B(u, mu) u'``.
+    """Residual ``F(u, mu) - B(u, mu) u'`` about an equilibrium, for exponential motions.
+
+    A viscoelastic system has a class of its own with these methods; vectors of motions have n entries.
 
     Parameters
     ----------
@@ -171,27 +140,34 @@ class SystemForms:
         self._d, self._linear = Derivatives(system, u, self._mu), system.linear(u, self._mu)
 
     def pencil(self, s):
+        """``T(s)``, with ``matvec``, ``rmatvec``, ``solve`` and ``solve_transpose``."""
         return self._linear.shifted(s) if s else self._linear
 
     def slope(self, motion):
+        """``T'(s) a``."""
         return -self._linear.mass_matvec(motion.vector)
 
     def second(self, a, b):
+        """Second form of two motions, complex."""
         mass = self._d.mass_d(a.rate * a.vector, b.vector) + self._d.mass_d(b.rate * b.vector, a.vector)
         return self._d.d2(a.vector, b.vector) - mass
 
     def third(self, a, b, c):
+        """Third form of three motions, complex."""
         d = self._d
         mass = sum(d.mass_d2(x.rate * x.vector, y.vector, z.vector) for x, y, z in ((a, b, c), (b, a, c), (c, a, b)))
         return d.d3(a.vector, b.vector, c.vector) - mass
 
     def state(self, motion):
+        """State of a motion, linear in its vector: its norm is the unit of the amplitude."""
         return motion.vector
 
     def parameter_slope(self, name):
+        """Derivative of the residual at the equilibrium by a parameter."""
         return self._system.d_parameter(self.rest, self._mu, name)
 
     def mixed(self, motion, name):
+        """Derivative of ``T(s) a`` by a parameter at a fixed state."""
         d = self._d
         return d.d2_parameter(name, motion.vector) - motion.rate * d.mass_parameter(name, motion.vector)
 
@@ -223,13 +199,13 @@ def hopf_normal_form(system, u, mu, omega: float, q, parameter: str | None = Non
 
 
 def hopf_normal_form_of(
-    forms: MotionForms, omega: float, q: np.ndarray, parameter: str | None = None
+    forms: SystemForms, omega: float, q: np.ndarray, parameter: str | None = None
 ) -> HopfNormalForm:
     """First Lyapunov coefficient and the second-order motion from the residual of exponential motions.
 
     Parameters
     ----------
-    forms : MotionForms
+    forms : SystemForms
         Of a viscoelastic system, say.
     omega, q, parameter
         As in `hopf_normal_form`; ``T(i omega) q = 0`` nearly, q of shape (n,).
@@ -237,7 +213,7 @@ def hopf_normal_form_of(
     Returns
     -------
     HopfNormalForm
-        ``q``, ``h20`` and ``h11`` as `MotionForms.state` gives them, with ``|q| = 1``; ``p`` is the left vector of the
+        ``q``, ``h20`` and ``h11`` as `SystemForms.state` gives them, with ``|q| = 1``; ``p`` is the left vector of the
         pencil, ``p* T'(i omega) q = 1``.
 
     Raises
@@ -285,7 +261,7 @@ def _require_frequency(omega):
         raise NotABifurcation(f"A Hopf point needs a positive frequency, not {omega}.")
 
 
-def _eigenvectors(forms: MotionForms, s: complex, q: np.ndarray):
+def _eigenvectors(forms: SystemForms, s: complex, q: np.ndarray):
     """Right vector of unit state and left vector with ``p* T'(s) q = 1``."""
     pencil = forms.pencil(s)
     q = q / np.linalg.norm(q)

@@ -201,3 +201,35 @@ class ContinuationOptions:
             require(low < high, f"The limits of {name!r} must increase, not {low}, {high}.")
         require(self.eigenvalues >= 0, "The number of eigenvalues cannot be negative.")
         require(self.location_tolerance > 0, "The location tolerance must be positive.")
+
+
+@dataclass(frozen=True)
+class OrbitOptions:
+    """Discretisation of periodic orbits.
+
+    Attributes
+    ----------
+    harmonics, max_harmonics : int
+        Harmonics of the first series, and at most.
+    tail : float
+        Largest share that the last two harmonics may have in an orbit about its mean; the series is made longer until
+        that holds.
+    tolerance : float
+        Error that the corrections leave, over the size of the orbit about its mean.
+    exponents : int
+        Leading Floquet exponents at most, 0 for none; there are n - 1 besides that of the shift in time.
+    """
+
+    harmonics: int = 8
+    max_harmonics: int = 128
+    tail: float = 1e-9
+    tolerance: float = 1e-11
+    exponents: int = 8
+
+    def __post_init__(self):
+        require(
+            1 <= self.harmonics <= self.max_harmonics, "The harmonics must satisfy 1 <= harmonics <= max_harmonics."
+        )
+        require(0 < self.tail < 1, "The share of the last harmonics lies between 0 and 1.")
+        require(0 < self.tolerance < 0.1, "The tolerance of orbits lies between 0 and 0.1.")
+        require(self.exponents >= 0, "The number of Floquet exponents cannot be negative.")

@@ -14,7 +14,7 @@ import numpy as np
 
 from continuation.branch import Branch, CurvePoint, SpecialPoint
 from continuation.cycle_branch import CycleTracer
-from continuation.cycle_points import FOLD, TORUS, CycleBranchOptions, CyclePoint, SpecialCycle
+from continuation.cycle_points import FOLD, TORUS, CyclePoint, SpecialCycle
 from continuation.cycles import Cycle, cycles_beside_onset
 from continuation.harmonics import Harmonics
 from continuation.normal_form import hopf_normal_form
@@ -24,11 +24,12 @@ from continuation.options import (
     DerivativeMissing,
     NotABifurcation,
     NotConverged,
+    OrbitOptions,
     Reason,
     Said,
     require,
 )
-from continuation.orbits import Orbit, OrbitOptions, OrbitSolver, add_exponents
+from continuation.orbits import Orbit, OrbitSolver, add_exponents
 from continuation.periodic import PeriodicMotion
 from continuation.tracer import as_observers, run_observed
 
@@ -182,31 +183,19 @@ class _Follower:
         options, n = self.options, system.size
         self.branch = Branch("orbits", 0, (parameter,), (), {name: float(value) for name, value in mu.items()})
         self.step_limits = options.min_step, options.max_step
-        low, high = options.limits.get(parameter, (-np.inf, np.inf))
-        kept = CycleBranchOptions(
-            step=options.step,
-            min_step=options.min_step,
-            max_step=options.max_step,
-            max_angle=options.max_angle,
-            scale=options.units([parameter])[parameter],
-            motion_scale=options.state_scale * np.sqrt(n),
-            limits=(low, high),
-            max_points=options.max_points + 1,
-            exponents=min(self.shape.exponents, max(n - 1, 1)),
-            tail=self.shape.tail,
-            max_harmonics=self.shape.max_harmonics,
-            located=options.location_tolerance,
-        )
-        self.parameter, self.tracer = parameter, CycleTracer(OrbitSolver(system, self.shape), parameter, kept)
+        kept = replace(options, state_scale=options.state_scale * np.sqrt(n), max_points=options.max_points + 1)
+        shape = replace(self.shape, exponents=min(self.shape.exponents, max(n - 1, 1)))
+        self.parameter, self.tracer = parameter, CycleTracer(OrbitSolver(system, shape), parameter, kept, shape)
         self.observers: list = []
         self._met: list[str] = []
 
     def second_orbit(self, first: Cycle) -> Cycle:
         """Orbit a first step along the parameter away from the first one."""
-        options, value = self.tracer.options, first.mu[self.parameter]
-        step, reason = options.step * options.scale, ""
-        while step >= options.min_step * options.scale:
-            target = float(np.clip(value + self.options.direction * step, *options.limits))
+        options, value, scale = self.options, first.mu[self.parameter], self.tracer.scale
+        limits = options.limits.get(self.parameter, (-np.inf, np.inf))
+        step, reason = options.step * scale, ""
+        while step >= options.min_step * scale:
+            target = float(np.clip(value + options.direction * step, *limits))
             require(target != value, f"The branch starts at its limit, {self.parameter} = {value:g}.")
             try:
                 return self.tracer.solver.solve(first.motion, first.mu | {self.parameter: target})
@@ -216,7 +205,8 @@ class _Follower:
 
     def beside_hopf(self, special: SpecialPoint) -> tuple[Cycle, Cycle, Cycle]:
         """Equilibrium at a Hopf point as a cycle at rest, and two small orbits beside it."""
-        kept, system, omega = self.tracer.options, self.tracer.solver.system.system, float(special.values["omega"])
+        kept, scale, system = self.tracer.options, self.tracer.scale, self.tracer.solver.system.system
+        omega = float(special.values["omega"])
         q = np.asarray(special.vectors["right"], complex)
         q, h = q / np.linalg.norm(q), Harmonics(self.shape.harmonics)
         rate, most = 0.0, np.inf
@@ -227,7 +217,7 @@ class _Follower:
         except DerivativeMissing:
             pass
         # |z|^2 of the orbit a step away: (a |z|)^2 + (b |z|^2)^2 = step^2
-        a, b = np.sqrt(2.0) / kept.motion_scale, rate / kept.scale
+        a, b = np.sqrt(2.0) / kept.state_scale, rate / scale
         radius = min(kept.step * np.sqrt(2.0 / (a**2 + np.sqrt(a**4 + (2 * b * kept.step) ** 2))), most)
         reason = ""
         for _ in range(HALVINGS):
@@ -238,7 +228,7 @@ class _Follower:
             row[0] = 0.0
             try:
                 cycles = cycles_beside_onset(self.tracer.solver, small, dict(special.mu), self.parameter, row, SECOND)
-                missed = (cycles[1].mu[self.parameter] - special.mu[self.parameter] - rate * radius**2) / kept.scale
+                missed = (cycles[1].mu[self.parameter] - special.mu[self.parameter] - rate * radius**2) / scale
                 if abs(missed) <= 0.5 * np.hypot(a * radius, b * radius**2):
                     return cycles
                 reason = Reason.NOT_NORMAL.value

@@ -13,44 +13,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from continuation.cycles import Cycle, CycleOptions, CycleSolver
+from continuation.cycles import Cycle, CycleSolver
 from continuation.first_order import DirectLinearisation, FirstOrderSystem
 from continuation.harmonics import Harmonics
 from continuation.hill import Exponents, floquet_exponents
-from continuation.options import NotConverged, Reason, require
+from continuation.options import NotConverged, OrbitOptions, Reason, require
 from continuation.periodic import PeriodicMotion
-
-
-@dataclass(frozen=True)
-class OrbitOptions:
-    """Discretisation of periodic orbits.
-
-    Attributes
-    ----------
-    harmonics, max_harmonics : int
-        Harmonics of the first series, and at most.
-    tail : float
-        Largest share that the last two harmonics may have in an orbit about its mean; the series is made longer until
-        that holds.
-    tolerance : float
-        Error that the corrections leave, over the size of the orbit about its mean.
-    exponents : int
-        Leading Floquet exponents at most; there are n - 1 besides that of the shift in time.
-    """
-
-    harmonics: int = 8
-    max_harmonics: int = 128
-    tail: float = 1e-9
-    tolerance: float = 1e-11
-    exponents: int = 8
-
-    def __post_init__(self):
-        require(
-            1 <= self.harmonics <= self.max_harmonics, "The harmonics must satisfy 1 <= harmonics <= max_harmonics."
-        )
-        require(0 < self.tail < 1, "The share of the last harmonics lies between 0 and 1.")
-        require(0 < self.tolerance < 0.1, "The tolerance of orbits lies between 0 and 0.1.")
-        require(self.exponents >= 1, "At least one Floquet exponent is needed.")
 
 
 class OrbitSolver(CycleSolver):
@@ -58,7 +26,7 @@ class OrbitSolver(CycleSolver):
 
     def __init__(self, system, options: OrbitOptions):
         every = np.zeros((system.size, 0))
-        super().__init__(FirstOrderSystem(system), every, CycleOptions(options.tolerance, max_iterations=40))
+        super().__init__(FirstOrderSystem(system), every, options.tolerance)
 
     def _for_corrections(self, motion: PeriodicMotion, mu: Mapping[str, float]) -> DirectLinearisation:
         return DirectLinearisation(self.system, motion, mu)

@@ -1,15 +1,12 @@
-"""Contract of a model whose branches and bifurcations are computed.
+"""Contract of a model whose branches and bifurcations are computed, with what it may leave to this package.
 
-A system is ``B(u, mu) u' = F(u, mu)`` with a state ``u`` of ``size`` numbers and a
-mapping ``mu`` of named parameters.  Everything here asks for residuals, matrix-vector
-products, solves and directional derivatives; never for a dense matrix of the full size.
-Directional derivatives take real vectors; `Derivatives` extends them to complex ones.
+Everything here asks for residuals, matrix-vector products, solves and directional derivatives; never for a dense matrix
+of the full size.  Directional derivatives take real vectors; `Derivatives` extends them to complex ones.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Protocol, runtime_checkable
 
 import numpy as np
 
@@ -19,96 +16,18 @@ from continuation.spectra import Spectrum, compute_spectrum
 Parameters = Mapping[str, float]
 
 
-@runtime_checkable
-class ShiftedSolver(Protocol):
-    """Products and solves with ``A - lambda B`` for one complex ``lambda``."""
+class System:
+    """``B(u, mu) u' = F(u, mu)`` with a state ``u`` of ``size`` numbers and named parameters ``mu``.
 
-    def matvec(self, x: np.ndarray) -> np.ndarray: ...
+    A model supplies `residual` and `linear`; `d2` and `d3` for normal forms and curves in two parameters.  By default
+    the mass is constant, the spectrum comes from solves, and derivatives in parameters are differences; derivatives in
+    the state never are: a missing one raises `DerivativeMissing`.  A model may have its own ``residual_norm(residual)``
+    and ``state_weights``, shape (n,), of the arclength.
 
-    def rmatvec(self, x: np.ndarray) -> np.ndarray:
-        """The plain transpose (no conjugate) times ``x``."""
-        ...
-
-    def solve(self, rhs: np.ndarray) -> np.ndarray: ...
-
-    def solve_transpose(self, rhs: np.ndarray) -> np.ndarray:
-        """Solve with the plain transpose (no conjugate)."""
-        ...
-
-
-@runtime_checkable
-class Linearisation(ShiftedSolver, Protocol):
-    """``A = dF/du`` and ``B`` at one state; all vectors of shape (n,), real or complex."""
-
-    size: int
-
-    def mass_matvec(self, x: np.ndarray) -> np.ndarray: ...
-
-    def mass_rmatvec(self, x: np.ndarray) -> np.ndarray: ...
-
-    def shifted(self, shift: complex) -> ShiftedSolver: ...
-
-
-@runtime_checkable
-class System(Protocol):
-    """``B(u, mu) u' = F(u, mu)``.
-
-    Directional derivatives take real vectors and are multilinear; this package splits
-    complex arguments itself.  `SystemBase` supplies defaults for what a model lacks.
-    """
-
-    size: int
-
-    def residual(self, u: np.ndarray, mu: Parameters) -> np.ndarray:
-        """``F(u, mu)``, shape (n,)."""
-        ...
-
-    def linear(self, u: np.ndarray, mu: Parameters) -> Linearisation:
-        """``dF/du`` and ``B`` at the state."""
-        ...
-
-    def d_parameter(self, u: np.ndarray, mu: Parameters, name: str) -> np.ndarray:
-        """``dF/dmu_name``, shape (n,)."""
-        ...
-
-    def d2(self, u, mu, a, b) -> np.ndarray:
-        """``F_uu[a, b]``."""
-        ...
-
-    def d3(self, u, mu, a, b, c) -> np.ndarray:
-        """``F_uuu[a, b, c]``."""
-        ...
-
-    def d2_parameter(self, u, mu, name: str, a) -> np.ndarray:
-        """``d(F_u a)/dmu_name``."""
-        ...
-
-    def d_parameters2(self, u, mu, first: str, second: str) -> np.ndarray:
-        """``d2F/(dmu_first dmu_second)``; needed only at branch points."""
-        ...
-
-    def mass_d(self, u, mu, c, a) -> np.ndarray:
-        """``d(B(u) c)/du [a]``; zero for a constant mass."""
-        ...
-
-    def mass_d2(self, u, mu, c, a, b) -> np.ndarray:
-        """``d2(B(u) c)/du2 [a, b]``."""
-        ...
-
-    def mass_parameter(self, u, mu, name: str, c) -> np.ndarray:
-        """``d(B c)/dmu_name``."""
-        ...
-
-    def spectrum(self, u, mu, count: int, near: complex | None = None) -> Spectrum:
-        """``count`` eigenvalues of ``A x = lambda B x``: nearest to ``near``, or leading."""
-        ...
-
-
-class SystemBase:
-    """Defaults for a `System`: constant mass, spectrum from solves, differences in parameters.
-
-    Derivatives in the state are never replaced by differences behind the caller's back:
-    a missing ``d2`` or ``d3`` raises `DerivativeMissing`.
+    `linear` returns a linearisation ``A = dF/du`` and ``B``, see `continuation.MatrixLinearisation`: ``size``;
+    ``matvec``, ``rmatvec``, ``solve``, ``solve_transpose`` (plain transposes, no conjugates) of ``A``; ``mass_matvec``,
+    ``mass_rmatvec``; and ``shifted(shift)``, the same four of ``A - shift B``.  Vectors have shape (n,), real or
+    complex.  Optional are ``determinant_sign()`` and, for periodic orbits, the matrices ``jacobian`` and ``mass``.
     """
 
     size: int = 0
@@ -118,10 +37,12 @@ class SystemBase:
     #: Relative step for the central differences in parameters.
     parameter_step: float = 6e-6
 
-    def residual(self, u, mu):
+    def residual(self, u: np.ndarray, mu: Parameters) -> np.ndarray:
+        """``F(u, mu)``, shape (n,)."""
         raise NotImplementedError(f"{type(self).__name__} has no residual.")
 
-    def linear(self, u, mu):
+    def linear(self, u: np.ndarray, mu: Parameters):
+        """Linearisation at a state."""
         raise NotImplementedError(f"{type(self).__name__} has no linearisation.")
 
     def _sides(self, mu: Parameters, name: str):
@@ -133,33 +54,42 @@ class SystemBase:
         return {**mu, name: up}, {**mu, name: down}, up - down
 
     def d_parameter(self, u, mu, name):
+        """``dF/dmu_name``, shape (n,)."""
         up, down, width = self._sides(mu, name)
         return (self.residual(u, up) - self.residual(u, down)) / width
 
     def d2(self, u, mu, a, b):
+        """``F_uu[a, b]``."""
         raise DerivativeMissing(f"{type(self).__name__} has no second derivative d2.")
 
     def d3(self, u, mu, a, b, c):
+        """``F_uuu[a, b, c]``."""
         raise DerivativeMissing(f"{type(self).__name__} has no third derivative d3.")
 
     def d2_parameter(self, u, mu, name, a):
+        """``d(F_u a)/dmu_name``."""
         up, down, width = self._sides(mu, name)
         return (self.linear(u, up).matvec(a) - self.linear(u, down).matvec(a)) / width
 
     def d_parameters2(self, u, mu, first, second):
+        """``d2F/(dmu_first dmu_second)``; needed only at branch points."""
         up, down, width = self._sides(mu, second)
         return (self.d_parameter(u, up, first) - self.d_parameter(u, down, first)) / width
 
     def mass_d(self, u, mu, c, a):
+        """``d(B(u) c)/du [a]``."""
         return np.zeros(self.size)
 
     def mass_d2(self, u, mu, c, a, b):
+        """``d2(B(u) c)/du2 [a, b]``."""
         return np.zeros(self.size)
 
     def mass_parameter(self, u, mu, name, c):
+        """``d(B c)/dmu_name``."""
         return np.zeros(self.size)
 
-    def spectrum(self, u, mu, count, near=None):
+    def spectrum(self, u, mu, count: int, near: complex | None = None) -> Spectrum:
+        """``count`` eigenvalues of ``A x = lambda B x``: nearest to ``near``, or leading."""
         return compute_spectrum(self.linear(u, mu), count, near)
 
 

@@ -28,7 +28,7 @@ _STEP = 1e-4
 
 
 class ValveMemoryForms:
-    """`continuation.normal_form.MotionForms` of a steady valve: vectors are (q, U), (n + l,), states (q, v, U).
+    """`continuation.normal_form.SystemForms` of a steady valve: vectors are (q, U), (n + l,), states (q, v, U).
 
     Parameters
     ----------

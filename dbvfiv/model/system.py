@@ -19,7 +19,7 @@ from functools import cached_property
 
 import numpy as np
 
-from continuation import OutOfDomain, Spectrum, SystemBase
+from continuation import OutOfDomain, Spectrum, System
 from eigen import CoupledPencil, SearchOptions, SingularShiftError, Workspace, leading_modes
 from eigen.operator import real_apply
 
@@ -35,7 +35,7 @@ _MEMORY = (
 )
 
 
-class ValveSystem(SystemBase):
+class ValveSystem(System):
     """A coupled valve with flow as a dynamical system.
 
     Parameters

@@ -8,10 +8,10 @@ from functools import cached_property
 
 import numpy as np
 
-from continuation import ContinuationError
+from continuation import ContinuationError, ContinuationOptions, OrbitOptions
 from continuation.cycle_branch import CycleTracer
-from continuation.cycle_points import CycleBranchOptions, CyclePoint
-from continuation.cycles import Cycle, CycleOptions, CycleSolver, cycles_beside_onset
+from continuation.cycle_points import CyclePoint
+from continuation.cycles import Cycle, CycleSolver, cycles_beside_onset
 from continuation.harmonics import Harmonics
 from continuation.periodic import PeriodicMotion
 
@@ -209,7 +209,7 @@ class Follower:
         self.case, self.walk, self.place, self.parameter = case, walk, place, parameter
         system = ValveSystem(walk.built(Mu.of(case)).model, rebuilder(case))
         self.system = PeriodicValve(system.model, place.for_system())
-        self.solver = CycleSolver(self.system, _basis(self.system, spectrum), CycleOptions())
+        self.solver = CycleSolver(self.system, _basis(self.system, spectrum))
         self.name = PARAMETERS[parameter].system_name or parameter
         model = self.system.model(place.for_system())
         #: Number of the displacement in y of the lip at x = z = 0 among the unknowns.
@@ -301,21 +301,22 @@ class Follower:
         asked = self.case.cycle
         swing = np.sqrt(2.0) * np.linalg.norm(first.coefficients[1:3, self.lip])
         whole = np.linalg.norm(first.coefficients[1:] / self.system.scales)
-        options = CycleBranchOptions(
+        options = ContinuationOptions(
             step=min(STEP, asked.max_step),
             min_step=min(1e-4, asked.max_step),
             max_step=asked.max_step,
-            scale=values[-1] - values[0],
-            motion_scale=UNIT * whole / swing,
-            limits=(values[0], values[-1]),
-            values=tuple(values),
+            max_angle=1.5,
+            parameter_scales={self.name: values[-1] - values[0]},
+            state_scale=UNIT * whole / swing,
+            limits={self.name: (values[0], values[-1])},
             max_points=asked.max_points,
-            exponents=asked.exponents,
-            tail=asked.tolerance,
-            max_harmonics=asked.max_harmonics,
+            location_tolerance=1e-2,
+        )
+        shape = OrbitOptions(
+            harmonics=1, max_harmonics=asked.max_harmonics, tail=asked.tolerance, exponents=asked.exponents
         )
         events = {TOUCHING: lambda cycle: self.orbit(cycle).lip_extremes[0]}
-        return CycleTracer(self.solver, self.name, options, events)
+        return CycleTracer(self.solver, self.name, options, shape, values, events)
 
     def orbit(self, cycle: Cycle) -> Orbit:
         """Orbit of a cycle, from which its results are taken."""

@@ -11,7 +11,7 @@ from continuation import blocks, hill
 from continuation.blocks import BlockRows, SparseBlocks
 from continuation.cycle_linearisation import LeftProjection
 from continuation.cycle_points import parameter_predicts_better, predict_by_arclength, predict_by_parameter
-from continuation.cycles import CycleOptions, CycleSolver
+from continuation.cycles import CycleSolver
 from continuation.harmonics import Harmonics
 from continuation.periodic import PeriodicMotion, PeriodicOperator, Term
 from tests.systems import periodic
@@ -160,10 +160,7 @@ def test_eigenvalues_in_the_circle_are_all_found():
 def test_corrections_leave_less_than_their_tolerance(tolerance):
     system = periodic.van_der_pol()
     guess = periodic.guess_of(1.9 * np.cos(2 * np.pi * np.arange(64) / 64)[:, None], 9, 1.0)
-    found, exact = (
-        CycleSolver(system, system.basis, CycleOptions(tolerance=t)).solve(guess, {"mu": 0.5})
-        for t in (tolerance, 1e-12)
-    )
+    found, exact = (CycleSolver(system, system.basis, t).solve(guess, {"mu": 0.5}) for t in (tolerance, 1e-12))
     change = np.abs(found.motion.coefficients - exact.motion.coefficients).max()
     assert change <= tolerance * np.abs(exact.motion.coefficients[1:]).max()
     assert found.iterations < exact.iterations

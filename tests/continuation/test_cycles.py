@@ -5,11 +5,11 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from continuation import NotConverged, OutOfDomain
+from continuation import ContinuationOptions, NotConverged, OrbitOptions, OutOfDomain
 from continuation.cycle_branch import CycleTracer
 from continuation.cycle_linearisation import gmres
-from continuation.cycle_points import DOUBLING, FOLD, TORUS, CycleBranchOptions
-from continuation.cycles import CycleOptions, CycleSolver
+from continuation.cycle_points import DOUBLING, FOLD, TORUS
+from continuation.cycles import CycleSolver
 from continuation.harmonics import Harmonics, Rates
 from continuation.hill import floquet_exponents
 from continuation.orbits import find_orbit
@@ -17,13 +17,13 @@ from continuation.periodic import PeriodicMotion
 from tests.systems import periodic
 from tests.systems.van_der_pol import van_der_pol as first_order_van_der_pol
 
-EXACT = CycleOptions(tolerance=1e-10)
+EXACT = 1e-10
 PHASE = 2 * np.pi * np.arange(64) / 64
 CIRCLE = np.stack([np.cos(PHASE), np.sin(PHASE)], axis=1)
 
 
-def solved(system, guess, mu, options=EXACT, **unknown):
-    solver = CycleSolver(system, system.basis, options)
+def solved(system, guess, mu, tolerance=EXACT, **unknown):
+    solver = CycleSolver(system, system.basis, tolerance)
     return solver, solver.solve(guess, mu, **unknown)
 
 
@@ -127,10 +127,10 @@ def test_folds_of_the_forced_duffing():
     guess = periodic.guess_of(0.15 * np.cos(PHASE)[:, None], 5, 1.0)
     first = solver.solve(guess, mu)
     second = solver.solve(first.motion, mu | {"w": 0.82})
-    options = CycleBranchOptions(
-        step=0.05, max_step=0.4, scale=0.2, motion_scale=1.0, limits=(0.5, 1.3), max_points=150, exponents=2
+    options = ContinuationOptions(
+        max_step=0.4, parameter_scales={"w": 0.2}, limits={"w": (0.5, 1.3)}, max_points=150, location_tolerance=1e-2
     )
-    tracer = CycleTracer(solver, "w", options)
+    tracer = CycleTracer(solver, "w", options, OrbitOptions(exponents=2, tail=1e-3))
     tracer.start(first, second)
     assert tracer.run() == "ended on the limit w = 1.3"
     folds = [s for s in tracer.special if s.kind == FOLD]
@@ -160,11 +160,14 @@ def langford(u, mu):
     return jnp.stack([gain * x - 0.25 * y, 0.25 * x + gain * y, m * z - (x**2 + y**2 + z**2)])
 
 
-def trace(system, guess, mu, other, name, **options):
+def trace(system, guess, mu, other, name, limits, tail=1e-3, max_harmonics=24, located=1e-2, **options):
     solver = CycleSolver(system, system.basis, EXACT)
     first = solver.solve(guess, mu)
     second = solver.solve(first.motion, mu | {name: other})
-    tracer = CycleTracer(solver, name, CycleBranchOptions(**options))
+    options = ContinuationOptions(
+        limits={name: limits}, parameter_scales={name: 1.0}, max_angle=1.5, location_tolerance=located, **options
+    )
+    tracer = CycleTracer(solver, name, options, OrbitOptions(tail=tail, max_harmonics=max_harmonics, exponents=4))
     tracer.start(first, second)
     return tracer, tracer.run()
 
@@ -285,15 +288,15 @@ def test_events_are_located():
     first = solver.solve(periodic.guess_of(0.3 * CIRCLE, 2, 1.0), {"mu": 0.09})
     second = solver.solve(first.motion, {"mu": 0.12})
     event = {"radius": lambda cycle: float(np.linalg.norm(cycle.motion.at([0.0]))) - 0.6}
-    options = CycleBranchOptions(limits=(0.0, 0.5), values=(0.2, 0.3), located=1e-9)
-    tracer = CycleTracer(solver, "mu", options, event)
+    options = ContinuationOptions(limits={"mu": (0.0, 0.5)}, location_tolerance=1e-9)
+    tracer = CycleTracer(solver, "mu", options, values=(0.2, 0.3), events=event)
     tracer.start(first, second)
     told = []
     tracer.run(told.append)
     (special,) = tracer.special
     assert special.kind == "radius" and abs(special.value - 0.36) < 1e-5 and special in told
     assert {0.2, 0.3} <= {p.value for p in tracer.points if p.asked}
-    again = CycleTracer(solver, "mu", options, event)
+    again = CycleTracer(solver, "mu", options, values=(0.2, 0.3), events=event)
     again.restore(tracer.points[:3])
     again.run()
     assert np.isclose(again.points[-1].value, tracer.points[-1].value) and len(again.special) == 1
@@ -317,7 +320,7 @@ def test_an_event_that_ends_a_branch_is_located_from_one_side():
     first = solver.solve(periodic.guess_of(0.3 * CIRCLE, 2, 1.0), {"mu": 0.09})
     second = solver.solve(first.motion, {"mu": 0.12})
     event = {"wall": lambda cycle: 0.6 - float(np.linalg.norm(cycle.motion.at([0.0])))}
-    tracer = CycleTracer(solver, "mu", CycleBranchOptions(limits=(0.0, 0.5)), event)
+    tracer = CycleTracer(solver, "mu", ContinuationOptions(limits={"mu": (0.0, 0.5)}), events=event)
     tracer.start(first, second)
     told = []
     assert "no further cycle" in tracer.run(told.append)
@@ -348,8 +351,6 @@ def test_too_few_harmonics_end_a_branch_with_a_sentence():
 def test_bad_options():
     with pytest.raises(ValueError, match="odd"):
         Harmonics(3, 6)
-    with pytest.raises(ValueError, match="max_step"):
-        CycleBranchOptions(step=1.0, max_step=0.1)
     with pytest.raises(ValueError, match="condition"):
         system = periodic.van_der_pol()
         solved(system, periodic.guess_of(np.cos(PHASE)[:, None], 3, 1.0), {"mu": 0.5}, free=("mu",))

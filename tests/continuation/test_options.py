@@ -23,7 +23,7 @@ BAD = [
     (OrbitOptions, {"harmonics": 20, "max_harmonics": 10}),
     (OrbitOptions, {"tail": 0.0}),
     (OrbitOptions, {"tolerance": 1.0}),
-    (OrbitOptions, {"exponents": 0}),
+    (OrbitOptions, {"exponents": -1}),
 ]
 
 

@@ -1,10 +1,10 @@
 """A system seen through products and solves alone, as a large coupled model would offer it."""
 
 from continuation.spectra import shift_invert_spectrum
-from continuation.system import SystemBase
+from continuation.system import System
 
 
-class OperatorOnly(SystemBase):
+class OperatorOnly(System):
     """Hides every matrix of another system; counts what is asked of it."""
 
     def __init__(self, inner, near):

@@ -10,10 +10,10 @@ import scipy.sparse as sp
 import scipy.sparse.linalg as spla
 
 from continuation.spectra import shift_invert_spectrum
-from continuation.system import SystemBase
+from continuation.system import System
 
 
-class CoupledChain(SystemBase):
+class CoupledChain(System):
     """Fixed chain of ``count`` unit masses; ``rank`` columns feed strains back as forces."""
 
     def __init__(self, count: int, rank: int = 3, near: complex = 0.0, damping: float = 0.05, delay: float = 5.0):

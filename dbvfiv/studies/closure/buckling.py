@@ -20,7 +20,7 @@ import numpy as np
 import scipy.sparse as sp
 import scipy.sparse.linalg as spla
 
-from continuation import ContinuationOptions, MatrixLinearisation, Reason, SystemBase, continue_branch
+from continuation import ContinuationOptions, MatrixLinearisation, Reason, System, continue_branch
 from continuation import NewtonOptions as ContinuationNewton
 
 from ...contact import class_stiffness, contact_form
@@ -301,7 +301,7 @@ class _Known:
         return float(self.pressure + part * (other.pressure - self.pressure))
 
 
-class PressedSystem(SystemBase):
+class PressedSystem(System):
     """M u' = -r(u; P): motion so slow that only resistance counts, with the mass matrix for the resistance.
 
     Its equilibria are those of the shell, and the stiffness eigenvalues with the sign turned are those of its
