@@ -85,25 +85,6 @@ def continue_branch(
     return tracer.run(branch, point, options.step)
 
 
-def resume(
-    system,
-    branch: Branch,
-    options: ContinuationOptions | None = None,
-    events=(),
-    spectrum=None,
-    observers=None,
-) -> Branch:
-    """Go on from the last point of a branch of equilibria, e.g. one loaded from a file.
-
-    The branch handed over stays as it is; the one returned holds its points and the new ones.
-    """
-    if branch.kind != "equilibria":
-        raise ValueError(f"This resumes branches of equilibria, not a {branch.kind}.")
-    options = options or ContinuationOptions()
-    tracer = branch_tracer(system, branch.fixed, branch.names[0], options, events, spectrum, observers)
-    return tracer.resume(branch)
-
-
 def switch_branch(
     system,
     special: SpecialPoint,
@@ -129,6 +110,16 @@ def switch_branch(
         The point is not a located branch point with a second real branch.
     NotConverged
         No point of the other branch was found at any step tried.
+
+    Examples
+    --------
+    >>> from continuation import JaxSystem
+    >>> system = JaxSystem(lambda u, mu: mu["r"] * u - u**3, size=1)
+    >>> options = ContinuationOptions(limits={"r": (-1.0, 1.0)})
+    >>> pitchfork, = continue_branch(system, [0.0], {"r": -1.0}, "r", options).special
+    >>> other = switch_branch(system, pitchfork, "r", options)
+    >>> bool(abs(other.states[-1, 0] ** 2 - 1) < 1e-9)
+    True
     """
     options = options or ContinuationOptions()
     if special.kind != "branch point" or not special.located or "direction" not in special.vectors:

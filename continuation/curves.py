@@ -173,7 +173,7 @@ class HopfCurveMonitor(Monitor):
 
 
 #: Kinds of points that curves start from.
-_STARTS = {
+STARTS = {
     "fold curve": ("fold", "bogdanov-takens", "cusp"),
     "hopf curve": ("hopf", "generalised hopf", "zero-hopf"),
 }
@@ -211,11 +211,21 @@ def continue_fold(
     ------
     NotABifurcation
         The point is no located fold.
+
+    Examples
+    --------
+    >>> from continuation import JaxSystem, continue_branch
+    >>> cusp = JaxSystem(lambda u, mu: mu["a"] + mu["b"] * u - u**3, size=1)
+    >>> options = ContinuationOptions(limits={"a": (-2.0, 2.0), "b": (-1.0, 2.0)})
+    >>> fold, _ = continue_branch(cusp, [-1.5], {"a": -2.0, "b": 1.0}, "a", options).special
+    >>> curve = continue_fold(cusp, fold, ("a", "b"), options)
+    >>> bool(abs(27 * curve.values("a")**2 - 4 * curve.values("b")**3).max() < 1e-8)
+    True
     """
     borders = _borders("fold curve", special)
-    monitors = [FoldCurveMonitor(), CountMonitor(spectrum)]
-    tracer = _tracer(system, special.mu, parameters, FoldCondition(*borders), options, observers, monitors)
-    return _start("fold curve", tracer, special)
+    return _start(
+        curve_tracer(system, "fold curve", special.mu, parameters, borders, options, observers, spectrum), special
+    )
 
 
 def continue_hopf(
@@ -249,50 +259,47 @@ def continue_hopf(
     ------
     NotABifurcation
         The point is no located Hopf point.
+
+    Examples
+    --------
+    >>> import jax.numpy as jnp
+    >>> from continuation import JaxSystem, continue_branch
+    >>> brusselator = JaxSystem(lambda u, mu: jnp.stack([
+    ...     mu["A"] - (mu["B"] + 1) * u[0] + u[0]**2 * u[1], mu["B"] * u[0] - u[0]**2 * u[1]]), 2)
+    >>> options = ContinuationOptions(eigenvalues=2, limits={"A": (0.5, 2.0), "B": (0.0, 6.0)})
+    >>> hopf, = continue_branch(brusselator, [1.0, 1.0], {"A": 1.0, "B": 1.0}, "B", options).special
+    >>> curve = continue_hopf(brusselator, hopf, ("B", "A"), options)
+    >>> bool(abs(curve.values("B") - 1 - curve.values("A")**2).max() < 1e-8)
+    True
     """
     borders = _borders("hopf curve", special)
-    monitors = [HopfCurveMonitor(lyapunov), CountMonitor(spectrum)]
-    tracer = _tracer(system, special.mu, parameters, HopfCondition(*borders), options, observers, monitors)
-    return _start("hopf curve", tracer, special)
-
-
-def resume_curve(
-    system,
-    branch: Branch,
-    options: ContinuationOptions | None = None,
-    observers=None,
-    lyapunov: bool = True,
-    spectrum=None,
-) -> Branch:
-    """Go on from the last point of a fold or Hopf curve, e.g. one loaded from a file."""
-    if branch.kind not in _STARTS:
-        raise ValueError(f"This resumes fold and Hopf curves, not {branch.kind}.")
-    fold = branch.kind == "fold curve"
-    condition = (FoldCondition if fold else HopfCondition)(branch.restart["p"], branch.restart["q"])
-    monitors = [FoldCurveMonitor() if fold else HopfCurveMonitor(lyapunov), CountMonitor(spectrum)]
-    tracer = _tracer(system, branch.fixed, branch.names, condition, options, observers, monitors)
-    return tracer.resume(branch)
+    tracer = curve_tracer(system, "hopf curve", special.mu, parameters, borders, options, observers, spectrum, lyapunov)
+    return _start(tracer, special)
 
 
 def _borders(kind, special):
     """Left and right vectors of a special point from which a curve of a kind can start."""
-    if special.kind not in _STARTS[kind] or "right" not in special.vectors:
+    if special.kind not in STARTS[kind] or "right" not in special.vectors:
         raise NotABifurcation(
-            f"A {kind} starts at a located point of kind {', '.join(_STARTS[kind])}; this is a "
+            f"A {kind} starts at a located point of kind {', '.join(STARTS[kind])}; this is a "
             f"{special.kind}{'' if special.located else ' that was only bracketed'}."
         )
     return special.vectors["left"], special.vectors["right"]
 
 
-def _tracer(system, mu, parameters, condition, options, observers, monitors):
+def curve_tracer(system, kind, mu, parameters, borders, options, observers, spectrum, lyapunov=True):
+    """Tracer of a fold or Hopf curve with the left and right vectors from which it starts."""
     options = options or ContinuationOptions()
     if len(set(parameters)) != 2:
         raise ValueError(f"A curve needs two different parameters, not {parameters}.")
+    fold = kind == "fold curve"
+    condition = (FoldCondition if fold else HopfCondition)(*borders)
     problem = Problem(system, mu, parameters, condition, options.state_scale, options.units(parameters))
-    return Tracer(problem, options, monitors if options.eigenvalues else monitors[:1], observers)
+    monitors = [FoldCurveMonitor() if fold else HopfCurveMonitor(lyapunov)]
+    return Tracer(problem, options, monitors + [CountMonitor(spectrum)] * bool(options.eigenvalues), observers)
 
 
-def _start(kind, tracer, special):
+def _start(tracer, special):
     """Curve from a special point, in the direction the options ask for."""
     problem = tracer.problem
     extra = [special.values["omega"]] if problem.e else []
@@ -309,5 +316,6 @@ def _start(kind, tracer, special):
     direction = np.zeros(z.size)
     direction[n + 1] = tracer.options.direction
     point = tracer.start(z, direction, frame)
+    kind = "hopf curve" if problem.e else "fold curve"
     branch = Branch(kind, n, problem.names, problem.condition.extra_names, dict(special.mu), [point.record()])
     return tracer.run(branch, point, tracer.options.step)

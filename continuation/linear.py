@@ -153,6 +153,10 @@ class MatrixLinearisation:
             self.mass = sp.csc_matrix(dense) if sparse else np.asarray(dense, float)
         self._solver = None
 
+    def __repr__(self) -> str:
+        kind = "sparse" if sp.issparse(self.jacobian) else "dense"
+        return f"<MatrixLinearisation: {kind} matrices of order {self.size}>"
+
     @property
     def _factors(self):
         if self._solver is None:

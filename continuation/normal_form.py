@@ -25,7 +25,7 @@ from continuation.options import NotABifurcation, SingularSystem
 from continuation.system import Derivatives
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class HopfNormalForm:
     """Cubic normal form at a Hopf point.
 
@@ -59,6 +59,10 @@ class HopfNormalForm:
     u: np.ndarray
     crossing: complex | None = None
     cancellation: float = 1.0
+
+    def __repr__(self) -> str:
+        crossing = "" if self.crossing is None else f", growth rate by the parameter {self.crossing.real:.6g}"
+        return f"<HopfNormalForm: {self.criticality}, omega {self.omega:.6g}, l1 {self.l1:.6g}{crossing}>"
 
     @property
     def criticality(self) -> str:
@@ -192,6 +196,15 @@ def hopf_normal_form(system, u, mu, omega: float, q, parameter: str | None = Non
     ------
     NotABifurcation
         ``i omega`` is not a simple eigenvalue, or the frequency is zero.
+
+    Examples
+    --------
+    >>> import jax.numpy as jnp
+    >>> from continuation import JaxSystem
+    >>> system = JaxSystem(lambda u, mu: jnp.stack([  # z' = (r + 2 i) z - z|z|^2
+    ...     mu["r"] * u[0] - 2 * u[1] - u[0] * (u @ u), 2 * u[0] + mu["r"] * u[1] - u[1] * (u @ u)]), 2)
+    >>> hopf_normal_form(system, np.zeros(2), {"r": 0.0}, 2.0, [1.0, -1j], "r")
+    <HopfNormalForm: super, omega 2, l1 -1, growth rate by the parameter 1>
     """
     _require_frequency(omega)
     form = hopf_normal_form_of(SystemForms(system, u, mu), omega, q, parameter)

@@ -13,6 +13,8 @@ from dataclasses import replace
 import numpy as np
 
 from continuation.branch import Branch, CurvePoint, SpecialPoint
+from continuation.branches import branch_tracer
+from continuation.curves import STARTS, curve_tracer
 from continuation.cycle_branch import CycleTracer
 from continuation.cycle_points import FOLD, TORUS, CyclePoint, SpecialCycle
 from continuation.cycles import Cycle, cycles_beside_onset
@@ -77,6 +79,19 @@ def continue_orbits(
         No second orbit was found beside the first.
     ValueError
         The first orbit lies at the limit of the parameter.
+
+    Examples
+    --------
+    >>> import jax.numpy as jnp
+    >>> from continuation import JaxSystem, find_orbit
+    >>> system = JaxSystem(lambda u, mu: jnp.stack([  # z' = (1/4 + i) z + z|z|^2 (r - |z|^2)
+    ...     u[0] / 4 - u[1] + u[0] * (u @ u) * (mu["r"] - u @ u),
+    ...     u[0] + u[1] / 4 + u[1] * (u @ u) * (mu["r"] - u @ u)]), 2)
+    >>> phase = 2 * np.pi * np.arange(30) / 30
+    >>> orbit = find_orbit(system, np.stack([np.cos(phase), np.sin(phase)], 1), 6.0, {"r": 0.5})
+    >>> branch = continue_orbits(system, orbit, "r", ContinuationOptions(limits={"r": (0.0, 1.0)}))
+    >>> branch.reason
+    'ended on the limit r = 1'
     """
     follower = _Follower(system, parameter, options, discretisation, orbit.mu)
     first = Cycle(orbit.motion, dict(orbit.mu), 0.0, 0, 0)
@@ -117,6 +132,19 @@ def orbits_from_hopf(
         The point is no located Hopf point.
     NotConverged
         No orbit was found beside it.
+
+    Examples
+    --------
+    >>> import jax.numpy as jnp
+    >>> from continuation import JaxSystem, continue_branch
+    >>> system = JaxSystem(lambda u, mu: jnp.stack([  # z' = (r + i) z - z|z|^2
+    ...     mu["r"] * u[0] - u[1] - u[0] * (u @ u), u[0] + mu["r"] * u[1] - u[1] * (u @ u)]), 2)
+    >>> options = ContinuationOptions(eigenvalues=2, limits={"r": (-1.0, 1.0)})
+    >>> hopf, = continue_branch(system, [0.0, 0.0], {"r": -1.0}, "r", options).special
+    >>> orbits = orbits_from_hopf(system, hopf, "r", options)
+    >>> last = orbit_at(system, orbits, -1)
+    >>> last.amplitude().round(6), bool(last.stable)
+    (array([1., 1.]), True)
     """
     if special.kind != "hopf" or not special.located:
         raise NotABifurcation(f"Orbits start at a located Hopf point, not at a {special.kind}.")
@@ -131,18 +159,38 @@ def orbits_from_hopf(
     return follower.run(steps, observers)
 
 
-def resume_orbits(
+def resume(
     system,
     branch: Branch,
     options: ContinuationOptions | None = None,
     discretisation: OrbitOptions | None = None,
     observers=None,
+    events=(),
+    spectrum=None,
+    lyapunov: bool = True,
 ) -> Branch:
-    """Go on from the last point of a branch of orbits, e.g. one loaded from a file.
+    """Go on from the last point of a branch or curve of any kind, e.g. one loaded from a file.
 
-    The branch handed over stays as it is; the one returned holds its points and the new ones.
+    The branch handed over stays as it is; the one returned holds its points and the new ones.  The other arguments are
+    those of the function that started it.
+
+    Examples
+    --------
+    >>> from continuation import JaxSystem, continue_branch
+    >>> system, limits = JaxSystem(lambda u, mu: mu["r"] + u**2, size=1), {"r": (-1.0, 0.5)}
+    >>> part = continue_branch(system, [-1.0], {"r": -1.0}, "r", ContinuationOptions(limits=limits, max_points=5))
+    >>> resume(system, part, ContinuationOptions(limits=limits)).of_kind("fold")
+    [<SpecialPoint: fold at r = 0, located>]
     """
-    require(branch.kind == "orbits", f"This needs a branch of orbits, not {branch.kind}.")
+    options = options or ContinuationOptions()
+    if branch.kind == "equilibria":
+        tracer = branch_tracer(system, branch.fixed, branch.names[0], options, events, spectrum, observers)
+        return tracer.resume(branch)
+    if branch.kind in STARTS:
+        borders = branch.restart["p"], branch.restart["q"]
+        return curve_tracer(
+            system, branch.kind, branch.fixed, branch.names, borders, options, observers, spectrum, lyapunov
+        ).resume(branch)
     require(len(branch) > 1, "A branch of orbits goes on from two points at least.")
     follower = _Follower(system, branch.names[0], options, discretisation, branch.fixed)
     follower.restore(branch)

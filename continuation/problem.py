@@ -188,7 +188,7 @@ ROUNDING, STALLED = 64 * np.finfo(float).eps, 0.7
 DIVERGENCE = 1e6
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Correction:
     """Outcome of Newton's method on a `Problem`.
 
@@ -208,6 +208,9 @@ class Correction:
     reason: Said
     iterations: int
     residual: float
+
+    def __repr__(self) -> str:
+        return f"<Correction: {self.reason}, {self.iterations} iterations, residual {self.residual:.3g}>"
 
     @property
     def converged(self) -> bool:

@@ -19,7 +19,7 @@ DENSE_LIMIT = 300
 REAL = 1e-9
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Spectrum:
     """Eigenvalues, some of them, of ``A x = lambda B x``.
 
@@ -39,6 +39,10 @@ class Spectrum:
     vectors: np.ndarray
     converged: np.ndarray
     iterations: int = 0
+
+    def __repr__(self) -> str:
+        count, leading = len(self.values), max(np.real(self.values), default=np.nan)
+        return f"<Spectrum: {count} eigenvalues, {np.sum(self.converged)} converged, growth rates up to {leading:.6g}>"
 
     def upper_half(self) -> tuple[np.ndarray, np.ndarray]:
         """Converged values with non-negative imaginary part, one of each pair, by growth rate."""

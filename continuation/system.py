@@ -37,6 +37,9 @@ class System:
     #: Relative step for the central differences in parameters.
     parameter_step: float = 6e-6
 
+    def __repr__(self) -> str:
+        return f"<{type(self).__name__}: {self.size} unknowns>"
+
     def residual(self, u: np.ndarray, mu: Parameters) -> np.ndarray:
         """``F(u, mu)``, shape (n,)."""
         raise NotImplementedError(f"{type(self).__name__} has no residual.")

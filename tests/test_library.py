@@ -59,7 +59,7 @@ def test_tables_come_with_units_and_ranges_as_arrays():
 def test_texts_of_a_branch_and_its_points_are_short():
     options = ContinuationOptions(eigenvalues=2, limits={"B": (0.0, 4.0)})
     branch = continue_branch(brusselator(), [1.0, 0.5], {"A": 1.0, "B": 0.5}, "B", options)
-    assert "limit of B reached" in repr(branch) and "hopf at A = 1, B = 2, located" in repr(branch)
+    assert "ended on the limit B = 4" in repr(branch) and "hopf at A = 1, B = 2, located" in repr(branch)
     branch.special *= 20
     assert all(map(is_short, (branch, branch.points[0], branch.special[0]))) and "13 more" in repr(branch)
 

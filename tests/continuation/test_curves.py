@@ -12,7 +12,7 @@ from continuation import (
     continue_branch,
     continue_fold,
     continue_hopf,
-    resume_curve,
+    resume,
 )
 from continuation.jax_system import JaxSystem
 from tests.systems.normal_forms import bautin, bogdanov_takens, cusp
@@ -134,7 +134,7 @@ def test_curves_are_saved_and_resumed(tmp_path, cusp_fold):
     )
     assert part.reason.kind is Reason.POINTS
     part.save(tmp_path / "curve.h5")
-    longer = resume_curve(cusp(), Branch.load(tmp_path / "curve.h5"), options)
+    longer = resume(cusp(), Branch.load(tmp_path / "curve.h5"), options)
     assert len(longer) == len(whole)
     assert np.allclose(longer.values("a"), whole.values("a"), rtol=0, atol=1e-8)
     assert len(longer.of_kind("cusp")) == 1
@@ -146,5 +146,3 @@ def test_wrong_starts_are_refused(cusp_fold, takens):
         continue_hopf(cusp(), cusp_fold, ("a", "b"))
     with pytest.raises(ValueError, match="two different parameters"):
         continue_fold(cusp(), cusp_fold, ("a", "a"))
-    with pytest.raises(ValueError, match="resumes fold and Hopf curves"):
-        resume_curve(bogdanov_takens(), takens)

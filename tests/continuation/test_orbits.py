@@ -20,7 +20,7 @@ from continuation import (
     hopf_normal_form,
     orbit_at,
     orbits_from_hopf,
-    resume_orbits,
+    resume,
 )
 from continuation.first_order import DirectLinearisation, FirstOrderSystem
 from continuation.harmonics import Harmonics
@@ -182,7 +182,7 @@ def test_fold_of_cycles_of_the_bautin_system(tmp_path):
     branch.save(tmp_path / "cycles.h5")
     part = orbits_from_hopf(system, hopf, "mu", ContinuationOptions(limits={"mu": (-1, 0.3)}, max_points=5))
     part.save(tmp_path / "part.h5")
-    longer = resume_orbits(
+    longer = resume(
         system,
         Branch.load(tmp_path / "part.h5"),
         ContinuationOptions(limits={"mu": (-1, 0.3)}),
