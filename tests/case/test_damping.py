@@ -2,11 +2,6 @@
 
 from __future__ import annotations
 
-import pytest
-
-from dbvfiv.case import make_case
-from dbvfiv.case.load import parse_toml
-from dbvfiv.case.write import case_toml
 from dbvfiv.studies.case import Case, load_case
 
 LOSS, RAYLEIGH = {"damping.model": "loss factor"}, {"damping.model": "rayleigh"}
@@ -26,24 +21,6 @@ def test_what_is_given_stays():
     damping = Case().replace(LOSS | {"damping.alpha": 3, "damping.loss_factor": "1/2", "damping.branches": 6}).damping
     assert (damping.alpha, damping.loss_factor, damping.branches) == (3.0, 0.5, 6)
     assert Case().replace(LOSS | {"damping.beta": 0, "damping.loss_factor": 0}).damping.loss_factor == 0.0
-
-
-@pytest.mark.parametrize(
-    "changes",
-    [
-        {},
-        LOSS,
-        LOSS | {"damping.loss_factor": 0.5, "damping.band": [2, "300 Hz"]},
-        LOSS | {"materials.CR.loss_factor": "NBR", "materials.fibre.prony": [[0.1, "3 ms"], [0.2, 1]]},
-        RAYLEIGH,
-        RAYLEIGH | {"damping.beta": 0.001},
-    ],
-)
-def test_every_case_can_be_written_and_read(changes):
-    case = Case().replace(changes)
-    for comments in (True, False):
-        assert make_case(Case, parse_toml(case_toml(case, comments))) == case
-    assert Case.from_dict(case.to_dict()) == case
 
 
 def test_cases_of_earlier_versions_are_read():

@@ -8,7 +8,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from dbvfiv.case.model import Case
-from dbvfiv.errors import CaseError
 from dbvfiv.geometry import surface_of, valve_mesh
 from dbvfiv.geometry.divisions import (
     bend_of_lip,
@@ -86,21 +85,6 @@ def test_rows_of_ones_own():
     assert np.array_equal(rows_of(7, row_positions=own).positions, own)
     spread = rows_of(14, row_positions=own).positions
     assert spread[::2] == pytest.approx(own, abs=1e-12)
-
-
-@pytest.mark.parametrize(
-    "key, value, words",
-    [
-        ("breaks", [0.6], "mesh.breaks is a list with 0.6 m; a row lies between"),
-        ("breaks", [0.0], "mesh.breaks is a list with 0 m; a row lies between"),
-        ("row_positions", [0.0, 0.56], "mesh.row_positions is a list of 2; a mesh has at least 7"),
-        ("row_positions", [0, 0.1, 0.2, 0.15, 0.3, 0.4, 0.56], "mesh.row_positions is a list that falls"),
-        ("row_positions", [0, 0.1, 0.2, 0.25, 0.3, 0.4, 0.5], "mesh.row_positions is a list from 0 to 0.5 m"),
-    ],
-)
-def test_rows_off_the_valve_are_refused(key, value, words):
-    with pytest.raises(CaseError, match=words):
-        Case().replace({f"mesh.{key}": value})
 
 
 def test_too_few_rows_for_all_breaks_are_told():

@@ -78,29 +78,6 @@ def test_patches_lie_on_both_sides():
     assert np.array_equal(half, np.concatenate([quarter[:, ::-1], quarter], axis=1))
 
 
-REFUSED = {
-    "too far": ({"valve.bill_offset": 1.5}, "valve.bill_offset is given as 1.5"),
-    "to the other side": ({"valve.bill_offset": -0.5}, "valve.bill_offset is given as -0.5"),
-    "too steep": (
-        {"valve.bill_offset": 1.0, "valve.lip_half_width": 0.3, "valve.saddle_length": "58 mm"},
-        "valve.saddle_length .* steeper than 80 degrees",
-    ),
-    "fluid outside": ({"valve.bill_offset": 1.0, "outside.fluid": "same"}, 'outside.fluid .* must be "none"'),
-    "class of a quarter": ({"valve.bill_offset": 1.0, "modes.symmetry": "AS"}, "modes.symmetry .* S, A"),
-    "class of a half": ({"sweep.symmetry": "A"}, "sweep.symmetry .* SS, SA, AS, AA"),
-    "part that is none": ({"mesh.part": "third"}, "mesh.part"),
-}
-
-
-@pytest.mark.parametrize("name", REFUSED)
-def test_what_is_refused(name, one_sentence):
-    changes, words = REFUSED[name]
-    changes = {"valve.wall": "uniform", "valve.lip_half_width": 0.2} | changes
-    with pytest.raises(CaseError, match=words) as caught:
-        dbvfiv.load(None, changes)
-    assert one_sentence(str(caught.value)), str(caught.value)
-
-
 def test_the_symmetric_saddle_may_be_that_steep():
     dbvfiv.load(None, {"valve.wall": "uniform", "valve.lip_half_width": 0.3, "valve.saddle_length": "58 mm"})
 

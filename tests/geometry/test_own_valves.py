@@ -4,9 +4,8 @@ import numpy as np
 import pytest
 
 from dbvfiv.case import CaseError
-from dbvfiv.case.write import case_toml
 from dbvfiv.geometry import valve_mesh
-from dbvfiv.studies.case import Case, load_case
+from dbvfiv.studies.case import Case
 
 SIX_INCH = {
     "valve.duckbill_length": 0.105,
@@ -51,16 +50,13 @@ def test_what_follows_goes_on_following():
     )
 
 
-def test_given_numbers_stay(tmp_path):
+def test_given_numbers_stay():
     case = Case().replace(SIX_INCH | {"valve.lip_radius": "8 mm", "valve.flange_wall_deduction": "4 mm"})
     assert (case.valve.duckbill_wall_deduction, case.valve.flange_wall_deduction) == (0.0035, 0.004)
     inner = 0.008 - 0.0035  # open at rest by what the lips leave between them, the round corner included
     assert lip_area(case) == pytest.approx(0.062 * (inner + 1e-4) + np.pi / 4 * inner**2, rel=1e-6)
     low = Case().replace(SIX_INCH | {"valve.lip_radius": "3 mm"})
     assert low.valve.duckbill_wall_deduction == 0.003  # faces that would cross at rest touch
-    for comments in (True, False):
-        (tmp_path / "case.toml").write_text(case_toml(case, comments))
-        assert load_case(tmp_path / "case.toml") == case
 
 
 def test_thickness_factor_leaves_the_passage():
@@ -104,11 +100,3 @@ def test_walls_that_fill_key_points_are_refused(points):
     case = Case().replace({"valve.key_points": points, "valve.wall": "uniform", "valve.wall_thickness": 0.05})
     with pytest.raises(ValueError, match="key points of the lip leave no flow area"):
         valve_mesh(case.valve, case.mesh)
-
-
-def test_lips_as_wide_as_the_flange_are_refused():
-    with pytest.raises(CaseError, match="valve.initial_gap is 0.11 m, .*smaller than that of the flange, 539.1 cm2"):
-        Case().replace({"valve.initial_gap": "110 mm"})
-    round_lip = {"valve.lip_radius": 0.06, "valve.lip_half_width": 0.009, "valve.flange_wall_deduction": 0.015}
-    with pytest.raises(CaseError, match="valve.lip_radius is 0.06 m"):
-        Case().replace(SIX_INCH | round_lip)

@@ -6,11 +6,10 @@ import numpy as np
 import pytest
 
 from dbvfiv.case import CaseError
-from dbvfiv.case.write import case_toml
 from dbvfiv.geometry import valve_mesh
 from dbvfiv.geometry.divisions import grading
 from dbvfiv.model.build import build_shell
-from dbvfiv.studies.case import Case, load_case
+from dbvfiv.studies.case import Case
 
 EVEN = {"valve.wall": "uniform", "valve.wall_thickness": 0.012}
 
@@ -70,43 +69,6 @@ def test_a_patch_of_the_same_wall_changes_no_passage():
     even, patched = meshes({"begin": 0.1, "end": 0.3, "around_from": 0.2, "thickness": 0.012})
     assert np.interp(even.z, patched.z, patched.wall_deduction) == pytest.approx(even.wall_deduction, rel=1e-3)
     assert patched.wall_deduction[0] == even.wall_deduction[0]
-
-
-def test_patches_are_read_and_written(tmp_path):
-    case = case_of({"end": 0.21, "around_from": 0.9, "extra": 0.002}, {"thickness": 0.013})
-    for comments in (True, False):
-        (tmp_path / "case.toml").write_text(case_toml(case, comments))
-        assert load_case(tmp_path / "case.toml") == case
-    assert Case.from_dict(case.to_dict()) == case
-
-
-BAD = {
-    "neither thickness nor extra": ({}, r"valve.patches.0.thickness is missing; a patch has either"),
-    "both": ({"thickness": 0.01, "extra": 0.01}, "thickness is 0.01 m beside extra"),
-    "end before begin": (
-        {"extra": 0.001, "begin": 0.3, "end": 0.2},
-        "valve.patches.0.end is 0.2 m; it must lie",
-    ),
-    "around backwards": (
-        {"extra": 0.001, "around_from": 0.6, "around_to": 0.5},
-        "around_to is 0.5; it must be",
-    ),
-    "beyond the valve": ({"extra": 0.001, "begin": 0.6}, "valve.patches.0.begin is 0.6 m; the valve ends at 0.56 m"),
-    "share above one": ({"extra": 0.001, "around_to": 1.5}, "around_to is given as 1.5; it must be .*at most 1"),
-    "an arc as a length": ({"extra": 0.001, "around_to": "30 mm"}, 'around_to is given as "30 mm"'),
-    "nothing left": ({"extra": -0.012}, "leaves 0 m of wall at z = 0 m"),
-    "less than nothing": ({"extra": -0.02, "begin": 0.1}, "leaves -0.008 m of wall at z = 0.1 m"),
-    "fills the pipe": ({"thickness": 0.3, "begin": 0.5}, "fills the pipe"),
-    "unknown key": ({"extra": 0.001, "width": 0.1}, "valve.patches.0.width is not a key"),
-}
-
-
-@pytest.mark.parametrize("name", BAD)
-def test_bad_patches(name, one_sentence):
-    patch, words = BAD[name]
-    with pytest.raises(CaseError, match=words) as caught:
-        case_of(patch)
-    assert one_sentence(str(caught.value))
 
 
 def test_a_patch_that_fills_a_narrow_place(one_sentence):

@@ -2,10 +2,8 @@
 
 import pytest
 
-from dbvfiv.case import CaseError
-from dbvfiv.case.write import case_toml
 from dbvfiv.geometry import valve_mesh
-from dbvfiv.studies.case import Case, load_case
+from dbvfiv.studies.case import Case
 
 OWN = {"valve.lip_half_width": 0.15, "valve.cuff_length": 0.05, "valve.lip_rise": 0.004, "valve.flare_length": 0.04}
 UNIFORM = {"valve.wall": "uniform"}
@@ -23,7 +21,7 @@ def test_every_length_is_multiplied(changes, factor):
     assert other.columns == pytest.approx(one.columns, abs=1e-12)
 
 
-def test_a_case_says_what_was_given(tmp_path):
+def test_a_case_says_what_was_given():
     """Sizes are read, written and changed as given; the model sees them multiplied."""
     case = Case().replace({"valve.scale": 3})
     assert case.valve.duckbill_length == pytest.approx(0.63) and case.valve.wall_map[0].thickness == pytest.approx(
@@ -32,18 +30,6 @@ def test_a_case_says_what_was_given(tmp_path):
     assert case.valve.lip_radius == pytest.approx(3 * 0.00619)
     assert case.to_dict()["valve"]["duckbill_length"] == 0.21
     assert Case.from_dict(case.to_dict()) == case
-    for comments in (True, False):
-        (tmp_path / "case.toml").write_text(case_toml(case, comments))
-        assert load_case(tmp_path / "case.toml") == case
     assert case.replace({"valve.scale": 1}) == Case()
     assert case.replace({"valve.duckbill_length": "200 mm"}).valve.duckbill_length == pytest.approx(0.6)
     assert case.replace({"fluid.density": 5}).valve == case.valve
-
-
-def test_rules_speak_of_what_was_given():
-    with pytest.raises(CaseError, match="ends at 0.5 m; it must reach the valve's length of 0.56 m"):
-        Case().replace({"valve.scale": 7, "valve.wall_map": [{"to": 0.5, "thickness": 0.01}]})
-    with pytest.raises(CaseError, match=r"valve.scale is given as 0\b.*at least 0.001"):
-        Case().replace({"valve.scale": 0})
-    with pytest.raises(CaseError, match="a list with 0.6 m; a row lies between the lip, 0 m, and the flange, 0.56 m"):
-        Case().replace({"valve.scale": 2, "mesh.breaks": [0.6]})
