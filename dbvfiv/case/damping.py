@@ -4,23 +4,20 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from pathlib import Path
 from typing import Annotated, Any, Literal
 
 from pydantic import (
     BeforeValidator,
     PrivateAttr,
     StrictInt,
-    ValidationInfo,
-    field_validator,
     model_serializer,
     model_validator,
 )
 
 from .parameters import PARAMETERS
-from .quantity import Number, Quantity, Rate, Time
+from .quantity import Number, Quantity, Rate, Time, word_or_number
 from .section import BrokenRule, Described, Section, key
-from .tables import existing_file
+from .tables import ExistingFile
 
 #: Materials whose loss factors come with the program.
 SHIPPED_LOSSES = ("NR", "SBR", "CR", "EPDM", "NBR", "IIR", "fibre")
@@ -60,17 +57,6 @@ def kelvin(value: float, unit: str) -> float:
 def celsius(temperature: float) -> str:
     """A temperature in K as it stands in messages."""
     return f"{round(temperature - _ZERO_CELSIUS, 2):g} degC"
-
-
-def _loss_factor(given: Any) -> Any:
-    if isinstance(given, str) and given.strip() in SHIPPED_LOSSES:
-        return given.strip()
-    if isinstance(given, str) and not any(c.isdigit() for c in given):
-        raise ValueError("which is no material whose loss factor is known")
-    value = _PLAIN.parse(given)
-    if not 0 <= value <= LARGEST_LOSS:
-        raise ValueError("which is out of range")
-    return value
 
 
 def _temperature(given: Any) -> float:
@@ -114,7 +100,12 @@ def _series(given: Any) -> Any:
 
 LossFactor = Annotated[
     float | str,
-    BeforeValidator(_loss_factor),
+    word_or_number(
+        SHIPPED_LOSSES,
+        _PLAIN,
+        lambda value: 0 <= value <= LARGEST_LOSS,
+        "which is no material whose loss factor is known",
+    ),
     Described(
         "plain number or text",
         f"a number from 0 to {LARGEST_LOSS:g}, or one of {', '.join(SHIPPED_LOSSES)} for a value that comes with the "
@@ -146,7 +137,7 @@ class Relaxing(Section):
         None,
         "Loss factor (tan delta), the same over damping.band; the name of a material takes the value shipped for it.",
     )
-    loss_data: Path | None = key(
+    loss_data: ExistingFile | None = key(
         None,
         "CSV file of tan delta, or of storage and loss modulus, over frequency, with units in its header; relative to "
         "the case file.",
@@ -154,7 +145,7 @@ class Relaxing(Section):
     loss_temperature: Temperature | None = key(
         None, "Which temperature of the table is meant, where loss_data or relaxation_data holds several."
     )
-    relaxation_data: Path | None = key(
+    relaxation_data: ExistingFile | None = key(
         None, "CSV file of the relaxing modulus over time, with units in its header; relative to the case file."
     )
     prony: Series | None = key(
@@ -168,11 +159,6 @@ class Relaxing(Section):
         fields = cls.__pydantic_fields__
         for name in Relaxing.model_fields:
             fields[name] = fields.pop(name)
-
-    @field_validator("loss_data", "relaxation_data", mode="after")
-    @classmethod
-    def _find_table(cls, path: Path | None, info: ValidationInfo) -> Path | None:
-        return None if path is None else existing_file(path, info)
 
     @model_validator(mode="after")
     def _one_way(self):

@@ -9,15 +9,14 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Collection, Mapping
-from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import BeforeValidator, Field, StrictStr, ValidationInfo, field_validator, model_validator
+from pydantic import BeforeValidator, Field, StrictStr, model_validator
 
 from .damping import Relaxing
-from .quantity import Angle, Density, Length, Modulus, Number, Percent, Quantity
+from .quantity import Angle, Density, Length, Modulus, Number, Percent, Quantity, word_or_number
 from .section import BrokenRule, Described, Section, key
-from .tables import existing_file
+from .tables import ExistingFile
 from .wall import Extent
 
 RUBBERS = ("CR", "SBR", "EPDM")
@@ -28,18 +27,9 @@ AUTO = "auto"
 _PERCENT = Quantity("", "%")
 
 
-def _strain_level(given: Any) -> Any:
-    if isinstance(given, str) and given.strip() == AUTO:
-        return AUTO
-    value = _PERCENT.parse(given)
-    if not LOWEST_LEVEL <= value <= HIGHEST_LEVEL:
-        raise ValueError("which is out of range")
-    return value
-
-
 StrainLevel = Annotated[
     float | str,
-    BeforeValidator(_strain_level),
+    word_or_number((AUTO,), _PERCENT, lambda value: LOWEST_LEVEL <= value <= HIGHEST_LEVEL, is_word=lambda text: False),
     Described("plain number or choice", 'a number at least 10 % and at most 60 %, or "auto"', _PERCENT),
 ]
 
@@ -212,12 +202,14 @@ class Fit(Relaxing):
     """Rubber fitted to tests in tension, planar and biaxial tension (`dbvfiv fit` shows how well)."""
 
     kind: Literal["fit"] = key(..., "Rubber fitted to its tests.")
-    path: Path = key(
+    path: ExistingFile = key(
         ...,
         "CSV file of the tension test, or of several tests with a column test; relative to the case file.",
     )
-    planar: Path | None = key(None, "CSV file of a test in planar tension (pure shear), fitted with the others.")
-    biaxial: Path | None = key(None, "CSV file of a test in equibiaxial tension, fitted with the others.")
+    planar: ExistingFile | None = key(
+        None, "CSV file of a test in planar tension (pure shear), fitted with the others."
+    )
+    biaxial: ExistingFile | None = key(None, "CSV file of a test in equibiaxial tension, fitted with the others.")
     law: Literal["softening", "mooney-rivlin", "neo-hookean", "yeoh", "ogden"] = key("softening", "Form of its energy.")
     terms: Literal[1, 2, 3] | None = key(
         None,
@@ -241,11 +233,6 @@ class Fit(Relaxing):
         "last", "Which loading is taken where the file has a column cycle: the first, or the stabilised last."
     )
     density: Density = _density(...)
-
-    @field_validator("path", "planar", "biaxial", mode="after")
-    @classmethod
-    def _find(cls, path: Path | None, info: ValidationInfo) -> Path | None:
-        return None if path is None else existing_file(path, info)
 
 
 class ShippedRubber(Relaxing):

@@ -8,7 +8,7 @@ from typing import Annotated, Any, Literal
 from pydantic import BeforeValidator, Field, StrictBool, ValidationInfo, field_validator, model_validator
 
 from .parameters import PARAMETERS
-from .quantity import GRAVITY, Density, FaceStiffness, Length, Number, Pressure, Quantity, Stiffness
+from .quantity import GRAVITY, Density, FaceStiffness, Length, Number, Pressure, Quantity, Stiffness, word_or_number
 from .section import BrokenRule, Described, Section, key
 
 #: Viscosities by name, Pa s, at 20 degC: water at 0.1 MPa (IAPWS R12-08), dry air at 0.1 MPa (Lemmon & Jacobsen 2004).
@@ -17,20 +17,9 @@ VISCOSITIES = {"none": 0.0, "water": 1.0016e-3, "air": 1.813e-5}
 _THICKEST = 10.0
 
 
-def _viscosity(given: Any) -> float | str:
-    if isinstance(given, str) and given.strip() in VISCOSITIES:
-        return given.strip()
-    if isinstance(given, str) and given.strip().isalpha():
-        raise ValueError("which is no word that is known here")
-    value = Quantity("Pa s", "mPa s").parse(given)
-    if not 0.0 < value <= _THICKEST:
-        raise ValueError("which is out of range")
-    return value
-
-
 Viscosity = Annotated[
     float | str,
-    BeforeValidator(_viscosity),
+    word_or_number(VISCOSITIES, Quantity("Pa s", "mPa s"), lambda value: 0 < value <= _THICKEST, is_word=str.isalpha),
     Described(
         "choice or viscosity", f'"none", "water", "air" or a viscosity greater than 0 and at most {_THICKEST:g} Pa s'
     ),
@@ -257,20 +246,9 @@ CLEARANCE = 1.02
 _DENSITY = PARAMETERS["density"]
 
 
-def _fluid(given: Any) -> Any:
-    if isinstance(given, str) and given.strip() in WORDS:
-        return given.strip()
-    if isinstance(given, str) and not any(c.isdigit() for c in given):
-        raise ValueError("which is no word that is known here")
-    value = _DENSITY.quantity.parse(given)
-    if not _DENSITY.low < value <= _DENSITY.high:
-        raise ValueError("which is out of range")
-    return value
-
-
 OutsideFluid = Annotated[
     float | str,
-    BeforeValidator(_fluid),
+    word_or_number(WORDS, _DENSITY.quantity, lambda value: _DENSITY.low < value <= _DENSITY.high),
     Described("choice or density", f'"none", "same" or a density greater than 0 and at most {_DENSITY.high:g} kg/m^3'),
 ]
 

@@ -9,12 +9,13 @@ from __future__ import annotations
 
 import math
 import re
+from collections.abc import Callable, Collection
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cache
 from typing import Annotated, Any
 
-from pydantic import GetCoreSchemaHandler
+from pydantic import BeforeValidator, GetCoreSchemaHandler
 from pydantic_core import core_schema
 
 _NUMBER = r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?"
@@ -199,6 +200,33 @@ class Quantity:
             return self.parse(given, (info.context or {}).get("density"))
 
         return core_schema.with_info_before_validator_function(parse, handler(source))
+
+
+def has_no_digit(text: str) -> bool:
+    """True for what can be a word only."""
+    return not any(character.isdigit() for character in text)
+
+
+def word_or_number(
+    words: Collection[str],
+    quantity: Quantity,
+    fits: Callable[[float], bool],
+    unknown: str = "which is no word that is known here",
+    is_word: Callable[[str], bool] = has_no_digit,
+) -> BeforeValidator:
+    """Validator of a key that takes one of some words, or a number that fits; `unknown` is said of other words."""
+
+    def read(given: Any) -> Any:
+        if isinstance(given, str) and given.strip() in words:
+            return given.strip()
+        if isinstance(given, str) and is_word(given.strip()):
+            raise ValueError(unknown)
+        value = quantity.parse(given)
+        if not fits(value):
+            raise ValueError("which is out of range")
+        return value
+
+    return BeforeValidator(read)
 
 
 Length = Annotated[float, Quantity("m", "mm")]

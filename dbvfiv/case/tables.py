@@ -7,7 +7,7 @@ import re
 from pathlib import Path
 from typing import Annotated, Any
 
-from pydantic import BeforeValidator, ValidationInfo
+from pydantic import AfterValidator, BeforeValidator, ValidationInfo
 
 from .quantity import Quantity
 from .section import Described
@@ -57,6 +57,9 @@ def existing_file(path: Path, info: ValidationInfo) -> Path:
         raise ValueError("which does not exist" if not str(path).endswith("/") else "which is not a file")
     return path.resolve()
 
+
+#: A key that names a file, which is looked for.
+ExistingFile = Annotated[Path, AfterValidator(existing_file)]
 
 _TIME, _PRESSURE = Quantity("s", "s"), Quantity("Pa", "kPa", head=True)
 _UNIT = re.compile(r"[\[(]\s*([^\])]+?)\s*[\])]")
