@@ -194,16 +194,8 @@ def read_header(file: h5py.File, case_model: type[Case]) -> Header:
     )
 
 
-#: What files that do not say it were computed with.
-FORMER_MESH = {"element": "MITC4", "rows": "uniform", "columns": "uniform"}
-
-
 def _case(text: str, model: type[Case]) -> Case:
-    data = json.loads(text)
     try:
-        data["mesh"] = FORMER_MESH | data["mesh"]
-        return model.from_dict(data)
-    except (KeyError, TypeError) as error:
-        raise ValueError(f"its case has no readable mesh, {error}") from error
+        return model.from_dict(json.loads(text))
     except CaseError as error:  # not the user's slip but the file's
         raise ValueError(f"its case cannot be used, {error}") from error

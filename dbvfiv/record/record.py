@@ -9,7 +9,6 @@ import json
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
-from functools import cached_property
 from importlib import import_module
 from pathlib import Path
 from typing import Any
@@ -269,15 +268,12 @@ class StoredRecord(Record):
             self.mesh = read_mesh(file) if "mesh" in file else None
             self.tables = {table.name: table for table in tables(self.mesh)}
             self._log = read_log(file)
-            self._absent = {name for name, table in self.tables.items() if table.later and name not in file["tables"]}
             for table in self.tables.values():
-                if table.name in self._absent:
-                    continue
                 group = file["tables"][table.name]
-                missing = [c.name for c in table.columns if c.name not in group and c.earlier is None]
+                missing = [c.name for c in table.columns if c.name not in group]
                 if missing:
                     raise KeyError(f"{table.name}/{missing[0]}")
-            self._count = {name: 0 if name in self._absent else read_rows(file["tables"][name]) for name in self.tables}
+            self._count = {name: read_rows(file["tables"][name]) for name in self.tables}
             self.header = replace(read_header(file, case_model), complete=self.complete)
 
     def __getstate__(self) -> dict[str, Any]:
@@ -302,14 +298,8 @@ class StoredRecord(Record):
 
     def _read(self, table: str, name: str, rows: slice | int) -> Any:
         column = next(c for c in self.tables[table].columns if c.name == name)
-        if table in self._absent:
-            spec = self.tables[table]
-            return np.empty((0, *spec.shape(column)), spec.dtype(column))[rows]
         with reading(self.path) as file:
-            group = file["tables"][table]
-            if column.name not in group:
-                return np.full(self._count[table], column.earlier, self.tables[table].dtype(column))[rows]
-            return read_column(group, column, rows)
+            return read_column(file["tables"][table], column, rows)
 
     @property
     def log(self) -> list[dict[str, Any]]:
@@ -320,11 +310,6 @@ class StoredRecord(Record):
         self._columns.clear()
         self._count |= {name: min(count, self._count[name]) for name, count in rows.items()}
         return self
-
-    @cached_property
-    def size(self) -> int:
-        """Bytes of the file."""
-        return self.path.stat().st_size
 
 
 def copy_record(record: Record, tables: Iterable[TableSpec], path: str | Path) -> None:

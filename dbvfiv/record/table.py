@@ -50,8 +50,6 @@ class Column:
         A numpy type, or ``TEXT``.
     shown : Shown, optional
         How it is printed; not at all without.
-    earlier : float, optional
-        What its rows are in files of earlier versions, which do not have it.
     read : callable, optional
         Its value, from the object that a row is made of; the item or attribute of its name without.
     shape : tuple of int, or callable
@@ -63,13 +61,12 @@ class Column:
     description: str
     dtype: str = "f8"
     shown: Shown | None = None
-    earlier: float | None = None
     read: Callable[[Any], Any] | None = None
     shape: tuple[int, ...] | Callable[[Any], tuple[int, ...] | None] = ()
 
     def __reduce__(self) -> tuple:
         """For pickle; functions that print and read it are no data and stay behind."""
-        return Column, (self.name, self.units, self.description, self.dtype, None, self.earlier)
+        return Column, (self.name, self.units, self.description, self.dtype)
 
     def of(self, source: Any) -> Any:
         """Value of the column in a mapping or an object; a slash in its name leads to an attribute of an attribute."""
@@ -122,15 +119,12 @@ class TableSpec:
         Shape of one row of the columns that are not scalars, where these do not say it.
     chunk : int
         Rows of scalar columns that are stored together; those with a shape are stored row by row up to 64 kB.
-    later : bool
-        Files of earlier versions do not have it; they are read as if it had no rows.
     """
 
     name: str
     columns: tuple[Column, ...]
     shapes: dict[str, tuple[int, ...]] = field(default_factory=dict)
     chunk: int = 64
-    later: bool = False
 
     @classmethod
     def on(cls, mesh: Any, name: str, columns: Iterable[Column], chunk: int = 64) -> TableSpec:

@@ -60,14 +60,8 @@ def keep_measured(
 
 def kept_tables(record: Record) -> tuple[MeasuredTable, ...]:
     """The tables that a record holds."""
-    return tuple(_table(note) for note in record.notes(NOTE))
-
-
-def _table(note: dict[str, Any]) -> MeasuredTable:
-    if "points" in note:  # of a version that knew pressures and flows alone
-        pressure, mass_flow = zip(*note["points"])
-        return MeasuredTable("", {"pressure": pressure, "mass_flow": mass_flow})
-    return MeasuredTable(note["name"], {name: tuple(values) for name, values in note["columns"].items()})
+    notes = record.notes(NOTE)
+    return tuple(MeasuredTable(n["name"], {key: tuple(column) for key, column in n["columns"].items()}) for n in notes)
 
 
 def _joined(tables: Iterable[MeasuredTable], kind: str, *names: str) -> list[tuple[Any, ...]] | None:

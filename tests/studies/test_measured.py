@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -16,7 +15,7 @@ from dbvfiv.case.measured import AREA, DISCHARGE, SHAPE, TAPS, read_measured
 from dbvfiv.drawing.views import faces
 from dbvfiv.studies.case import Case, thesis_case
 from dbvfiv.studies.closure import study as closure
-from dbvfiv.studies.measured import cut, distances, kept_tables
+from dbvfiv.studies.measured import cut, distances
 from dbvfiv.studies.steady import study as steady
 
 SMALL = {"mesh.around": 6, "mesh.along": 8}
@@ -122,12 +121,6 @@ def test_several_files(tmp_path):
         with pytest.raises(CaseError, match=words):
             thesis_case([f"steady.measured={wrong}"])
     assert Case.from_dict({"steady": {"measured": None}}).steady.measured == ()  # as earlier versions wrote it
-
-
-def test_points_of_an_earlier_version_are_a_discharge():
-    record = SimpleNamespace(notes=lambda what: [{"what": what, "points": [[1e3, 2.0], [2e3, 3.0]]}])
-    (table,) = kept_tables(record)
-    assert table.holds == {DISCHARGE} and table.columns["mass_flow"] == (2.0, 3.0)
 
 
 # -- sections

@@ -15,6 +15,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 import numpy as np
 import scipy.sparse as sp
@@ -40,8 +41,7 @@ _REFUSALS = 6
 PARAMETER, STEP, LARGEST_STEP, MOST_POINTS = "pressure", 0.05, 0.25, 400
 
 
-@dataclass(frozen=True)
-class StiffnessSpectrum:
+class StiffnessSpectrum(NamedTuple):
     """Eigenvalues nearest to zero at one state, ascending.
 
     Attributes
@@ -108,8 +108,7 @@ def spectrum_of(stiffness, mass, pressure: float, count: int = 4, tolerance: flo
     if residuals.max() > tolerance:
         raise SolveError(
             f"The lowest stiffness eigenvalues at {pressure:.6g} Pa were found to a relative residual of "
-            f"{residuals.max():.2g} only, "
-            f"not to {tolerance:.2g}."
+            f"{residuals.max():.2g} only, not to {tolerance:.2g}."
         )
     skew = abs(stiffness - stiffness.T).max() / abs(stiffness).max()
     return StiffnessSpectrum(values, vectors, residuals, lower, float(skew))
@@ -117,9 +116,8 @@ def spectrum_of(stiffness, mass, pressure: float, count: int = 4, tolerance: flo
 
 def _nearest(stiffness, mass, count, shift):
     """Eigenvalues next to a shift with vectors and residuals, by real part."""
-    values, vectors = spla.eigs(
-        stiffness, count, mass, sigma=shift, OPinv=_inverse(stiffness - shift * mass), v0=_start(stiffness), tol=1e-13
-    )
+    inverse, start = _inverse(stiffness - shift * mass), _start(stiffness)
+    values, vectors = spla.eigs(stiffness, count, mass, sigma=shift, OPinv=inverse, v0=start, tol=1e-13)
     order = np.argsort(values.real)
     values, vectors = values[order], vectors[:, order]
     # Measured against the size of the terms that cancel, for an eigenvalue may be zero.
@@ -128,17 +126,8 @@ def _nearest(stiffness, mass, count, shift):
 
 
 def _symmetric(symmetric, mass, count):
-    values = spla.eigsh(
-        symmetric,
-        count,
-        mass,
-        sigma=0.0,
-        OPinv=_inverse(symmetric),
-        v0=_start(symmetric),
-        tol=1e-12,
-        return_eigenvectors=False,
-    )
-    return np.sort(values)
+    look = {"sigma": 0.0, "OPinv": _inverse(symmetric), "v0": _start(symmetric), "tol": 1e-12}
+    return np.sort(spla.eigsh(symmetric, count, mass, return_eigenvectors=False, **look))
 
 
 def _start(matrix) -> np.ndarray:
@@ -180,8 +169,7 @@ def class_matrices(
     return stiffness.tocsr(), dofs.matrix(shell.mass(still))
 
 
-@dataclass(frozen=True)
-class Buckling:
+class Buckling(NamedTuple):
     """A state in which the tangent stiffness is singular.
 
     Attributes
@@ -280,15 +268,14 @@ class BucklingWatch:
             steps.settle()
         except SolveError:
             return None
-        size = lambda q: np.abs(self.pressed.nodal(q)[:, :3]).max()  # noqa: E731
-        if size(steps.q - guess) > 0.5 * size(high.q - low.q):
+        off, apart = (np.abs(self.pressed.nodal(way)[:, :3]).max() for way in (steps.q - guess, high.q - low.q))
+        if off > 0.5 * apart:
             return None
         spectrum = self.spectrum(steps.q, pressure)
         return _Known(float(pressure), steps.q, spectrum.lowest, spectrum.shape)
 
 
-@dataclass(frozen=True)
-class _Known:
+class _Known(NamedTuple):
     """A state of the path with its lowest eigenvalue, 1/s2, and the shape that belongs to it."""
 
     pressure: float
@@ -340,11 +327,12 @@ class PressedSystem(System):
 
     def d2(self, u, mu, a, b):
         pressed = self.pressed
-        expand, restrict = pressed.nodal, pressed.shell.dofs.restrict
+        a_nodal, b_nodal = pressed.nodal(a), pressed.nodal(b)
         second = pressed.shell.second(u, a, b)
         if pressed.contact is not None:
-            second += restrict(contact_form(pressed.contact, expand(u), pressed.multiplier, expand(a), expand(b)))
-        return mu[PARAMETER] * pressed.pressure_force_second(expand(a), expand(b)) - second
+            form = contact_form(pressed.contact, pressed.nodal(u), pressed.multiplier, a_nodal, b_nodal)
+            second += pressed.shell.dofs.restrict(form)
+        return mu[PARAMETER] * pressed.pressure_force_second(a_nodal, b_nodal) - second
 
     def d2_parameter(self, u, mu, name, a):
         tangent = self.pressed.tangent(u, 0.0)
@@ -352,8 +340,7 @@ class PressedSystem(System):
         return -(self.pressed.shell.dofs.matrix(loaded.stiffness - tangent.stiffness) @ a)
 
 
-@dataclass(frozen=True)
-class LimitPath:
+class LimitPath(NamedTuple):
     """Equilibria followed by arc length.
 
     Attributes

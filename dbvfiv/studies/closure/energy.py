@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from copy import copy
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 import numpy as np
 
@@ -15,14 +16,11 @@ from ...model.pressed_shell import PressedShell
 _POINTS, _WEIGHTS = np.polynomial.legendre.leggauss(6)
 #: Most halvings of a stretch, and halvings in a row that do not help.
 _DEEPEST, _STUBBORN = 16, 5
-#: Most iterations for an equilibrium in between.
-_ITERATIONS = 25
-#: Unknowns, in sizes of the mesh, beyond which an iteration has lost its way.
-_ASTRAY = 10.0
+#: Most iterations for an equilibrium in between, and unknowns, in sizes of the mesh, beyond which one has lost its way.
+_ITERATIONS, _ASTRAY = 25, 10.0
 
 
-@dataclass(frozen=True)
-class _Loads:
+class _Loads(NamedTuple):
     """Pressure and multipliers of a stretch of path, linear in s from 0 to 1."""
 
     pressure: float
@@ -34,8 +32,7 @@ class _Loads:
         return self.pressure + s * self.rise, self.multiplier + s * self.change
 
 
-@dataclass(frozen=True)
-class _Place:
+class _Place(NamedTuple):
     """An equilibrium on a stretch: s, unknowns, their derivative by s if known, strain energy and contact potential."""
 
     s: float
@@ -70,16 +67,9 @@ class EnergyLedger:
 
     Attributes
     ----------
-    work : float, J
-        Of the pressure.
-    renewal : float, J
-        Work of renewing multipliers.
-    contact : float, J
-        Taken up by the contact's potential.
-    strain : float, J
-        Strain energy gained.
-    defect : float, J
-        Sum of the sizes of what is missing on each stretch.
+    work, renewal, contact, strain, defect : float, J
+        Work of the pressure and of renewing multipliers, taken up by the contact's potential, strain energy gained,
+        and the sum of the sizes of what is missing on each stretch.
     equilibria : int
         Solved for in between.
     """
@@ -119,14 +109,8 @@ class EnergyLedger:
         self._last = (pressure, self.pressed.multiplier.copy(), q, slope)
 
     def add(self, q: np.ndarray, pressure: float, slope: np.ndarray | None = None, refine: bool = True) -> None:
-        """The next equilibrium, for the multipliers that the shell has now.
-
-        Parameters
-        ----------
-        slope : (n,) array, optional
-            dq/dP there.
-        refine : bool
-            False if equilibria in between cannot be found by their pressure, as on a path that turns back.
+        """Take the next equilibrium, for the multipliers that the shell has now, with dq/dP if that is known; without
+        `refine` where equilibria in between cannot be found by their pressure, as on a path that turns back.
         """
         before, multiplier, start, slope0 = self._last
         loads = _Loads(before, pressure - before, multiplier, self.pressed.multiplier - multiplier)
@@ -151,20 +135,16 @@ class EnergyLedger:
         total = sum(abs(loads.rise) for loads, _, _ in waiting)
         for loads, start, stop in waiting:
             share = 0.5 * abs(loads.rise) / total if loads.rise else 0.05
-            self._refined(loads, start, stop, share * self.tolerance * work)
+            self._refine(loads, start, stop, share * self.tolerance * work)
 
-    # -- a stretch
-    # ----
-
-    def _refined(self, loads: _Loads, start: _Place, stop: _Place, allowed: float) -> None:
+    def _refine(self, loads: _Loads, start: _Place, stop: _Place, allowed: float) -> None:
         """Count a stretch, in parts if its balance misses what is allowed, J."""
-        start, stop = (self._solved(loads, place.s, place.q) or place for place in (start, stop))
+        start, stop = (self._solve(loads, place.s, place.q) or place for place in (start, stop))
         waiting = [(start, stop, self._missing(loads, start, stop), allowed, 0, 0)]
         while waiting:
             a, b, missing, share, depth, stubborn = waiting.pop()
-            middle = None
-            if abs(missing) > share and depth < _DEEPEST and stubborn < _STUBBORN:
-                middle = self._between(loads, a, b)
+            halved = abs(missing) > share and depth < _DEEPEST and stubborn < _STUBBORN
+            middle = self._between(loads, a, b) if halved else None
             if middle is None:
                 self._count(loads, a, b)
                 continue
@@ -199,28 +179,24 @@ class EnergyLedger:
             work += w * float(self.pressed.pressure_force(self.pressed.nodal(place), pressure) @ rate)
         return work, renewal
 
-    # -- equilibria
-    # ----
-
     def _place(self, loads: _Loads, s: float, q: np.ndarray, rate: np.ndarray | None) -> _Place:
         _, self._own.multiplier = loads.at(s)
         return _Place(s, q, rate, self._own.shell.energy(q), self._own.contact_energy(q))
 
     def _between(self, loads: _Loads, a: _Place, b: _Place) -> _Place | None:
-        straight = 0.5 * (a.q + b.q)
-        curved = straight
+        straight = curved = 0.5 * (a.q + b.q)
         if a.rate is not None and b.rate is not None:
             curved = straight + 0.125 * (b.s - a.s) * (a.rate - b.rate)
         starts = (curved, straight, a.q, b.q)  # where contact comes and goes a straight way may serve better
-        return next((found for q in starts if (found := self._solved(loads, 0.5 * (a.s + b.s), q))), None)
+        return next((found for q in starts if (found := self._solve(loads, 0.5 * (a.s + b.s), q))), None)
 
-    def _solved(self, loads: _Loads, s: float, q: np.ndarray) -> _Place | None:
+    def _solve(self, loads: _Loads, s: float, q: np.ndarray) -> _Place | None:
         """Equilibrium under the loads at s by Newton's method, with its tangent; None if it was not found."""
         own = self._own
         pressure, own.multiplier = loads.at(s)
         if self._factor is None:
             self._factor = own.factor()
-        last = np.inf
+        last, found = np.inf, False
         try:
             for _ in range(_ITERATIONS):
                 tangent = own.tangent(q, pressure)

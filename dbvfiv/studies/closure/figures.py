@@ -68,8 +68,7 @@ def side_views(result: StudyResult) -> Figure:
         axes.set_title(
             f"({letter}) {kilopascals(state.pressure)}, largest {state.max_displacement * 1e3:.1f} mm", loc="left"
         )
-        axes.set_xlabel("Distance from the lip z, mm")
-        axes.set_ylabel("y, mm")
+        axes.set(xlabel="Distance from the lip z, mm", ylabel="y, mm")
         axes.tick_params(labelbottom=True, labelleft=True)
     for axes in panels[len(states) :]:
         axes.set_visible(False)
@@ -169,8 +168,7 @@ def buckling_shape(result: StudyResult) -> Figure:
     ):
         right.plot(*faces(mesh, nodal)[0][row, :2].T * 1e3, **look)
     right.set_aspect("equal")
-    right.set_xlabel("x, mm")
-    right.set_ylabel("y, mm")
+    right.set(xlabel="x, mm", ylabel="y, mm")
     right.set_title(f"Section at z = {1e3 * mesh.nodes[row[0], 2]:.0f} mm, where the shape is largest", loc="left")
     right.legend(loc="upper center", bbox_to_anchor=(0.5, -0.18), ncols=3)
     headline(figure, f"Buckling at {kilopascals(first.pressure)} ({first.kind}), {supports_of(result)}")
@@ -247,8 +245,7 @@ def passage(result: StudyResult) -> Figure:
     limit = result.case.closure.shut_fraction * result.reference_opening
     axes.axhline(limit * 1e6, color=ACCENT, lw=1.0, ls=":", label="counts as shut below")
     axes.axvline(result.case.valve.duckbill_length * 1e3, color=REST, lw=0.8, ls=":")
-    axes.set_xlabel("Distance from the lip z, mm")
-    axes.set_ylabel("Passage between the inner faces, mm²")
+    axes.set(xlabel="Distance from the lip z, mm", ylabel="Passage between the inner faces, mm²")
     axes.set_title(
         f"What stays open, whole valve, {supports_of(result)} ({_SHUT:g} mm² or less drawn there)",
         loc="left",
@@ -264,8 +261,7 @@ def measured_passage(result: StudyResult) -> Figure:
     figure = new_figure(6.4, 4.2)
     axes = figure.add_subplot()
     draw_curve(axes, [(p.pressure, p.least_opening) for p in result.walk], result.measured.area, 1e6, "computed")
-    axes.set_xlabel("Back pressure, kPa")
-    axes.set_ylabel("Narrowest passage between the inner faces, mm²")
+    axes.set(xlabel="Back pressure, kPa", ylabel="Narrowest passage between the inner faces, mm²")
     axes.set_xlim(left=0)
     axes.set_ylim(bottom=0)
     axes.set_title(f"Passage left, {supports_of(result)}", loc="left", fontweight="bold")
@@ -281,8 +277,7 @@ def reversal(result: StudyResult) -> Figure:
     left, right = figure.subplots(1, 2)
     opened = sorted(result.opened, key=lambda s: -s.pressure)
     left.plot([s.pressure / 1e3 for s in opened], [s.outlet_area * 1e4 for s in opened], "o-", color=COMPUTED, ms=4)
-    left.set_ylabel("Flow area at the lip, whole valve, cm²")
-    left.set_xlabel("Static inlet pressure, kPa")
+    left.set(ylabel="Flow area at the lip, whole valve, cm²", xlabel="Static inlet pressure, kPa")
     left.set_ylim(bottom=0)
     left.set_xlim(max([s.pressure / 1e3 for s in opened], default=1.0) * 1.03, 0)
     left.set_title("Fluid flowing", loc="left")
@@ -292,8 +287,7 @@ def reversal(result: StudyResult) -> Figure:
     right.semilogy(p, np.where(shut, np.nan, area), "o-", color=ACCENT, ms=4)
     right.plot(p[shut], np.full(shut.sum(), _SHUT), "v", color=ACCENT, ms=4.5, label=f"{_SHUT:g} mm² or less: shut")
     log_axis(right.yaxis, _SHUT, max(area.max(), 10 * _SHUT))
-    right.set_ylabel("Narrowest passage between the inner faces, mm²")
-    right.set_xlabel("Back pressure, kPa")
+    right.set(ylabel="Narrowest passage between the inner faces, mm²", xlabel="Back pressure, kPa")
     right.set_xlim(left=0)
     right.set_title("Pressed from outside, no flow", loc="left")
     if shut.any():
@@ -355,15 +349,13 @@ def supports_compared(first: StudyResult, second: StudyResult) -> Figure:
     line.axhline(0.0, color=ACCENT, lw=1.0, label="inner faces meet")
     line.set_xlim(0.25 * rest[-1, 2], 0.9 * rest[-1, 2])
     line.set_ylim(-5, 0.75 * rest[:, 1].max())
-    line.set_xlabel("Distance from the lip z, mm")
-    line.set_ylabel("Inner face at x = 0, y, mm")
+    line.set(xlabel="Distance from the lip z, mm", ylabel="Inner face at x = 0, y, mm")
     for axes, label in (
         (front, "Contact front at x = 0, mm"),
         (moved, "Largest displacement, mm"),
         (stiffness, "Lowest stiffness eigenvalue, 10³ 1/s²"),
     ):
-        axes.set_xlabel("Back pressure, kPa")
-        axes.set_ylabel(label)
+        axes.set(xlabel="Back pressure, kPa", ylabel=label)
     front.axvline(21.0, color=REST, lw=0.9, ls=":", label="saddle touches, Th. 3.6")
     figure.legend(loc="outside lower center", ncols=3)
     pressures = ", ".join(f"{s.pressure / 1e3:g}" for s in first.states)

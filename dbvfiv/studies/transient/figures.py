@@ -105,8 +105,7 @@ def energies(result: StudyResult) -> Figure:
     rest.set_title(f"unexplained: at most {scale * worst:.3g} {unit}{share}", loc="left", fontsize=9)
     upper.set_ylabel("Energy, J")
     lower.set_ylabel("Since the start, J")
-    rest.set_ylabel(f"Imbalance, {unit}")
-    rest.set_xlabel("Time, s")
+    rest.set(ylabel=f"Imbalance, {unit}", xlabel="Time, s")
     rest.set_xlim(t[0], t[-1])
     for axes in (upper, lower):
         axes.tick_params(labelbottom=True)
@@ -174,8 +173,7 @@ def centre_line(result: StudyResult, count: int = 6) -> Figure:
         z, 1e3 * h["centre_line"][rows].min(axis=0), 1e3 * h["centre_line"][rows].max(axis=0), color="0.9", zorder=0
     )
     axes.axhline(0.0, color=REST, lw=0.9)
-    axes.set_xlabel("Distance from the lip z, mm")
-    axes.set_ylabel("Displacement in y, mm")
+    axes.set(xlabel="Distance from the lip z, mm", ylabel="Displacement in y, mm")
     period = (
         f"one cycle of {1e3 * (result.cycle[1] - result.cycle[0]):.3g} ms"
         if result.cycle
@@ -200,8 +198,7 @@ def phase_portrait(result: StudyResult) -> Figure:
     )  # a cycle is no whole number of steps: one more closes the loop
     axes.plot(x[rows], v[rows], color=COMPUTED, lw=1.8, label="last cycle" if result.cycle else "last fifth of the run")
     axes.plot(x[0], v[0], "o", color=ACCENT, label="start")
-    axes.set_xlabel("Clear lip opening, mm")
-    axes.set_ylabel("Velocity of one lip, m/s")
+    axes.set(xlabel="Clear lip opening, mm", ylabel="Velocity of one lip, m/s")
     axes.set_title("Phase portrait of the lip", loc="left", fontweight="bold")
     axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.14), ncols=3)
     return figure
@@ -278,8 +275,7 @@ def _space_time(result: StudyResult, name: str, factor: float, label: str, headi
     look = {"vmin": low, "vmax": high, "cmap": MAGNITUDE, "shading": "nearest", "rasterized": True}
     drawn = axes.pcolormesh(t[rows], 1e3 * result.mesh.z, values, **look)
     axes.grid(False)
-    axes.set_xlabel("Time, s")
-    axes.set_ylabel("Distance from the lip z, mm")
+    axes.set(xlabel="Time, s", ylabel="Distance from the lip z, mm")
     axes.set_title(heading, loc="left", fontweight="bold")
     margin = 0.01 * (high - low)
     beyond = (values.min() < low - margin, values.max() > high + margin)
@@ -437,8 +433,7 @@ def draw_together(results: Sequence[StudyResult], names: Sequence[str] | None = 
             panels[1, column].plot(time, 1e3 * h["lip_opening"][rows], **look)
             look["lw"] = 1.5
     panels[0, 0].set_ylabel("Mass flow, kg/s")
-    panels[1, 0].set_ylabel("Clear lip opening, mm")
-    panels[1, 0].set_xlabel("Time, s")
+    panels[1, 0].set(ylabel="Clear lip opening, mm", xlabel="Time, s")
     times = [result.history["time"] for result in results]
     panels[1, 0].set_xlim(min(t[0] for t in times), max(t[-1] for t in times))
     panels[0, 0].set_title("Comparison of runs", loc="left", fontweight="bold")

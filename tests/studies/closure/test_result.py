@@ -88,13 +88,6 @@ def test_python_interface_takes_one_pressure_or_several(given, monkeypatch):
     assert asked == [(2e3,)]
 
 
-def test_one_pressure_gives_a_result():
-    valve = load(thesis_case(), COARSE | {"closure.start": "rest"})
-    single, listed = valve.closure("2 kPa"), valve.closure([2e3])
-    assert [state.pressure for state in single.states] == [2e3]
-    assert np.array_equal(single.states[0].nodal, listed.states[0].nodal)
-
-
 def test_the_states_of_the_flow_can_be_asked(run):
     result, path = run
     opened = load_result(path).opened
@@ -108,3 +101,42 @@ def test_the_states_of_the_flow_can_be_asked(run):
 def test_python_interface_refuses_what_is_no_pressure():
     with pytest.raises(dbvfiv.errors.CaseError, match="pressure"):
         load(thesis_case(), COARSE).closure(["7 mm"])
+
+
+# -- figures
+# ----
+
+
+def test_the_contact_map_reaches_to_its_maximum_and_says_it(run):
+    figure = run[0].figures(only=["contact-map"])["contact-map"]
+    mesh = figure.axes[0].collections[0]
+    largest = [s.contact_pressure.max() / s.pressure for s in run[0].states if s.contact_nodes]
+    assert mesh.norm.vmax == pytest.approx(max(largest))
+    for ratio, axes in zip(largest, figure.axes):
+        assert f"largest {ratio:.3g} times" in axes.get_title("left")
+
+
+def test_the_closure_curve_has_no_lines_but_its_own(run):
+    figure = run[0].figures(only=["closure-curve"])["closure-curve"]
+    buckled = len(run[0].buckling[:1])
+    for axes in figure.axes:
+        upright = [line for line in axes.lines if len(set(line.get_xdata())) == 1 and len(line.get_xdata()) == 2]
+        assert len(upright) == buckled
+        dots = [line for line in axes.lines if line.get_marker() == "o"]
+        assert dots and np.allclose(dots[0].get_xdata(), [s.pressure / 1e3 for s in run[0].states])
+
+
+def test_two_measures_of_opening_stand_on_two_axes(run):
+    left, right = run[0].figures(only=["reversal"])["reversal"].axes
+    assert "Flow area" in left.get_ylabel() and "passage between the inner faces" in right.get_ylabel()
+    assert np.nanmin(right.lines[0].get_ydata()) > 0
+
+
+def test_side_views_show_the_faces(run):
+    figure = run[0].figures(only=["side-views"])["side-views"]
+    axes = figure.axes[0]
+    wall = next(c for c in axes.collections if c.get_label() == "wall")
+    upper, lower = (path.vertices for path in wall.get_paths())
+    at_lip = upper[np.isclose(upper[:, 0], upper[:, 0].min(), atol=2.0), 1]
+    assert at_lip.min() < 1.0 and at_lip.max() == pytest.approx(12, abs=1.0)  # no slot of 12 mm between the lips
+    assert np.allclose(lower[:, 1], -upper[:, 1])
