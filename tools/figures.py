@@ -123,6 +123,11 @@ ALL = (
         {"response.png": "transient-response.png"},
         study=False,
     ),
+    Made(
+        "modes",
+        'dbvfiv modes cases/dbv12.toml -p "6 kPa" --density 10 --set damping.alpha=0',
+        {"eigenvalues.png": "modes-eigenvalues.png", "winding.png": "modes-count.png"},
+    ),
     Made("damping", "dbvfiv damping cases/loss-factor.toml --plots {folder}", {"damping.png": "damping.png"}, False),
     Made("valve", "dbvfiv plot cases/dbv4-wide.toml -o {folder}", {"valve.png": "valve-described.png"}, False),
     Made(

@@ -53,6 +53,11 @@ def test_captions_of_modes_follow_their_shapes(modes):
         assert phase < 25 or share >= 10, (caption, phase)  # what lags by much does not stand
 
 
+def test_the_verdict_stands_below_the_eigenvalues_as_a_sentence(modes):
+    caption = modes.figures(only=["eigenvalues"])["eigenvalues"].get_supxlabel()
+    assert caption.replace("\n", " ") == modes.sentence
+
+
 def test_numbers_of_modes_stand_above_the_winding_and_not_on_it(modes):
     figure = modes.figures(only=["winding"])["winding"]
     (axes,) = figure.axes

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import textwrap
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
@@ -102,7 +103,7 @@ def eigenvalues(result: StudyResult) -> Figure:
     axes.set_xlabel("Growth rate, 1/s")
     axes.set_ylabel("Frequency, Hz")
     axes.set_title(f"Leading modes {conditions(result)}", loc="left", fontweight="bold", pad=15)
-    figure.supxlabel(result.verdict, x=0.01, ha="left", fontsize=9)
+    figure.supxlabel(textwrap.fill(result.sentence, 100), x=0.01, ha="left", fontsize=9)
     return figure
 
 
