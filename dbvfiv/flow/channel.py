@@ -138,7 +138,7 @@ class Channel(FlowLaw):
         own = (
             FlowParameter("inlet", "Pa", "inlet pressure"),
             FlowParameter("density", "kg/m3", "density of the fluid"),
-            FlowParameter("storage", "1", "blend of the continuity laws", self.storage),
+            FlowParameter("storage", "1", "blend of the flow models", self.storage),
         )
         return own + tuple(parameter for term in self.terms for parameter in term.parameters)
 

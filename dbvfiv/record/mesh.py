@@ -45,7 +45,7 @@ class MeshData:
     relaxing: tuple[str, ...] = _kept("", "Groups of layers that relax alike, by their materials", TEXT, ())
     branch_group: np.ndarray = _kept("", "Which of them each Maxwell branch belongs to, from 0", "i4", None)
     branch_time: np.ndarray = _kept("s", "Its relaxation time", default=None)
-    branch_strength: np.ndarray = _kept("", "Its modulus over that of the slow law", default=None)
+    branch_strength: np.ndarray = _kept("", "Its modulus over that of the long-term response", default=None)
     line_places: np.ndarray = _kept(
         "", "Where the velocities in an elastic line are, from its far end (0) to the flange (1)", default=None
     )

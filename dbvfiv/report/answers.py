@@ -120,7 +120,7 @@ def chatters(found: Gathered) -> Answer:
         return Answer(question, UNKNOWN, f"No certain verdict at {at}: {why}", _factor(verdicts))
     least = min(verdicts.values(), key=lambda v: v.damping_ratio)
     text = (
-        f"Stable at all {len(verdicts)} heads in every class of motion; the least damped mode has a damping ratio of "
+        f"Stable at all {len(verdicts)} heads in every symmetry class; the least damped mode has a damping ratio of "
         f"{100 * least.damping_ratio:.2g} %, at {units.pressure(found.worst, 3)}."
     )
     return Answer(question, NO, text, _factor(verdicts), _sure(found, verdicts))

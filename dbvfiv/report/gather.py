@@ -338,6 +338,8 @@ class _Studies:
         try:
             result = kept_run(run.kind, self._asked(run), self._path(run), self.bar.of(run.name))
             self.found.results[run.name] = result
+            for sentence in result.warnings if is_on_own_mesh(run.name) else ():
+                self.bar.warn(sentence)
         except (CaseError, SolveError) as error:
             self.found.missing[run.name] = str(error)
         self.bar.done(run.name)
@@ -380,6 +382,7 @@ class Bar:
         self._runs: dict[str, Run] = {}
         self._done: dict[str, float] = {}
         self._warned: set[str] = set()
+        self._shown: set[str] = set()
         self._started, self._bar = time.monotonic(), None
         if is_watched() and not quiet:
             from tqdm import tqdm
@@ -393,9 +396,8 @@ class Bar:
 
     def of(self, name: str) -> Observer:
         """Observer of one run."""
-        if not self._quiet and self._bar is None and name in self._runs:
-            print(f"{self._runs[name].label} ... ({self.left()})", file=sys.stderr, flush=True)
-        self._show(name)
+        if self._done.get(name, 0.0) < 1.0:
+            self._show(name)
         return _Part(self, name)
 
     def move(self, name: str, share: float) -> None:
@@ -423,8 +425,11 @@ class Bar:
         return sum(self._done.get(name, 0.0) * run.share for name, run in self._runs.items()) / whole if whole else 0.0
 
     def _show(self, name: str) -> None:
+        label = self._runs[name].label if name in self._runs else name
+        if self._bar is None and not self._quiet and name not in self._shown:
+            print(f"{label} ... ({self.left()})", file=sys.stderr, flush=True)
+        self._shown.add(name)
         if self._bar is not None:
-            label = self._runs[name].label if name in self._runs else name
             self._bar.n = self.part
             self._bar.set_description_str(label, refresh=False)
             self._bar.set_postfix_str(self.left())

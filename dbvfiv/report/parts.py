@@ -127,7 +127,7 @@ def heads_part(found: Gathered) -> Part:
     factor = "loss factors" if found.case.damping.relaxes else "stiffness damping"
     sentences = (
         f"Modes about the steady state at each head, {first.law or 'in vacuo'}, in the fluid of the case, "
-        f"{found.case.fluid.density:g} kg/m3; in all classes of motion: {classes}.",
+        f"{found.case.fluid.density:g} kg/m3; in all symmetry classes: {classes}.",
         f"The factor on the {factor} at which chatter begins is that of motions which open and close the lips; - where "
         "none between 0.05 and 1 makes the valve chatter.",
         *missing,
@@ -332,7 +332,7 @@ def law_part(found: Gathered) -> Part | None:
     at = found.case.units.pressure(found.worst, 3)
     said = (
         f"At {at}. Storage conserves volume where the walls move and agrees with the water tunnel; quasi-steady is the "
-        "thesis's. The answers of page one are those of the case, the first row, in all classes of motion; the other "
+        "thesis's. The answers of page one are those of the case, the first row, in all symmetry classes; the other "
         "model differs in motions that open and close the lips alone."
     )
     return Part("law", _LAW, (said,), (Table(head, rows),))

@@ -82,7 +82,7 @@ class _CaseOfStudies(PhysicsCase):
                 raise BrokenRule(
                     f"{study}.symmetry",
                     f"{given!r} where a {self.part.name} of the valve is computed",
-                    f"its classes of motion are {', '.join(self.part.classes)}",
+                    f"its symmetry classes are {', '.join(self.part.classes)}",
                 )
         return self
 

@@ -99,7 +99,7 @@ LawOption = Annotated[
     typer.Option(
         "--law",
         metavar="LAW",
-        help="Continuity law in place of fluid.continuity: quasi-steady, storage, or both side by side.",
+        help="Flow model in place of fluid.continuity: quasi-steady, storage, or both side by side.",
     ),
 ]
 ClassesOption = Annotated[

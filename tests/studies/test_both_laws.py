@@ -73,7 +73,7 @@ def test_onsets_under_both_laws_are_those_of_each():
         ("modes", {"modes__in_vacuo": True}, "in_vacuo leaves the fluid out"),
         ("modes", {"fluid__unsteady": False}, "fluid.unsteady is false"),
         ("modes", {"drive__kind": "uniform"}, "drive.kind is 'uniform'"),
-        ("onset", {"onset__over": "storage"}, "onset.over moves the continuity law itself"),
+        ("onset", {"onset__over": "storage"}, "onset.over moves the flow model itself"),
         ("onset", {"fluid__unsteady": False}, "fluid.unsteady is false"),
     ],
 )
@@ -89,7 +89,7 @@ def test_a_law_that_is_none(command_line, one_sentence):
 
 
 def test_sentences():
-    assert compare_states("storage", True, "quasi-steady", True) == "Both continuity laws find the state stable."
+    assert compare_states("storage", True, "quasi-steady", True) == "Both flow models find the state stable."
     assert "cannot be compared: undecided under storage" in compare_states("storage", None, "quasi-steady", None)
     assert "say the same" in compare_ranges("density", [], "kg/m³", 1.0)
     other = {"continuity": "storage", "stable": [(1.0, 2.0), (4.0, 9.0)], "unstable": [(2.0, 4.0)]}

@@ -63,7 +63,7 @@ class Keys(Section):
     eigenvalues: StrictInt = key(4, "Lowest eigenvalues of the tangent stiffness to follow.", ge=1, le=100)
     symmetry: Literal["SS", "all"] = key(
         "SS",
-        "Classes of motion watched for buckling: SS is that of the model, all adds those in which the lips sway in y "
+        "Symmetry classes watched for buckling: SS is that of the model, all adds those in which the lips sway in y "
         "(SA), the valve sways sideways in x (AS) and twists (AA).",
     )
     balance_tolerance: Number = key(
@@ -90,7 +90,7 @@ class Keys(Section):
     reversal_hold: Time = key(0.2, "Time for which the back pressure is then held.", ge=0, le=1e3)
     reversal_continuity: Literal["storage", "quasi-steady"] = key(
         "storage",
-        "Continuity law while the drive turns. Lips that meet push the fluid between them away with "
+        "Flow model while the drive turns. Lips that meet push the fluid between them away with "
         "storage; quasi-steady they stop it at once, and the "
         "pressure of the incompressible fluid knows no bounds.",
     )

@@ -239,7 +239,7 @@ class ClosureModel:
             )
             if self.case.closure.symmetry != EQUILIBRIA:
                 yield (
-                    "closure.symmetry asks for all classes of motion, but lips that are held shut cannot move "
+                    "closure.symmetry asks for all symmetry classes, but lips that are held shut cannot move "
                     "together, so with these supports only the class of the model is watched for buckling."
                 )
 

@@ -24,7 +24,7 @@ class Keys(Section):
         "pressure=500:50000:64", "Horizontal range: PARAMETER=START:STOP:COUNT[:log]; parameters as in onset.over."
     )
     y: StabilityRange = key("density=1:1000:64:log", "Vertical range, likewise.")
-    continuity: Literal["case", "both"] = key("case", "The continuity law of the case, or both laws side by side.")
+    continuity: Literal["case", "both"] = key("case", "The flow model of the case, or both models side by side.")
     curve: StrictBool = key(True, "Put in columns until the onset curves are known everywhere.")
     refine: StrictInt = key(
         2, "How often columns are put in between neighbours with different numbers of onsets.", ge=0, le=6
@@ -38,7 +38,7 @@ class Keys(Section):
     )
     symmetry: Literal["SS", "all"] = key(
         "SS",
-        "Classes of motion looked at: SS is that of the model, all adds those in which the lips sway in y (SA), the "
+        "Symmetry classes looked at: SS is that of the model, all adds those in which the lips sway in y (SA), the "
         "valve sways sideways in x (AS) and twists (AA), cell by cell.",
     )
 
@@ -75,7 +75,7 @@ def command(
     density: Annotated[
         str | None, typer.Option("--density", metavar="RHO", help="Fluid density where no axis moves it.")
     ] = None,
-    both: Annotated[bool, typer.Option("--both", help="Both continuity laws side by side.")] = False,
+    both: Annotated[bool, typer.Option("--both", help="Both flow models side by side.")] = False,
     workers: Annotated[
         int | None, typer.Option("--workers", "-w", metavar="N", min=1, help="Processes that share the columns.")
     ] = None,
@@ -91,7 +91,7 @@ def command(
     put in where onsets appear or vanish (map.refine), and until the onset curves are known between them too; every
     point of a curve is neutral by the full matrices (map.curve).
 
-    With --symmetry all the cells are asked in every class of motion too, and the most unstable one is named.
+    With --symmetry all the cells are asked in every symmetry class too, and the most unstable one is named.
 
     With --cycles branches of limit cycles are followed from the onsets of each column, as the section cycle of the case
     says; that takes seconds a cell.

@@ -22,7 +22,7 @@ ROWS, DONE = "cycles", "cycles of a column"
 _COLUMNS = (
     Column("across", "SI", "Value of the parameter across"),
     Column("along", "SI", "Value of the parameter along"),
-    Column("law", "", "Number of the continuity law", "i8"),
+    Column("law", "", "Number of the flow model", "i8"),
     Column("amplitude", "m", "Half the swing of the displacement in y of one lip at x = z = 0; NaN without a cycle"),
     Column("frequency", "Hz", "Of the cycle"),
     Column(

@@ -127,7 +127,7 @@ def _panels(result: StudyResult):
         if number == 0:
             axes.set_ylabel(parameter_label(result.case, result.plan.y.parameter))
         if "storage" not in (result.plan.x.parameter, result.plan.y.parameter):
-            axes.set_title(_TITLES.get(law, f"Blend of the continuity laws {law:g}"), loc="left")
+            axes.set_title(_TITLES.get(law, f"Blend of the flow models {law:g}"), loc="left")
         for place, axis in ((axes.xaxis, result.plan.x), (axes.yaxis, result.plan.y)):
             if axis.log:
                 edges = _edges(axis)

@@ -204,7 +204,7 @@ _COLUMNS = (
     Column("seconds", "s", "Processor time"),
 )
 _ONSETS = (
-    Column("law", "", "Number of the continuity law", "i8"),
+    Column("law", "", "Number of the flow model", "i8"),
     Column("along", "SI", "Where a mode is neutral"),
     Column("frequency", "Hz", "Its frequency"),
     Column("direction", "", "+1 where the mode becomes unstable along the column, -1 where it ceases to be", "i8"),

@@ -27,10 +27,10 @@ class Keys(Section):
     shift: Rate | None = key(None, "Real part of a shift to search near, instead of automatic ones.", ge=-1e6, le=1e6)
     shift_frequency: Frequency = key(0.0, "Frequency of that shift.", ge=0, le=1e6)
     tolerance: Number = key(1e-8, "Largest accepted relative residual of the full pencil.", gt=0, le=1e-2)
-    continuity: Literal["case", "both"] = key("case", "The continuity law of the case, or both laws side by side.")
+    continuity: Literal["case", "both"] = key("case", "The flow model of the case, or both models side by side.")
     symmetry: Literal["SS", "SA", "AS", "AA", "S", "A", "all"] = key(
         "SS",
-        "Class of motion, symmetric (S) or antisymmetric (A) about x = 0, first letter, and about y = 0, second: SS "
+        "Symmetry class, symmetric (S) or antisymmetric (A) about x = 0, first letter, and about y = 0, second: SS "
         "opens and closes the lips, SA sways them together in y, AS sideways in x, AA twists; or all four. Where a "
         "half is computed there are two about y = 0 alone: S, which SS stands for too, opens the lips or sways them "
         "sideways, A sways them together in y or twists.",
@@ -65,7 +65,7 @@ def command(
         typer.Option(
             "--symmetry",
             metavar="CLASS",
-            help="Class of motion: SS opens and closes the lips, SA sways them in y, AS in x, AA twists; or all.",
+            help="Symmetry class: SS opens and closes the lips, SA sways them in y, AS in x, AA twists; or all.",
         ),
     ] = None,
     animate: Annotated[
@@ -79,10 +79,10 @@ def command(
     """Leading modes of one steady state: growth rate, frequency, damping ratio, residual, and whether the state is
     stable.
 
-    The number of unstable eigenvalues is counted twice, in the list of modes and by the winding of the determinant
+    The number of unstable eigenvalues is counted twice, in the list of modes and by the argument principle
     along the imaginary axis; both eigenvalues of a pair count. Modes are symmetric about both planes unless --symmetry
-    asks for another class of motion; the lowest mode of a valve is often sway, SA. With --law both the other continuity
-    law is asked too, and where both disagree about stable or not the result says so.
+    asks for another symmetry class; the lowest mode of a valve is often sway, SA. With --law both the other flow
+    model is asked too, and where both disagree about stable or not the result says so.
 
     dbvfiv modes cases/dbv12.toml -p "6 kPa" --density 10 --set damping.alpha=0 -o modes.h5 --plots figures --animate 1
     """

@@ -355,7 +355,7 @@ def winding(result: StudyResult, symmetry: str, certificate: Certificate) -> Fig
         axes.axvspan(certificate.counted_up_to, right, color="0.93", lw=0, zorder=0, label="not counted")
     axes.legend(loc="upper left", bbox_to_anchor=(0.0, -0.16), ncols=3)
     axes.set_xlabel("Frequency on the imaginary axis, Hz")
-    axes.set_ylabel("Winding of the determinant, half turns")
+    axes.set_ylabel("Phase of the determinant, half turns")
     axes.set_title(f"Independent count{which} {conditions(result)}", loc="left", fontweight="bold", pad=6 + 11 * levels)
     verdict = f"{result.verdict.outcome.capitalize()} {result.law}: {certificate.statement}"
     beginning = f" The curve begins at {start:g}, half the degree of the determinant." if start else ""

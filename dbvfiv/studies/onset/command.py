@@ -39,11 +39,11 @@ class Keys(Section):
         lt=1,
     )
 
-    continuity: Literal["case", "both"] = key("case", "The continuity law of the case, or both laws side by side.")
+    continuity: Literal["case", "both"] = key("case", "The flow model of the case, or both models side by side.")
 
     symmetry: Literal["SS", "all"] = key(
         "SS",
-        "Classes of motion looked at: SS is that of the model, all adds those in which the lips sway in y (SA), the "
+        "Symmetry classes looked at: SS is that of the model, all adds those in which the lips sway in y (SA), the "
         "valve sways sideways in x (AS) and twists (AA).",
     )
 
@@ -74,7 +74,7 @@ def command(
     full matrices, confirmed by direct eigenvalues and independent counts on both sides, described by its first Lyapunov
     coefficient (onset.normal_form), and found again on a coarser mesh for an uncertainty (onset.coarse_mesh).
 
-    With --law both the other continuity law is scanned too, and what both disagree about is said.
+    With --law both the other flow model is scanned too, and what both disagree about is said.
 
     With --symmetry all the motions that are not symmetric about both planes are looked at too, and each onset names its
     class.

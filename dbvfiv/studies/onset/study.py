@@ -266,7 +266,10 @@ class OnsetResult(StudyResult):
         outcomes = {verdict["outcome"] for verdict in other["scan"].get("verdict", ())}
         sure = outcomes and (outcomes == {STABLE} or outcomes <= {FLUTTERS, DIVERGES})
         said = f"No onset: the valve is {'stable' if outcomes == {STABLE} else 'unstable'} over the range."
-        return [fixed, said if sure else "No onset was found, and none is ruled out: some values lack a certificate."]
+        return [
+            fixed,
+            said if sure else "No onset was found, and none is ruled out: at some values the two counts do not agree.",
+        ]
 
     @property
     def _own(self) -> str:
@@ -286,8 +289,8 @@ class OnsetResult(StudyResult):
         if not all(self.leading["certified"]) or len(set(outcomes)) != 1 or UNDECIDED in outcomes:
             but = f" {invalid} of them are not valid: the constants of the rubber do not hold." if invalid else ""
             return (
-                f"No onset was found, and none is ruled out: {sure} of {len(self.values)} values {scanned} carry a "
-                f"certificate.{but}"
+                f"No onset was found, and none is ruled out: {sure} of {len(self.values)} values {scanned} carry "
+                f"two counts that agree.{but}"
             )
         state = "unstable" if self.leading["growth_rate"][0] > 0 else "stable"
         band = min(verdict.band for verdict in self.verdicts)

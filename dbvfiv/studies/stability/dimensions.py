@@ -35,7 +35,7 @@ CLASS_NAMES = (*SYMMETRIES, *HALF_SYMMETRIES)
 #: Columns that name the variant of a row.
 VARIANT = (
     Column("continuity", "", "Blend of the flow models, 0 quasi-steady, 1 storage"),
-    Column("symmetry", "", f"Class of motion: {', '.join(f'{i} {name}' for i, name in enumerate(CLASS_NAMES))}", "i8"),
+    Column("symmetry", "", f"Symmetry class: {', '.join(f'{i} {name}' for i, name in enumerate(CLASS_NAMES))}", "i8"),
 )
 _WORDS = {True: "stable", False: "unstable", None: "undecided"}
 
@@ -109,7 +109,7 @@ def _require_two_laws(case: Case, study: str) -> None:
         without = "modes.in_vacuo leaves the fluid out"
     if without:
         raise CaseError(
-            f"{study}.continuity is given as 'both', but {without}, so that no continuity law is at work; it must be "
+            f"{study}.continuity is given as 'both', but {without}, so that no flow model is at work; it must be "
             "'case' then.",
             key=f"{study}.continuity",
         )
@@ -122,8 +122,7 @@ def _require_two_laws(case: Case, study: str) -> None:
         )
     if study == "onset" and keys.axis.parameter == "storage":
         raise CaseError(
-            "onset.continuity is given as 'both', but onset.over moves the continuity law itself; it must be 'case' "
-            "then.",
+            "onset.continuity is given as 'both', but onset.over moves the flow model itself; it must be 'case' then.",
             key="onset.continuity",
         )
 
@@ -154,11 +153,11 @@ def leading_class(names: Sequence[str], rates: np.ndarray, frequencies: np.ndarr
 def compare_states(own: str, stable: bool | None, other: str, other_stable: bool | None) -> str:
     """Sentence on what two laws say about one state."""
     if stable == other_stable and stable is not None:
-        return f"Both continuity laws find the state {_WORDS[stable]}."
+        return f"Both flow models find the state {_WORDS[stable]}."
     said = f"{_WORDS[stable]} under {own}, {_WORDS[other_stable]} under {other}"
     if None in (stable, other_stable):
-        return f"The continuity laws cannot be compared: {said}."
-    return f"The continuity laws disagree: {said}. Of the two, {_WHY}."
+        return f"The flow models cannot be compared: {said}."
+    return f"The flow models disagree: {said}. Of the two, {_WHY}."
 
 
 def compare_ranges(name: str, disagreements: Iterable[tuple[float, float, str]], unit: str, scale: float) -> str:
@@ -168,5 +167,5 @@ def compare_ranges(name: str, disagreements: Iterable[tuple[float, float, str]],
         for low, high, law in disagreements
     ]
     if not found:
-        return f"Both continuity laws say the same about stable or not wherever both are certain along {name}."
-    return f"The continuity laws disagree over {name} {', '.join(found)}. Of the two, {_WHY}."
+        return f"Both flow models say the same about stable or not wherever both are certain along {name}."
+    return f"The flow models disagree over {name} {', '.join(found)}. Of the two, {_WHY}."

@@ -34,7 +34,7 @@ class Keys(Section):
 
     symmetry: Literal["SS", "SA", "AS", "AA", "S", "A"] = key(
         "SS",
-        "Class of motion followed: SS opens and closes the lips, SA sways them together in y, AS sideways in x, AA "
+        "Symmetry class followed: SS opens and closes the lips, SA sways them together in y, AS sideways in x, AA "
         "twists; S or A where a half is computed, see modes.symmetry.",
     )
 
@@ -60,7 +60,7 @@ def command(
     ] = None,
     symmetry: Annotated[
         str | None,
-        typer.Option("--symmetry", metavar="CLASS", help="Class of motion: SS, SA, AS or AA; see dbvfiv modes."),
+        typer.Option("--symmetry", metavar="CLASS", help="Symmetry class: SS, SA, AS or AA; see dbvfiv modes."),
     ] = None,
 ) -> Request:
     """Damping and frequency of the leading modes, followed along a parameter of load, fluid or damping.

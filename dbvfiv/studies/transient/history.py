@@ -270,14 +270,14 @@ MEMORY = (
 _LINE = Column(
     "line",
     "m/s, m/s^2, J",
-    "Velocities, scaled pressures, their rates and books of energy",
+    "Velocities, scaled pressures, their rates and energy budget",
     read=lambda p: p.state.line.packed,
     shape=lambda mesh: (4 * len(mesh.line_places) + 1,) if len(mesh.line_places) else None,
 )
 _GAS = Column(
     "gas",
     "m/s, m^2/s, m^3, m^2, J",
-    "Unknowns, what balances hold and its rates, areas and books of energy",
+    "Unknowns, what balances hold and its rates, areas and energy budget",
     read=lambda p: p.state.gas.packed,
     shape=lambda mesh: (packed_size(int(mesh.gas_unknowns[0])),) if len(mesh.gas_unknowns) else None,
 )
