@@ -135,11 +135,19 @@ class Shell:
         nodal = self.dofs.expand(q)
         d, d1, _ = self.directors(nodal)
         out = np.zeros_like(nodal)
+        for part, wall, held in self._zones(step):
+            shell_force(part.quads, self.mesh.nodes, nodal, d, d1, part.reference, wall, held, out)
+        return self.dofs.restrict(out)
+
+    def _zones(self, step: StepWall | None):
+        """Parts of the shell, the laws of their layers and the resultants on top of those."""
         walls, held = (self.wall, None) if step is None else (step.wall, step.held)
         for part, wall in zip(self.parts, walls):
-            own = None if held is None else held[part.elements]
-            shell_force(part.quads, self.mesh.nodes, nodal, d, d1, part.reference, wall, own, out)
-        return self.dofs.restrict(out)
+            yield part, wall, None if held is None else held[part.elements]
+
+    def _add_tangent(self, nodal, part, wall, held, geometric, out, data) -> None:
+        fixed = (part.quads, self.mesh.nodes, nodal, *self.directors(nodal), part.reference)
+        shell_tangent(*fixed, wall, held, geometric, self.dofs.slots[part.elements], out, data)
 
     def force_and_tangent(
         self, q: np.ndarray, data: np.ndarray | None = None, step: StepWall | None = None
@@ -156,13 +164,9 @@ class Shell:
             self._scatter_matrix(np.asarray(self.energies.tangent(unknowns)), data)
             return self._scatter(np.asarray(self.energies.force(unknowns))), data
         nodal = self.dofs.expand(q)
-        d, d1, d2 = self.directors(nodal)
         out = np.zeros_like(nodal)
-        walls, held = (self.wall, None) if step is None else (step.wall, step.held)
-        for part, wall in zip(self.parts, walls):
-            own = None if held is None else held[part.elements]
-            fixed = (part.quads, self.mesh.nodes, nodal, d, d1, d2, part.reference)
-            shell_tangent(*fixed, wall, own, True, self.dofs.slots[part.elements], out, data)
+        for zone in self._zones(step):
+            self._add_tangent(nodal, *zone, True, out, data)
         return self.dofs.restrict(out), data
 
     def relaxing_tangents(self, q: np.ndarray) -> list[np.ndarray]:
@@ -171,17 +175,14 @@ class Shell:
         The part by which strains change stresses; that by which stresses turn with the wall belongs to no layer alone
         and does not relax.
         """
-        nodal = self.dofs.expand(q)
-        directors = self.directors(nodal)
-        found = []
+        nodal, found = self.dofs.expand(q), []
         for group in self.section.relaxing:
             data, share = np.zeros(len(self.dofs.pattern[1])), np.zeros(len(self.section.layers))
             share[list(group.layers)] = 1.0
             if self.metric == FIRST_ORDER:
                 unused = np.zeros_like(nodal)
                 for part, wall in zip(self.parts, self.wall_of(share)):
-                    fixed = (part.quads, self.mesh.nodes, nodal, *directors, part.reference)
-                    shell_tangent(*fixed, wall, None, False, self.dofs.slots[part.elements], unused, data)
+                    self._add_tangent(nodal, part, wall, None, False, unused, data)
             else:
                 self._scatter_matrix(np.asarray(self.energies.material_tangent(self._element_unknowns(q), share)), data)
             found.append(data)
