@@ -21,6 +21,7 @@ from .project import Project, Report
 from .section import BrokenRule, Section, key
 from .units import Units, unit_of
 from .valve import Valve
+from .wall import edges_of
 
 
 class Case(Section):
@@ -170,14 +171,7 @@ class Case(Section):
 
     def _check_fillers(self) -> None:
         """Refuse layers of limited extent beside the valve, and places with too few points through the wall."""
-        along, around = {0.0}, {0.0}
-        for i, layer in enumerate(self.layers):
-            try:
-                layer.check_inside(self.valve.as_given.length)
-            except BrokenRule as rule:
-                raise BrokenRule(f"layers.{i}.{rule.key}", rule.given, rule.allowed) from None
-            along |= set(layer.axial_edges)
-            around |= set(layer.section_edges)
+        along, around = edges_of(self.layers, "layers", self.valve.as_given.length)
         for z in along:
             for s in around:
                 count = sum(layer.covers(z, s) for layer in self.layers)

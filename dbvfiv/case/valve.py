@@ -12,7 +12,7 @@ from pydantic import PrivateAttr, ValidationInfo, field_validator, model_seriali
 from .key_points import has_whole_sections, key_point_inlet, read_key_points
 from .quantity import Length, Number
 from .section import BrokenRule, Section, key
-from .wall import WallPatch, WallStep
+from .wall import WallPatch, WallStep, edges_of
 
 #: Turns of a bow, rad, below which it is straight, and below which its area is taken from the series.
 _STRAIGHT, _SMALL = 1e-9, 1e-2
@@ -223,14 +223,7 @@ def _check_thickest(valve: Valve, name: str, thickest: float) -> None:
 
 def _check_patches(valve: Valve) -> None:
     """Refuse patches beside the valve and those that leave no wall, looked for between all edges."""
-    along, around = {0.0}, {0.0}
-    for i, patch in enumerate(valve.patches):
-        try:
-            patch.check_inside(valve.length)
-        except BrokenRule as rule:
-            raise BrokenRule(f"patches.{i}.{rule.key}", rule.given, rule.allowed) from None
-        along |= set(patch.axial_edges)
-        around |= set(patch.section_edges)
+    along, around = edges_of(valve.patches, "patches", valve.length)
     along |= {step.to for step in valve.wall_map} if valve.wall == "measured" else set()
     for z in along:
         for s in around:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Self
 
 from pydantic import model_validator
@@ -62,23 +63,30 @@ class Extent(Section):
         around = (self.around_from or 0.0) <= s < end
         return along and around
 
-    def check_inside(self, length: float) -> None:
-        """Refuse a part that lies beyond the end of a valve of this length, m.
-
-        Raises
-        ------
-        BrokenRule
-        """
-        for name in ("begin", "end"):
-            place = getattr(self, name)
-            if place is not None and (place > length * (1 + 1e-9) or (name == "begin" and place >= length)):
-                raise BrokenRule(name, f"{place:g} m", f"the valve ends at {length:g} m")
-
     def enlarged(self, factor: float) -> Self:
         """Copy with all lengths multiplied by a factor."""
         return self.model_copy(
             update={name: factor * getattr(self, name) for name in ("begin", "end") if getattr(self, name) is not None}
         )
+
+
+def edges_of(parts: Sequence[Extent], name: str, length: float) -> tuple[set[float], set[float]]:
+    """Axial positions, m, and shares of the section at which parts of a wall of this length begin or end, 0 among them.
+
+    Raises
+    ------
+    BrokenRule
+        For a part beyond the end of the valve; `name` is the key of the list.
+    """
+    along, around = {0.0}, {0.0}
+    for i, part in enumerate(parts):
+        for end in ("begin", "end"):
+            place = getattr(part, end)
+            if place is not None and (place > length * (1 + 1e-9) or (end == "begin" and place >= length)):
+                raise BrokenRule(f"{name}.{i}.{end}", f"{place:g} m", f"the valve ends at {length:g} m")
+        along |= set(part.axial_edges)
+        around |= set(part.section_edges)
+    return along, around
 
 
 class WallStep(Section):
