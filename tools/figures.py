@@ -62,7 +62,7 @@ ALL = (
     Made(
         "map",
         "dbvfiv map cases/dbv12.toml --x pressure=300:20000:64 --y density=1:1000:64:log --both --set damping.alpha=0",
-        {"stability-map.png": "stability-map.png", "leading-frequency.png": "stability-frequency.png"},
+        {"stability-map.png": "stability-map.png"},
     ),
     Made(
         "tongue",
@@ -98,7 +98,6 @@ ALL = (
         {
             "centre-line-cycle.png": "transient-cycle-centre-line.png",
             "lip-wave.png": "transient-cycle-wave.png",
-            "spectrum.png": "transient-cycle-spectrum.png",
             "cycle.gif": "transient-cycle.gif",
         },
     ),
