@@ -14,6 +14,7 @@ import numpy as np
 
 from continuation.cycle_linearisation import Condition
 from continuation.cycle_points import (
+    BRANCH_POINT,
     DOUBLING,
     FOLD,
     POINTS,
@@ -94,6 +95,7 @@ class CycleTracer:
         self.special: list[SpecialCycle] = []
         self.reason, self.next_step = Reason.RUNNING(), options.step
         self._origin: list[CyclePoint] = []
+        self._doubtful: tuple[CyclePoint, CyclePoint] | None = None
         self._weight = 1.0 / (np.asarray(solver.system.scales) * options.state_scale) ** 2
 
     # -- the branch
@@ -362,18 +364,24 @@ class CycleTracer:
     # ----
 
     def _between(self, a: CyclePoint, b: CyclePoint) -> list[SpecialCycle]:
-        found = []
+        found, turned = [], False
         if len(self.points) > 2:
             before = self.points[-3]
-            turns = (a.value - before.value) * (b.value - a.value) < 0
-            if turns and max(abs(a.value - before.value), abs(b.value - a.value)) > STILL * self.scale:
+            turned = (a.value - before.value) * (b.value - a.value) < 0
+            if turned and max(abs(a.value - before.value), abs(b.value - a.value)) > STILL * self.scale:
                 found.append(self._fold(before, a, b))
         for name in self.events:
             if a.tests[name] * b.tests[name] < 0:
                 found.append(self._located(name, a, b, lambda p, n=name: p.tests[n]))
+        # A real exponent through zero is that of a fold, if the parameter turns at this step or the next.
+        doubtful, self._doubtful = self._doubtful, None
+        if doubtful is not None and not turned:
+            found.append(self._located(BRANCH_POINT, *doubtful, growth_of_crossing(*(p.exponents for p in doubtful))))
         if a.exponents is not None and b.exponents is not None:
             change = change_between(a.exponents, b.exponents)
-            if change is not None and not (change == FOLD):
+            if change == FOLD and not turned:
+                self._doubtful = a, b
+            elif change is not None and change != FOLD:
                 found.append(self._located(change, a, b, growth_of_crossing(a.exponents, b.exponents)))
         return found
 
@@ -453,10 +461,15 @@ class CycleTracer:
         met = [(fa, a), (fb, b)]
         for _ in range(16):
             s = (low.arclength * fhigh - high.arclength * flow) / (fhigh - flow)
-            point = self._interpolated([low, high], s)
+            # At the zero itself the equations may be singular, and the exponent that of the shift in time.
+            nearby = (s + share * (high.arclength - low.arclength) for share in (0.0, 1e-3, -1e-3))
+            point = next(filter(None, (self._interpolated([low, high], at) for at in nearby)), None)
             if point is None:
                 break
-            f = test(point)
+            merged = point.known < min(a.known, b.known) and abs(crossing_of(point.exponents).real) > max(
+                map(abs, (fa, fb))
+            )
+            f = 0.0 if merged else test(point)
             met.append((f, point))
             if f * fhigh < 0:
                 low, flow, high, fhigh = high, fhigh, point, f

@@ -77,7 +77,8 @@ class CycleLinearisation:
 
     Parameters
     ----------
-    system : continuation.periodic.PeriodicSystem
+    system : object
+        As in `continuation.cycles.CycleSolver`.
     motion : PeriodicMotion
     mu : mapping
     basis : (n, r) array

@@ -17,7 +17,7 @@ from continuation.hill import Exponents
 from continuation.periodic import PeriodicMotion
 
 #: Kinds of special points.
-FOLD, DOUBLING, TORUS = "fold", "period doubling", "torus"
+FOLD, DOUBLING, TORUS, BRANCH_POINT = "fold", "period doubling", "torus", "branch point"
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,6 +47,11 @@ class CyclePoint:
     @property
     def motion(self):
         return self.cycle.motion
+
+    @property
+    def known(self) -> int:
+        """Number of exponents."""
+        return 0 if self.exponents is None else len(self.exponents.values)
 
 
 @dataclass(frozen=True, eq=False)

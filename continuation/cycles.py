@@ -60,7 +60,13 @@ class CycleSolver:
 
     Parameters
     ----------
-    system : continuation.periodic.PeriodicSystem
+    system : object
+        ``size`` n; ``autonomous``, whether a shift in time of a motion is one as well, or the phase is that of a
+        forcing; ``scales`` (n,), sizes that changes of the unknowns are measured in; ``residual(motion, mu)``, (N, n)
+        at the samples; ``linearise(motion, mu, rough)``, a `continuation.periodic.PeriodicOperator` about a motion that
+        need not solve the equations, a rough one with an error of some per cent in how it changes within a period;
+        ``smoother(operator, mu)``, approximate solves from coefficients (2 H + 1, n) to coefficients, good in all
+        directions but those of the basis, or None.
     basis : (n, r) array
         Directions to start with, see the module.
     tolerance : float

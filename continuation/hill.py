@@ -70,6 +70,11 @@ class Exponents:
     omega: float
     as_found: np.ndarray = field(default_factory=lambda: np.zeros(0, complex))
 
+    @classmethod
+    def unknown(cls, omega: float) -> Exponents:
+        """No exponents of a motion, where none were asked for."""
+        return cls(np.zeros(0, complex), [], np.zeros(0), np.inf, omega)
+
     @property
     def multipliers(self) -> np.ndarray:
         """(k,) complex."""

@@ -77,7 +77,6 @@ class JaxSystem(System):
             def b(u, mu, c):
                 return jnp.asarray(mass(u, mu, c), dtype=jnp.float64)
 
-            self._mass_apply = jax.jit(b)
             self._mass_d1 = jax.jit(lambda u, mu, c, a: _jvp(lambda x: b(x, mu, c), u, a))
             self._mass_d2 = jax.jit(lambda u, mu, c, a, d: _jvp(lambda x: _jvp(lambda y: b(y, mu, c), x, a), u, d))
             self._mass_mu = jax.jit(lambda u, mu, dmu, c: jax.jvp(lambda m: b(u, m, c), (mu,), (dmu,))[1])

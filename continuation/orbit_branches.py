@@ -19,6 +19,7 @@ from continuation.cycle_branch import CycleTracer
 from continuation.cycle_points import FOLD, TORUS, CyclePoint, SpecialCycle
 from continuation.cycles import Cycle, cycles_beside_onset
 from continuation.harmonics import Harmonics
+from continuation.hill import Exponents
 from continuation.normal_form import hopf_normal_form
 from continuation.options import (
     ContinuationError,
@@ -53,7 +54,7 @@ def continue_orbits(
 ) -> Branch:
     """Follow a periodic orbit in one parameter.
 
-    Folds of cycles, period doublings and torus bifurcations are located by the Floquet exponents.
+    Folds of cycles, period doublings, torus bifurcations and branch points are located by the Floquet exponents.
 
     Parameters
     ----------
@@ -331,7 +332,7 @@ class _Follower:
         return np.concatenate([cycle.motion.coefficients.ravel(), [cycle.motion.period, cycle.mu[self.parameter]]])
 
     def _orbit(self, point: CyclePoint) -> Orbit:
-        return Orbit(point.cycle.mu, point.motion, point.exponents)
+        return Orbit(point.cycle.mu, point.motion, point.exponents or Exponents.unknown(point.motion.omega))
 
     def _point(self, item: CyclePoint) -> CurvePoint:
         z, cycle = self._z(item.cycle), item.cycle
@@ -344,7 +345,7 @@ class _Follower:
             cycle.iterations,
             cycle.correction,
             tests,
-            item.exponents.unstable,
+            self._orbit(item).floquet.unstable,
             self._orbit(item).multipliers,
         )
 

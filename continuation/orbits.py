@@ -179,5 +179,7 @@ def find_orbit(system, states, period: float, mu, options: OrbitOptions | None =
 def add_exponents(solver: CycleSolver, cycle: Cycle, options: OrbitOptions) -> Orbit:
     """Add Floquet exponents to a cycle."""
     count = min(options.exponents, max(solver.system.size - 1, 1))
+    if not count:
+        return Orbit(cycle.mu, cycle.motion, Exponents.unknown(cycle.motion.omega))
     linear = solver.linearise(cycle.motion, cycle.mu)
     return Orbit(cycle.mu, cycle.motion, floquet_exponents(solver, linear, count))

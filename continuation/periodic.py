@@ -1,4 +1,4 @@
-"""Contract of a system whose periodic motions are found as Fourier series, and its linearisation about one.
+"""Periodic motions as Fourier series, and linearisations about one.
 
 A motion x(t) of n unknowns is periodic with angular frequency omega; a system answers with its residual at N samples of
 one period, and is free to use rates, and filters in time for what it remembers, see `continuation.harmonics.Rates`. It
@@ -12,11 +12,11 @@ functions at another argument alone.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from math import comb
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
@@ -315,41 +315,3 @@ def _by_parts(left: np.ndarray, right: np.ndarray) -> np.ndarray:
         real, imaginary = _parts(left)
         return real @ right + 1j * (imaginary @ right)
     return left @ right
-
-
-class PeriodicSystem(Protocol):
-    """A system whose periodic motions are sought.
-
-    Attributes
-    ----------
-    size : int
-        n.
-    autonomous : bool
-        Whether time shifts of a motion are motions as well; of a forced one the phase of the forcing is the phase.
-    """
-
-    size: int
-    autonomous: bool
-
-    def residual(self, motion: PeriodicMotion, mu: Mapping[str, float]) -> np.ndarray:
-        """Residual (N, n) at the samples."""
-        ...
-
-    def linearise(self, motion: PeriodicMotion, mu: Mapping[str, float], rough: bool = False) -> PeriodicOperator:
-        """Linearisation about a motion that need not solve the equations; a rough one, if that is cheaper, serves to
-        correct the motion, which takes an error of some per cent in how the linearisation changes within a period.
-        """
-        ...
-
-    def smoother(
-        self, operator: PeriodicOperator, mu: Mapping[str, float]
-    ) -> Callable[[np.ndarray], np.ndarray] | None:
-        """Approximate solves, coefficients (2 H + 1, n) to coefficients, good in all other directions; None where there
-        are none.
-        """
-        ...
-
-    @property
-    def scales(self) -> np.ndarray:
-        """(n,) sizes that changes of the unknowns are measured in."""
-        ...

@@ -35,7 +35,7 @@ CLEAR = 0.15
 
 
 class PeriodicValve:
-    """Equations of a valve's periodic motions, a `continuation.periodic.PeriodicSystem`.
+    """Equations of a valve's periodic motions, a system of `continuation.cycles.CycleSolver`.
 
     Parameters
     ----------

@@ -296,3 +296,26 @@ def test_orbits_start_at_hopf_points_only():
     )
     with pytest.raises(NotABifurcation):
         orbits_from_hopf(bautin(), branch.special[0], "mu")
+
+
+def test_a_branch_point_of_cycles_is_no_fold():
+    """z' = (1 + i) z - z|z|^2 and w' = mu w - w^3 + mu |z|^2 w: the exponent of w, 2 mu, passes zero at mu = 0."""
+
+    def residual(u, mu):
+        r2 = u[0] ** 2 + u[1] ** 2
+        rate = mu["mu"] * (1 + r2)
+        return jnp.stack([u[0] - u[1] - r2 * u[0], u[0] + u[1] - r2 * u[1], rate * u[2] - u[2] ** 3])
+
+    system = JaxSystem(residual, 3)
+    orbit = find_orbit(system, np.hstack([CIRCLE, np.zeros((60, 1))]), 6.0, {"mu": -0.5})
+    branch = continue_orbits(system, orbit, "mu", ContinuationOptions(limits={"mu": (-1.0, 0.5)}))
+    assert [(s.kind, s.located) for s in branch.special] == [("branch point", True)]
+    assert abs(branch.special[0].mu["mu"]) < 1e-7 and branch.unstable[0] == 0 and branch.unstable[-1] == 1
+
+
+def test_exponents_only_where_asked():
+    orbit = find_orbit(stuart_landau(), 0.4 * CIRCLE, 3.0, MU, OrbitOptions(exponents=0))
+    assert orbit.exponents.size == 0 and orbit.stable is None
+    options = ContinuationOptions(limits={"mu": (0.1, 0.5)})
+    branch = continue_orbits(stuart_landau(), orbit, "mu", options, OrbitOptions(exponents=0))
+    assert branch.reason.kind is Reason.LIMIT and set(branch.unstable) == {-1}

@@ -1,4 +1,4 @@
-"""Small systems as `continuation.periodic.PeriodicSystem`: residual(x, x', x'', phase, mu) in jax."""
+"""Small systems as systems of `continuation.cycles.CycleSolver`: residual(x, x', x'', phase, mu) in jax."""
 
 from __future__ import annotations
 
