@@ -72,7 +72,7 @@ def _check(case, name: str) -> None:
     """
     from ..model.equilibria import model_warnings
     from ..model.sizes import ValveSizes
-    from ..studies.contradictions import contradictions
+    from ..studies.case import contradictions
     from ..studies.session import Session
 
     found = list(contradictions(case))

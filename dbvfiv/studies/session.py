@@ -19,8 +19,7 @@ from ..record.header import Header
 from ..record.mesh import MeshData
 from ..record.record import GrowingRecord, Record, StoredRecord
 from . import KINDS
-from .case import Case
-from .contradictions import require_consistent
+from .case import Case, require_consistent
 from .study import Study, find_study, nothing_to_resume
 
 #: Keyword arguments of the Python interface and the keys of the case that they stand for.

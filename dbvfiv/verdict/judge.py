@@ -10,8 +10,22 @@ from typing import Any
 
 import numpy as np
 
-from .cycles import Cycles, comes_and_goes, extremes, find_period, harmonics, refine, remaining, settled, trend_of
-from .series import Series, check_samples, longest_part, swings, undersampled
+from .series import (
+    Cycles,
+    Series,
+    check_samples,
+    comes_and_goes,
+    extremes,
+    find_period,
+    harmonics,
+    longest_part,
+    refine,
+    remaining,
+    settled,
+    swings,
+    trend_of,
+    undersampled,
+)
 
 
 @dataclass(frozen=True)

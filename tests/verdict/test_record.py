@@ -255,7 +255,7 @@ def survive(command_line, tmp_path, one_sentence, seeds):
 
 
 def test_spoiled_files_give_a_verdict_or_a_sentence(command_line, tmp_path, one_sentence):
-    survive(command_line, tmp_path, one_sentence, range(100))
+    survive(command_line, tmp_path, one_sentence, range(50))
 
 
 @pytest.mark.slow

@@ -13,7 +13,6 @@ from dbvfiv.motion.state import consistent_state
 from dbvfiv.motion.stepper import StepOptions, Stepper
 from dbvfiv.studies.session import load_result
 from dbvfiv.studies.transient.figures import energies
-from dbvfiv.studies.transient.history import FACES
 from tests.observers import Stop
 
 from .runs import transient
@@ -69,8 +68,6 @@ def test_columns_of_the_contact_are_there_where_it_is(tmp_path, shutting, valve,
     resumed = dbvfiv.resume(tmp_path / "parts.h5")
     for name in whole.history:
         assert np.array_equal(resumed.history[name], whole.history[name]), name
-    bare = transient(valve({"transient.duration": 0.003}))
-    assert not {c.name for c in FACES} & set(bare.history) and not len(bare.mesh.face_nodes)
 
 
 def test_a_small_motion_of_pressed_lips_follows_its_mode(valve):

@@ -22,7 +22,19 @@ from dbvfiv.record.record import GrowingRecord, StoredRecord
 from dbvfiv.studies.case import THESIS, Case
 from dbvfiv.studies.session import load_result
 from dbvfiv.studies.transient import history
-from dbvfiv.studies.transient.history import HISTORY, RESTART, STATES, Progress, rows_to_keep, tables_of
+from dbvfiv.studies.transient.history import (
+    FACES,
+    GAS,
+    HISTORY,
+    LINE,
+    MEMORY,
+    RELAXING,
+    RESTART,
+    STATES,
+    Progress,
+    rows_to_keep,
+    tables_of,
+)
 from dbvfiv.studies.transient.run import Runner
 from tests.observers import Stop
 
@@ -62,33 +74,57 @@ def test_a_file_holds_the_run(tmp_path, valve):
     assert again.history["mass_flow"][0] == pytest.approx(result.history["mass_flow"][10], rel=1e-6)
 
 
-@pytest.mark.parametrize("adaptive", [False, True])
-def test_a_resumed_run_gives_the_same_numbers(tmp_path, valve, adaptive, all_restart_points):
-    # light fluid: the lips are slamming when it is interrupted
-    changes = SHORT | {
-        "transient.duration": 0.045,
-        "fluid.density": 1.2,
-        "damping.alpha": 0.0,
-        "drive.pressure": 6e3,
-        "transient.adaptive": adaptive,
-        "transient.step": 5e-4,
-        "transient.numerical_damping": 0.1,
-        "transient.local_error": 1e-4,
-    }
-    model = valve(changes)
+#: Light fluid: the lips are slamming when the run is interrupted.
+SLAMS = {"transient.duration": 0.045, "fluid.density": 1.2, "damping.alpha": 0.0, "drive.pressure": 6e3}
+#: Waves in a line and a wall that relaxes; a gas.
+WAVES = {"upstream.length": 6.0, "upstream.wave_speed": 600.0, "upstream.loss": 1.5, "upstream.elements": 2}
+LOSSY = WAVES | {
+    "transient.duration": 0.025,
+    "fluid.density": 1.2,
+    "drive.pressure": 6e3,
+    "damping.model": "loss factor",
+}
+AIR = {"fluid.density": 1.2, "fluid.continuity": "storage", "fluid.sound_speed": 343.0, "drive.pressure": 6e3}
+
+
+@pytest.mark.parametrize(
+    "keys, after, column",
+    [
+        pytest.param(SLAMS, 66, "stops", id="slams"),
+        pytest.param(SLAMS | {"transient.adaptive": True}, 1, "stops", id="slams, adaptive"),
+        pytest.param(LOSSY, 40, "line_supply", id="line and relaxing wall"),
+        pytest.param(
+            LOSSY | {"transient.adaptive": True}, 40, "branch_loss", id="both, adaptive", marks=pytest.mark.slow
+        ),
+        pytest.param(AIR | {"transient.duration": 0.012}, 10, "gas_supply", id="gas"),
+    ],
+)
+def test_a_resumed_run_gives_the_same_numbers(tmp_path, valve, keys, after, column, all_restart_points):
+    steps = {"transient.step": 5e-4, "transient.numerical_damping": 0.1, "transient.local_error": 1e-4}
+    model = valve(SHORT | steps | keys)
     whole = transient(model, output=tmp_path / "whole.h5")
-    assert whole.history["stops"].max() > 0
-    for after in (1, 66):
-        stopped = transient(model, output=tmp_path / "parts.h5", observer=Stop(after))
-        assert not stopped.complete and len(stopped.history["time"]) == after + 1
-        known = StoredRecord(tmp_path / "parts.h5", tables_of, Case)
-        assert rows_to_keep(known, model.case)[HISTORY] == 1 + 7 * (after // 7)
-        resumed = dbvfiv.resume(tmp_path / "parts.h5")
-        assert resumed.complete
-        for name in whole.history:
-            assert np.array_equal(resumed.history[name], whole.history[name]), name
-        assert [s.time for s in resumed.states] == [s.time for s in whole.states]
-        assert np.array_equal(resumed.states[-1].nodal, whole.states[-1].nodal)
+    assert whole.history[column].max() > 0
+    stopped = transient(model, output=tmp_path / "parts.h5", observer=Stop(after))
+    assert not stopped.complete and len(stopped.history["time"]) == after + 1
+    known = StoredRecord(tmp_path / "parts.h5", tables_of, Case)
+    assert rows_to_keep(known, model.case)[HISTORY] == 1 + 7 * (after // 7)
+    resumed = dbvfiv.resume(tmp_path / "parts.h5")
+    assert resumed.complete
+    for name in whole.history:
+        assert np.array_equal(resumed.history[name], whole.history[name]), name
+    assert [s.time for s in resumed.states] == [s.time for s in whole.states]
+    assert np.array_equal(resumed.states[-1].nodal, whole.states[-1].nodal)
+
+
+def test_nothing_is_kept_of_what_is_not_there(tmp_path, valve):
+    """A rigid column in front, an elastic wall, a fluid that is not compressed, lips with stops."""
+    rigid = {name: value for name, value in WAVES.items() if "wave" not in name and "elements" not in name}
+    run = transient(valve(SHORT | rigid | {"transient.duration": 0.005}), output=tmp_path / "run.h5")
+    absent = {c.name for columns in (RELAXING, LINE, GAS, FACES) for c in columns}
+    assert not absent & set(run.history) and "dissipated" not in "\n".join(run.lines())
+    with h5py.File(tmp_path / "run.h5") as file:
+        assert not {"line_places", "relaxing", "gas_unknowns", "face_nodes"} & set(file["mesh"])
+        assert not {"line", "gas", "contact_loss", *(c.name for c in MEMORY)} & set(file["tables/restart"])
 
 
 def test_a_finished_run_goes_on_to_a_later_end(tmp_path, valve):

@@ -1,16 +1,9 @@
-"""Runs of a valve behind an elastic line: files, resuming, starts, and what is kept without one."""
+"""Runs of a valve behind an elastic line: starts from rest and from a steady flow."""
 
 from __future__ import annotations
 
-import h5py
 import numpy as np
 import pytest
-
-import dbvfiv
-from dbvfiv.record.record import StoredRecord
-from dbvfiv.studies.case import Case
-from dbvfiv.studies.transient.history import HISTORY, LINE, rows_to_keep, tables_of
-from tests.observers import Stop
 
 from .runs import SHORT, transient
 
@@ -21,30 +14,6 @@ WAVES = {
     "upstream.elements": 2,
     "drive.pressure": 6e3,
 }
-
-
-@pytest.mark.parametrize("adaptive", [False, pytest.param(True, marks=pytest.mark.slow)])
-def test_a_resumed_run_gives_the_same_numbers(tmp_path, valve, adaptive, all_restart_points):
-    changes = SHORT | WAVES | {"transient.duration": 0.03, "transient.adaptive": adaptive, "transient.step": 5e-4}
-    model = valve(changes | {"fluid.density": 1.2, "transient.local_error": 1e-5, "transient.numerical_damping": 0.1})
-    whole = transient(model, output=tmp_path / "whole.h5")
-    assert whole.complete and whole.history["line_supply"].shape == whole.history["time"].shape
-    for after in (1, 40):
-        stopped = transient(model, output=tmp_path / "parts.h5", observer=Stop(after))
-        assert not stopped.complete
-        known = StoredRecord(tmp_path / "parts.h5", tables_of, Case)
-        assert rows_to_keep(known, model.case)[HISTORY] == 1 + 7 * (after // 7)
-        resumed = dbvfiv.resume(tmp_path / "parts.h5")
-        for name in whole.history:
-            assert np.array_equal(resumed.history[name], whole.history[name]), name
-
-
-def test_nothing_is_stored_of_a_rigid_column(tmp_path, valve):
-    rigid = {name: value for name, value in WAVES.items() if "wave" not in name and "elements" not in name}
-    run = transient(valve(SHORT | rigid | {"transient.duration": 0.005}), output=tmp_path / "rigid.h5")
-    assert not {c.name for c in LINE} & set(run.history) and not len(run.mesh.line_places)
-    with h5py.File(tmp_path / "rigid.h5") as file:
-        assert "line_places" not in file["mesh"] and "line" not in file["tables/restart"]
 
 
 @pytest.mark.parametrize("law", [pytest.param("quasi-steady", marks=pytest.mark.slow), "storage"])

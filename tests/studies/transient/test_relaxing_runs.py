@@ -1,52 +1,18 @@
-"""Runs of a valve whose materials relax: files, resuming, energy, coupling."""
+"""Runs of a valve whose materials relax: energy, coupling."""
 
 from __future__ import annotations
 
-import h5py
 import numpy as np
 import pytest
 
-import dbvfiv
 from dbvfiv.case import CaseError
 from dbvfiv.motion.equations import ValveMotion
-from dbvfiv.record.record import StoredRecord
-from dbvfiv.studies.case import Case
 from dbvfiv.studies.session import load_result
-from dbvfiv.studies.transient.history import HISTORY, MEMORY, RELAXING, rows_to_keep, tables_of
 from dbvfiv.studies.transient.run import Runner
-from tests.observers import Stop
 
 from .runs import SHORT, transient
 
 LOSSY = {"damping.model": "loss factor", "drive.pressure": 6e3, "fluid.density": 50.0}
-
-
-@pytest.mark.parametrize("adaptive", [False, pytest.param(True, marks=pytest.mark.slow)])
-def test_a_resumed_run_gives_the_same_numbers(tmp_path, valve, adaptive, all_restart_points):
-    changes = SHORT | LOSSY | {"transient.duration": 0.03, "transient.adaptive": adaptive, "transient.step": 5e-4}
-    model = valve(changes | {"fluid.density": 1.2, "transient.local_error": 1e-5, "transient.numerical_damping": 0.1})
-    whole = transient(model, output=tmp_path / "whole.h5")
-    assert whole.complete and whole.history["branch_loss"].shape == (len(whole.history["time"]), 4)
-    for after in (1, 40):
-        stopped = transient(model, output=tmp_path / "parts.h5", observer=Stop(after))
-        assert not stopped.complete
-        known = StoredRecord(tmp_path / "parts.h5", tables_of, Case)
-        assert rows_to_keep(known, model.case)[HISTORY] == 1 + 7 * (after // 7)
-        resumed = dbvfiv.resume(tmp_path / "parts.h5")
-        for name in whole.history:
-            assert np.array_equal(resumed.history[name], whole.history[name]), name
-        assert np.array_equal(resumed.states[-1].nodal, whole.states[-1].nodal)
-
-
-def test_nothing_is_stored_where_nothing_relaxes(tmp_path, valve):
-    model = valve(SHORT | {"transient.duration": 0.005})
-    run = transient(model, output=tmp_path / "elastic.h5")
-    assert run.mesh.relaxing == () and not {c.name for c in RELAXING} & set(run.history)
-    assert Runner(model).start().progress.state.memory is None
-    with h5py.File(tmp_path / "elastic.h5") as file:
-        assert "relaxing" not in file["mesh"]
-        assert not {c.name for c in MEMORY} & set(file["tables/restart"])
-    assert "dissipated" not in "\n".join(run.lines())
 
 
 def test_a_loss_factor_of_zero_is_an_undamped_wall(valve):
