@@ -121,10 +121,7 @@ def read_curves(path: str | Path, mode: str | None = None) -> list[TensionTest]:
         cycle = 0 if number is None else _cycle(place, _cell(row, number))
         points = kept.setdefault((MODES.index(which), cycle), [])
         points.append((values["engineering_strain"], values["nominal_stress"]))
-    with _blamed(path, kept):
-        return [
-            TensionTest(*np.array(kept[which, cycle]).T, MODES[which], cycle or None) for which, cycle in sorted(kept)
-        ]
+    return [_test(path, *np.array(kept[key]).T, MODES[key[0]], key[1] or None) for key in sorted(kept)]
 
 
 def read_columns(path: str | Path, others: dict[str, dict[str, float]]) -> tuple[TensionTest, dict[str, np.ndarray]]:
@@ -142,31 +139,24 @@ def read_columns(path: str | Path, others: dict[str, dict[str, float]]) -> tuple
         See `read_curves`.
     """
     found = [values for _, _, values in _table(Path(path), _COLUMNS | others)[1]]
-    with _blamed(path, found):
-        columns = {name: np.array([values[name] for values in found]) for name in found[0]}
-        return TensionTest(columns["engineering_strain"], columns["nominal_stress"]), columns
+    columns = {name: np.array([values[name] for values in found]) for name in found[0]}
+    return _test(path, columns["engineering_strain"], columns["nominal_stress"]), columns
 
 
-class _blamed:
-    """Refuse a table without rows, and name its file in what is refused within."""
-
-    def __init__(self, path: str | Path, rows):
-        self.path = path
-        if not rows:
-            raise MaterialError(f"Tension test {path}: there is no row of numbers below the header.")
-
-    def __enter__(self) -> None:
-        pass
-
-    def __exit__(self, kind, error, trace) -> None:
-        if isinstance(error, MaterialError):
-            raise MaterialError(f"Tension test {self.path}: {error}") from None
+def _test(path: str | Path, *values) -> TensionTest:
+    """The test of a file, which is named where the values are refused."""
+    try:
+        return TensionTest(*values)
+    except MaterialError as error:
+        raise MaterialError(f"Tension test {path}: {error}") from None
 
 
 def _table(path: Path, known: dict[str, dict[str, float]]) -> tuple[list[str], Iterator]:
     """Titles of a table, and place, cells and SI values of the known columns of each row; a stretch as a strain."""
     (line, header), *rows = _rows(path)
     columns = _columns(path, line, header, known)
+    if not rows:
+        raise MaterialError(f"Tension test {path}: there is no row of numbers below the header.")
 
     def read():
         for line, row in rows:
