@@ -4,7 +4,7 @@ Each law is a strain energy in five Green-Lagrange strains with S33 = 0 (see `en
 stresses and tangents follow by differentiation, in float64.
 """
 
-from dbvfiv.materials.energy import LINEAR_ELASTIC, MOONEY_RIVLIN, PARAMETER_COUNT, energy_of
+from dbvfiv.materials.energy import LINEAR_ELASTIC, MOONEY_RIVLIN, PARAMETER_COUNT
 from dbvfiv.materials.laws import (
     IsotropicElastic,
     Law,
@@ -45,7 +45,6 @@ __all__ = [
     "SofteningRubber",
     "StableRange",
     "Yeoh",
-    "energy_of",
     "fibre_ply",
     "halpin_tsai",
     "ply_from_constituents",

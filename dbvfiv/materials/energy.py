@@ -195,24 +195,3 @@ def rubber_energy(parameters, e):
 
 #: Energies by their numbers.
 ENERGIES = {LINEAR_ELASTIC: linear_elastic_energy, MOONEY_RIVLIN: rubber_energy}
-
-
-def energy_of(kind, parameters, e):
-    """Strain energy of any law from its number and constants; traceable in all three arguments.
-
-    One compiled function then serves a wall of mixed materials. The rubber branch is fed a zero
-    strain where it is not selected, so neither it nor its derivatives can spoil the other one.
-
-    Examples
-    --------
-    >>> from dbvfiv.materials import MooneyRivlin, energy_of
-    >>> law = MooneyRivlin(c10=4e5, c01=1e5, c11=0.0, density=1300.0)
-    >>> e = [0.1, 0.0, 0.02, 0.0, 0.01]
-    >>> bool(abs(energy_of(law.kind, law.parameters, e) - law.energy(e)) < 1e-9)
-    True
-    """
-    parameters = jnp.asarray(parameters)
-    e = jnp.asarray(e)
-    is_rubber = jnp.asarray(kind) == MOONEY_RIVLIN
-    rubber = rubber_energy(parameters, jnp.where(is_rubber, e, 0.0))
-    return jnp.where(is_rubber, rubber, linear_elastic_energy(parameters, e))
