@@ -42,7 +42,7 @@ def stability_map():
             "map.checks=0",
         ],
     )
-    plan, walk = MapPlan.of(case), StabilityWalk(case)
+    plan, walk = MapPlan(case), StabilityWalk(case)
     random = np.random.default_rng(1)
     picks = sorted((int(i), int(j)) for i, j in random.integers(0, CELLS, (SAMPLE, 2)))
     direct, each = [], []

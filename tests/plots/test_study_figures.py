@@ -140,7 +140,7 @@ def test_an_onset_scan_of_one_value_shows_it():
 
 def map_result(certified=None):
     case = thesis_case({"map.x": "pressure=1000:12000:6", "map.y": "density=1:1000:5:log"})
-    plan = MapPlan.of(case)
+    plan = MapPlan(case)
     shape = (len(plan.laws), 5, 6)
     growth = np.broadcast_to(np.linspace(80, -80, 6) + 0 * np.arange(5)[:, None], shape).copy()
     unstable = np.where(growth > 0, 2, 0)

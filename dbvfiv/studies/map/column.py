@@ -53,41 +53,33 @@ class ColumnTask(NamedTuple):
 
 @dataclass(frozen=True)
 class MapPlan:
-    """Plan of a map: its cells, and the order in which they are computed.
+    """Plan of the map of a case: its cells, and the order in which they are computed.
 
     Attributes
     ----------
     case : Case
-    x, y : Axis
-    laws : tuple of float
-        Blends of the continuity laws, one picture each.
-    classes : tuple of Symmetry
-        Classes of motion, that of the equilibria first; of the others cells alone are asked for.
-    refine : int
-        Number of times that columns are halved where the number of onsets changes.
     """
 
     case: Case
-    x: Axis
-    y: Axis
-    laws: tuple[float, ...]
-    classes: tuple[Symmetry, ...]
-    refine: int = 2
 
-    @classmethod
-    def of(cls, case: Case) -> MapPlan:
-        """The map of a case file."""
-        x, y = case.map.axes
-        storage = Mu.of(case).storage
-        both = case.map.continuity == "both" and "storage" not in (x.parameter, y.parameter)
-        return cls(
-            case,
-            x,
-            y,
-            (0.0, 1.0) if both else (storage,),
-            chosen_symmetries(case.map.symmetry, case.part),
-            case.map.refine,
-        )
+    @cached_property
+    def x(self) -> Axis:
+        return self.case.map.axes[0]
+
+    @cached_property
+    def y(self) -> Axis:
+        return self.case.map.axes[1]
+
+    @cached_property
+    def laws(self) -> tuple[float, ...]:
+        """Blends of the continuity laws, one picture each."""
+        both = self.case.map.continuity == "both" and "storage" not in (self.x.parameter, self.y.parameter)
+        return (0.0, 1.0) if both else (self.base.storage,)
+
+    @cached_property
+    def classes(self) -> tuple[Symmetry, ...]:
+        """Classes of motion, that of the equilibria first; of the others cells alone are asked for."""
+        return chosen_symmetries(self.case.map.symmetry, self.case.part)
 
     @property
     def parts(self) -> list[tuple[float, Symmetry]]:

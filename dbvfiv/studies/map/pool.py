@@ -182,7 +182,7 @@ def _start(case: dict) -> None:
         threading.Thread(target=_end_with_parent, daemon=True).start()
     prepare()
     read = Case.from_dict(case)
-    _plan = MapPlan.of(read)
+    _plan = MapPlan(read)
     _walk = StabilityWalk(read)
 
 

@@ -265,7 +265,7 @@ def rows_to_keep(known: Record, case: Case) -> dict[str, int]:
     if known.complete:
         raise nothing_to_resume("map", known.path)
     samples, onsets = (int(known.column(COLUMNS, name).sum()) for name in ("sample_count", "onset_count"))
-    return {SAMPLES: samples, ONSETS: onsets, cycles.ROWS: cycles.vouched_rows(known, MapPlan.of(case))}
+    return {SAMPLES: samples, ONSETS: onsets, cycles.ROWS: cycles.vouched_rows(known, MapPlan(case))}
 
 
 def run(session: Session, record: GrowingRecord, workers: int | None = None) -> None:
@@ -284,7 +284,7 @@ def run(session: Session, record: GrowingRecord, workers: int | None = None) -> 
     SolveError
         If the case has no flow, or no column was found at all.
     """
-    case, plan = session.case, MapPlan.of(session.case)
+    case, plan = session.case, MapPlan(session.case)
     check_scan(case, plan.x.parameter, plan.y.parameter)
     walk = StabilityWalk(case, record, session.model)
     if session.start is not None:
@@ -294,7 +294,7 @@ def run(session: Session, record: GrowingRecord, workers: int | None = None) -> 
     with ColumnPool(plan, processes, record.warn, walk, known) as pool:
         filling = _Filling(plan, record, pool)
         filling.fill([plan.task(value) for value in plan.across.values])
-        for level in range(1, plan.refine + 1):
+        for level in range(1, case.map.refine + 1):
             filling.fill(filling.between(level))
         if all(column.failure for column in filling.columns):
             raise SolveError(f"No state of the map was found: {filling.columns[0].failure}")
@@ -325,7 +325,7 @@ class MapResult(StudyResult):
 
     @cached_property
     def plan(self) -> MapPlan:
-        return MapPlan.of(self.case)
+        return MapPlan(self.case)
 
     @cached_property
     def columns(self) -> tuple[MapColumn, ...]:

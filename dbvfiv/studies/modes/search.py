@@ -391,7 +391,6 @@ def run_modes(
     verdict = _verdict(certified, searched, search.claimed)
     modes = _shapes(model, pencil, linear, certified.spectrum, symmetry, in_vacuo)
     result = FoundModes(modes, Certificate.of(certified), verdict, notes, certified.spectrum)
-    observer.item(result)
     if result.stable is None:
         observer.warn(result.verdict.reason)
     return result

@@ -75,6 +75,7 @@ def run(session: Session, record: GrowingRecord) -> None:
                 factor = np.nan
             found = replace(found, verdict=replace(found.verdict, critical_damping_factor=factor))
         _keep(record, variant, found)
+        record.item(found)
 
 
 def _keep(record: GrowingRecord, variant: Variant, found: FoundModes) -> None:

@@ -8,7 +8,6 @@ costs two warm-started equilibria for each parameter and no further eigenvalue s
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from dataclasses import dataclass, fields, replace
 
 import numpy as np
@@ -104,16 +103,14 @@ def unit_of(name: str) -> str:
     return {"thickness": "m", "angle": "deg", "density": "kg/m^3"}.get(quantity, "Pa")
 
 
-def eigenvalue_sensitivities(
-    model: ValveModel,
-    q: np.ndarray,
-    pressure: float,
-    mu: Mu,
-    mode: Mode,
-    parameters: Iterable[str],
-    step: float = 1e-4,
-) -> list[Sensitivity]:
-    """Derivatives of one eigenvalue of a steady state.
+def differentiate(
+    model: ValveModel, q: np.ndarray, pressure: float, mu: Mu, mode: Mode, name: str, step: float = 1e-4
+) -> Sensitivity:
+    """Derivative of one eigenvalue of a steady state by one parameter.
+
+    At an end of what a parameter may be, such as the strain level of 10 %, that towards its inside, to second order as
+    central ones are. Strain levels are interpolated linearly between the tests: at one of those, 20 or 40 %, the
+    derivative is the mean of both sides.
 
     Parameters
     ----------
@@ -121,7 +118,7 @@ def eigenvalue_sensitivities(
         The steady state at the inlet pressure, Pa.
     mode : eigen.Mode
         With left vectors (`SearchOptions(left=True)`).
-    parameters : iterable of str
+    name : str
         Of `parameters_of`.
     step : float
         Relative size of the central differences of the pencil; of a parameter that is zero, its absolute size.
@@ -132,18 +129,6 @@ def eigenvalue_sensitivities(
         If a parameter does not exist or the mode has no left vector.
     SolveError
         If the steady state is lost beside its place.
-    """
-    return [differentiate(model, q, pressure, mu, mode, name, step) for name in parameters]
-
-
-def differentiate(
-    model: ValveModel, q: np.ndarray, pressure: float, mu: Mu, mode: Mode, name: str, step: float = 1e-4
-) -> Sensitivity:
-    """Derivative of one eigenvalue by one parameter; see `eigenvalue_sensitivities`.
-
-    At an end of what a parameter may be, such as the strain level of 10 %, that towards its inside, to second order as
-    central ones are. Strain levels are interpolated linearly between the tests: at one of those, 20 or 40 %, the
-    derivative is the mean of both sides.
     """
     known = parameters_of(model)
     if name not in known:

@@ -2,16 +2,10 @@
 
 import os
 import signal
-import subprocess
-import sys
-import time
 
-import h5py
 import numpy as np
 import pytest
 
-from dbvfiv import resume
-from dbvfiv.api import Valve
 from dbvfiv.cli import run
 from dbvfiv.model import ValveModel
 from dbvfiv.model.equilibria import find_equilibria
@@ -25,8 +19,7 @@ from dbvfiv.studies.modes.search import run_modes
 from dbvfiv.studies.session import load_result
 from eigen import SingularShiftError
 from eigen.reduced_counts import CellCounts
-from tests.observers import Stop
-from tests.small_valves import FORMER, THESIS_SET
+from tests.small_valves import THESIS_SET
 
 from .axes import AXES, run_map
 
@@ -116,20 +109,6 @@ def same(result, whole):
     assert result.checks == whole.checks and set(result.warnings) == set(whole.warnings)
 
 
-def test_an_interrupted_map_resumes_to_the_same_numbers(case, whole, tmp_path):
-    path = tmp_path / "map.h5"
-    first = Stop(3)
-    assert not Valve(case, "valve").map(output=path, observer=first).complete
-    second = Stop(100)
-    result = resume(path, observer=second)
-    assert result.complete and not set(first.seen) & set(second.seen)
-    again = load_result(path)
-    same(result, whole)
-    same(again, whole)
-    assert [c.points() for c in again.curves] == [c.points() for c in result.curves]
-    assert run(["resume", str(path)]) == 2  # nothing left to do
-
-
 def test_json_and_figures(case, tmp_path, capsys):
     arguments = [
         f"--set={key}={str(value).lower() if isinstance(value, bool) else value}" for key, value in AXES.items()
@@ -159,66 +138,6 @@ def test_the_command_says_what_is_fixed(command_line, one_sentence, tmp_path):
     outcome = command_line("map", *mesh, *axes, "--density", 10)
     assert outcome.status == 2 and "map.x" in outcome.err and one_sentence(outcome.err)
     assert command_line("resume", path, "--workers", 2).status == 2  # complete
-
-
-_RUN = """
-import sys
-from dbvfiv.cli import run
-if __name__ == "__main__":
-    sys.exit(run(sys.argv[1:]))
-"""
-
-
-@pytest.mark.slow
-def test_killed_run_resumes(case, whole, tmp_path):
-    path, script = tmp_path / "map.h5", tmp_path / "go.py"
-    script.write_text(_RUN)
-    settings = [
-        f"--set={key}={str(value).lower() if isinstance(value, bool) else value}" for key, value in AXES.items()
-    ]
-    mesh = [*THESIS_SET, "--set=mesh.around=8", "--set=mesh.along=16", "--set=damping.alpha=0"]
-    process = subprocess.Popen([sys.executable, str(script), "map", *settings, *mesh, "-o", str(path)], cwd=os.getcwd())
-    deadline = time.time() + 240
-    while time.time() < deadline:
-        time.sleep(0.2)
-        try:
-            with h5py.File(path, "r", swmr=True, locking=False) as file:
-                if len(file["tables/columns/#"]) >= 2:
-                    break
-        except (OSError, KeyError, RuntimeError):
-            continue
-    process.send_signal(signal.SIGKILL)
-    process.wait()
-    kept = len(load_result(path).columns)
-    assert kept >= 2
-    observer = Stop(100)
-    result = resume(path, observer=observer)
-    assert len(observer.seen) == len(result.columns) - kept
-    same(result, whole)
-
-
-@pytest.mark.slow
-def test_workers_find_the_same_digits_also_when_they_go_on(case, whole, tmp_path):
-    path = tmp_path / "map.h5"
-    first = Stop(4)
-    assert not Valve(case, "valve").map(workers=2, output=path, observer=first).complete
-    second = Stop(100)
-    result = resume(path, workers=2, observer=second)
-    assert not set(first.seen) & set(second.seen)
-    same(result, whole)
-
-
-@pytest.mark.slow
-def test_a_map_interrupted_in_its_curves_ends_with_the_same_curves(coarse_case, tmp_path):
-    """Columns that a round of the curves had found do not change what that round asks for."""
-    axes = {"map.x": "pressure=500:30000:4", "map.y": "density=1:1000:10:log", "map.checks": 1}
-    case = coarse_case.replace(axes | {"damping.beta": 0.001} | dict(FORMER))  # whose curves need three rounds
-    whole, path = run_map(case), tmp_path / "map.h5"
-    stop = 2 * len(whole.columns) // 3
-    assert not Valve(case, "valve").map(output=path, observer=Stop(stop)).complete
-    kept = load_result(path)
-    assert not kept.complete and max(column.level for column in kept.columns) >= 3
-    same(resume(path), whole)
 
 
 @pytest.mark.slow

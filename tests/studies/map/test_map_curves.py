@@ -17,7 +17,7 @@ def test_linked_curves_go_through_all_onsets(whole):
 
 
 def test_linked_tongue_is_one_curve(case):
-    plan = MapPlan.of(case)
+    plan = MapPlan(case)
     width = {2000.0: 0.1, 3000.0: 0.15, 4000.0: 0.1}
     columns = []
     for value in (1000.0, 2000.0, 3000.0, 4000.0, 5000.0):
@@ -39,7 +39,7 @@ def test_linked_tongue_is_one_curve(case):
 @pytest.mark.parametrize("solved", [True, False])
 def test_a_change_at_the_lower_edge_calls_for_columns(case, solved):
     """No curve ends there; beside a column whose cells are not valid nothing is known of it."""
-    plan = MapPlan.of(case)
+    plan = MapPlan(case)
     columns = []
     for value, number in ((1000.0, 0), (2000.0, 1)):
         unknown = Sample(value, refusal="The constants do not hold.")

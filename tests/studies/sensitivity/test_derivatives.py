@@ -39,7 +39,7 @@ def valve():
 )
 def test_derivative_is_that_of_the_eigenvalue(valve, name):
     model, q, mode = valve
-    (found,) = sensitivity.eigenvalue_sensitivities(model, q, 6e3, CONDITIONS, mode, [name])
+    found = sensitivity.differentiate(model, q, 6e3, CONDITIONS, mode, name)
     h = 1e-3 * (abs(found.value) or 1.0)
     near = SearchOptions(limit_point=-1 / 0.003)
 
@@ -70,7 +70,7 @@ def lossy_valve():
 def test_derivative_of_a_wall_that_relaxes_is_that_of_the_eigenvalue(lossy_valve, name):
     """Through the change that the equilibrium makes to what relaxes, too."""
     model, q, mode = lossy_valve
-    (found,) = sensitivity.eigenvalue_sensitivities(model, q, 6e3, LOSSY, mode, [name])
+    found = sensitivity.differentiate(model, q, 6e3, LOSSY, mode, name)
     h = 1e-3 * abs(found.value)
 
     def eigenvalue(value):
@@ -87,7 +87,7 @@ def test_derivative_of_a_wall_that_relaxes_is_that_of_the_eigenvalue(lossy_valve
 def test_at_the_end_of_its_range_a_parameter_is_stepped_inward(valve):
     """The strain level of 10 %, below which no rubber was tested."""
     model, q, mode = valve
-    (found,) = sensitivity.eigenvalue_sensitivities(model, q, 6e3, CONDITIONS, mode, ["strain"])
+    found = sensitivity.differentiate(model, q, 6e3, CONDITIONS, mode, "strain")
     near = SearchOptions(limit_point=-1 / 0.003)
 
     def eigenvalue(value):
@@ -110,4 +110,4 @@ def test_only_what_a_valve_has_is_a_parameter(valve):
 def test_an_unknown_parameter_is_named(valve):
     model, q, mode = valve
     with pytest.raises(ValueError, match="'colour'.*layer 1 thickness"):
-        sensitivity.eigenvalue_sensitivities(model, q, 6e3, CONDITIONS, mode, ["colour"])
+        sensitivity.differentiate(model, q, 6e3, CONDITIONS, mode, "colour")

@@ -1,0 +1,199 @@
+"""Interrupted and killed studies over parameters go on: nothing is solved twice, and the outcome is that of a run that
+was never interrupted.
+"""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+
+import h5py
+import pytest
+
+from dbvfiv import resume
+from dbvfiv.cli import run
+from dbvfiv.errors import CaseError, SolveError
+from dbvfiv.model.equilibria import LoadPath
+from dbvfiv.observer import Observer
+from dbvfiv.studies.case import THESIS
+from dbvfiv.studies.map.column import MapColumn
+from dbvfiv.studies.modes.search import FoundModes
+from dbvfiv.studies.session import Session, load_result
+from dbvfiv.studies.stability.samples import Sample
+from tests.small_valves import FORMER
+from tests.studies.map.axes import AXES
+
+ONSET = {"onset.over": "pressure=4 kPa:12 kPa:5", "onset.normal_form": False, "fluid.density": 4.0, **FORMER}
+SCAN = {"onset.over": "density=1:1000:4:log", "onset.coarse_mesh": 0, "onset.normal_form": False}
+#: Its curves need three rounds of columns.
+CURVES = {"map.x": "pressure=500:30000:4", "map.y": "density=1:1000:10:log", "map.checks": 1, "damping.beta": 0.001}
+#: Runs by name, the study first.
+RUNS = {
+    "modes": {"modes.symmetry": "all", "modes.count": 2},
+    "sweep": {"sweep.over": "density=1:1000:5:log", "sweep.count": 3},
+    "onset": ONSET,
+    "onset-classes": SCAN | {"onset.symmetry": "all"},
+    "map": AXES,
+    "map-curves": CURVES | dict(FORMER),
+}
+
+
+class Watch(Observer):
+    """Remembers what was solved; interrupts the run after some items."""
+
+    def __init__(self, most=10**6):
+        self.left, self.solved, self.items = most, [], 0
+
+    def item(self, result):
+        self.items += 1
+        if isinstance(result, Sample):
+            self.solved.append((*result.key[:3], result.value))
+        elif isinstance(result, MapColumn):
+            self.solved.append((result.value, result.level))
+        elif isinstance(result, FoundModes):
+            self.solved.append(result.modes[0].symmetry)
+        self.left -= 1
+        if not self.left:
+            raise KeyboardInterrupt
+
+
+def perform(case, name, output=None, observer=None, **choices):
+    return Session(case.replace(RUNS[name])).perform(name.split("-")[0], output, observer, **choices)
+
+
+@pytest.fixture(scope="module")
+def wholes(coarse_case):
+    """Results of runs that were never interrupted, and what these solved."""
+    known = {}
+
+    def whole(name):
+        if name not in known:
+            watch = Watch()
+            known[name] = perform(coarse_case, name, observer=watch), watch
+        return known[name]
+
+    return whole
+
+
+def same(result, whole):
+    """To the last digit."""
+    assert result.complete
+    found, expected = (dict(part.summary()) for part in (result, whole))
+    assert set(found.pop("warnings")) == set(expected.pop("warnings"))
+    assert found == expected
+
+
+def slow(*where):
+    return pytest.param(*where, marks=pytest.mark.slow)
+
+
+@pytest.mark.parametrize(
+    "name, share",
+    [
+        ("modes", 0.5),
+        ("sweep", 0.5),
+        ("onset", 0.1),
+        slow("onset", 0.4),
+        slow("onset", 0.7),
+        slow("onset", 0.99),
+        ("onset-classes", 0.6),
+        ("map", 0.4),
+        slow("map-curves", 0.67),
+    ],
+)
+def test_an_interrupted_run_goes_on(coarse_case, wholes, tmp_path, name, share):
+    whole, seen = wholes(name)
+    path, first, second = tmp_path / "part.h5", Watch(max(1, int(share * seen.items))), Watch()
+    assert not perform(coarse_case, name, path, first).complete and not load_result(path).complete
+    result = resume(path, observer=second)
+    same(result, whole)
+    same(load_result(path), whole)
+    if name != "sweep":  # which starts anew
+        assert not set(first.solved) & set(second.solved)
+        assert len(first.solved) + len(second.solved) == len(seen.solved)
+    with pytest.raises(CaseError, match="nothing to resume"):
+        resume(path)
+
+
+@pytest.mark.slow
+def test_workers_find_the_same_digits_also_when_they_go_on(coarse_case, wholes, tmp_path):
+    path, first, second = tmp_path / "map.h5", Watch(4), Watch()
+    assert not perform(coarse_case, "map", path, first, workers=2).complete
+    result = resume(path, workers=2, observer=second)
+    assert not set(first.solved) & set(second.solved)
+    same(result, wholes("map")[0])
+
+
+def test_a_located_point_is_in_the_file_before_its_normal_form(coarse_case, tmp_path):
+    class Stop(Observer):
+        def progress(self, text):
+            if "normal form" in text:
+                raise KeyboardInterrupt
+
+    case = coarse_case.replace(ONSET | {"onset.normal_form": True, "onset.coarse_mesh": 0.0})
+    result = Session(case).perform("onset", tmp_path / "onset.h5", Stop())
+    assert not result.complete and len(result.points) == 1
+    (point,) = load_result(tmp_path / "onset.h5").points
+    assert point["confirmed"] and point["criticality"] is None and point["first_lyapunov_coefficient"] is None
+
+
+def test_failed_values_are_not_tried_again(coarse_case, tmp_path, monkeypatch):
+    honest, tried = LoadPath.go_to, []
+
+    def go_to(self, target):
+        if target == 12e3:
+            tried.append(target)
+            raise SolveError("No equilibrium was found at 12000 Pa.")
+        return honest(self, target)
+
+    monkeypatch.setattr(LoadPath, "go_to", go_to)
+    path, case = tmp_path / "onset.h5", coarse_case.replace(ONSET | {"onset.coarse_mesh": 0.0})
+    assert not Session(case).perform("onset", path, Watch(6)).complete
+    result = resume(path)
+    assert tried == [12e3] and result.complete and "12000 Pa" in result.failures[0]
+    assert 12e3 not in result.values and len(result.points) == 1
+
+
+def test_the_command_resumes(coarse_case, tmp_path, capsys):
+    path, case = tmp_path / "onset.h5", coarse_case.replace(ONSET | {"onset.coarse_mesh": 0.0})
+    assert "ended early" in Session(case).perform("onset", path, Watch(3)).lines()[-1]
+    assert run(["resume", str(path), "--animate", "x.gif"]) == 2
+    assert "kind 'onset'" in capsys.readouterr().err
+    assert run(["resume", str(path)]) == 0
+    assert "stable above" in capsys.readouterr().out
+    assert run(["resume", str(path)]) == 2
+
+
+_RUN = """
+import sys
+from dbvfiv.cli import run
+if __name__ == "__main__":
+    sys.exit(run(sys.argv[1:]))
+"""
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind, table, rows", [("onset", "samples", 4), ("map", "columns", 2)])
+def test_a_killed_run_goes_on(wholes, tmp_path, kind, table, rows):
+    path, script = tmp_path / "run.h5", tmp_path / "go.py"
+    script.write_text(_RUN)
+    keys = THESIS | {"mesh.around": 8, "mesh.along": 16, "damping.alpha": 0, "damping.beta": 0.003}
+    keys |= {"fluid.density": 10, "drive.pressure": 6000} | RUNS[kind]
+    settings = [f"--set={k}={str(v).lower() if isinstance(v, bool) else v}" for k, v in keys.items()]
+    process = subprocess.Popen([sys.executable, str(script), kind, *settings, "-o", str(path)], cwd=os.getcwd())
+    deadline = time.time() + 240
+    while time.time() < deadline and process.poll() is None:
+        time.sleep(0.02)
+        try:
+            with h5py.File(path, "r", swmr=True, locking=False) as file:
+                if len(file[f"tables/{table}/#"]) >= rows:
+                    break
+        except (OSError, KeyError, RuntimeError):
+            continue
+    process.send_signal(signal.SIGKILL)
+    process.wait()
+    kept, watch = load_result(path), Watch()
+    assert not kept.complete and kept.record.rows(table) >= rows
+    same(resume(path, observer=watch), wholes(kind)[0])
+    assert len(watch.solved) <= len(wholes(kind)[1].solved) - rows
