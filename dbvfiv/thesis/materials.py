@@ -100,16 +100,18 @@ FINE, COARSE = (64, 20), (32, 10)
 SHEAR = 5.0 / 6.0
 
 
-def layers() -> tuple[Layer, ...]:
-    """The strip's layers from its lower to its upper face: two EPDM, plies at -54 and +54 degrees, two SBR, one CR."""
-    ply = fibre_ply("program")
-    stack = [(published_rubber("EPDM", 0.1), 3e-3, 0.0)] * 2 + [(ply, 1e-3, -54.0), (ply, 1e-3, 54.0)]
-    stack += [(published_rubber("SBR", 0.1), 3e-3, 0.0)] * 2 + [(published_rubber("CR", 0.1), 3e-3, 0.0)]
-    return tuple(Layer(law, thickness, angle, SHEAR) for law, thickness, angle in stack)
+def layers(angle: float = 54.0, shear: float = SHEAR) -> tuple[Layer, ...]:
+    """The strip's layers from its lower to its upper face: two EPDM, plies at -54 and +54 degrees, two SBR, one CR;
+    `shear` is the shear correction of the rubber.
+    """
+    ply, (cr, sbr, epdm) = fibre_ply("program"), (published_rubber(name, 0.1) for name in ("CR", "SBR", "EPDM"))
+    plies = [Layer(ply, 1e-3, sign * angle, SHEAR) for sign in (-1.0, 1.0)]
+    below, above = ([Layer(law, 3e-3, 0.0, shear) for law in laws] for laws in ((epdm, epdm), (sbr, sbr, cr)))
+    return (*below, *plies, *above)
 
 
-def deflections(elements: tuple[int, int], loads=LOADS) -> np.ndarray:
-    """Deflection at the load over that at the supports, m, at loads in N.
+def deflections(elements: tuple[int, int], loads=LOADS, stack: tuple[Layer, ...] | None = None) -> np.ndarray:
+    """Deflection at the load over that at the supports, m, at loads in N; of the layers given, or those of the thesis.
 
     Raises
     ------
@@ -124,7 +126,7 @@ def deflections(elements: tuple[int, int], loads=LOADS) -> np.ndarray:
     # against motions as a rigid body; supports and load are lines of forces in balance
     free[left[across // 2], :3] = free[right[across // 2], 1:3] = free[left[0], 2] = False
     quads = np.stack([index[:-1, :-1], index[1:, :-1], index[1:, 1:], index[:-1, 1:]], axis=-1).reshape(-1, 4)
-    stack = layers()
+    stack = layers() if stack is None else stack
     mesh = ShellMesh.build(nodes, quads, sum(layer.thickness for layer in stack), material_axis=(1.0, 0.0, 0.0))
     shell = Shell(mesh, Section(stack), free)
     share = np.full(across + 1, 1.0 / across)

@@ -13,42 +13,10 @@ from functools import cache
 import numpy as np
 import pytest
 
-from dbvfiv.materials import fibre_ply, published_rubber
-from dbvfiv.shell import Layer, Section, Shell, ShellMesh
-from dbvfiv.thesis import materials as strip
-from tests.shell.structures import dead_load, grid, solve_path
+from dbvfiv.thesis.materials import HALF_SPAN, LENGTH, WIDTH, deflections, layers
 from tests.verification.layered_solid import LayeredSolid
 
-LENGTH, WIDTH, SPAN = 0.16, 0.05, 0.05
-
-
-def layers(angle=54.0, plies=True, shear=5 / 6):
-    """Bottom to top."""
-    ply = fibre_ply("program")
-    stack = [(published_rubber("EPDM", 0.1), 3e-3, 0), (published_rubber("EPDM", 0.1), 3e-3, 0)]
-    stack += [(ply, 1e-3, -angle), (ply, 1e-3, angle)] if plies else [(published_rubber("SBR", 0.1), 2e-3, 0)]
-    stack += [(published_rubber(name, 0.1), 3e-3, 0) for name in ("SBR", "SBR", "CR")]
-    return tuple(Layer(law, h, a, shear) for law, h, a in stack)
-
-
-def shell_deflections(stack, loads, nx=32, ny=10) -> np.ndarray:
-    patch = grid(nx, ny, lambda u, v: (LENGTH * (u - 0.5), WIDTH * v, 0 * u))
-    x = patch.nodes[patch.index[:, 0], 0]
-    free = np.ones((len(patch.nodes), 5), bool)
-    left, right = (int(np.argmin(np.abs(x - s))) for s in (-SPAN, SPAN))
-    middle = int(np.argmin(np.abs(x)))
-    free[patch.index[left, ny // 2], :3] = False
-    free[patch.index[right, ny // 2], 1:3] = False
-    free[patch.index[left, 0], 2] = False
-    mesh = ShellMesh.build(patch.nodes, patch.quads, sum(layer.thickness for layer in stack), material_axis=(1.0, 0, 0))
-    shell = Shell(mesh, Section(stack), free)
-    weights = np.full(ny + 1, 1.0 / ny)
-    weights[[0, -1]] /= 2
-    shape = np.zeros((len(patch.nodes), 5))
-    for column, share in ((middle, -1.0), (left, 0.5), (right, 0.5)):
-        shape[patch.index[column], 2] += share * weights
-    path = solve_path(shell, dead_load(shell.dofs.restrict(shape)), loads)
-    return np.array([(shape * shell.dofs.expand(e.q)).sum() for e in path])
+SPAN = HALF_SPAN
 
 
 def solid_deflections(stack, loads, nx=32, ny=10, per_layer=1) -> np.ndarray:
@@ -71,11 +39,6 @@ def solid_deflections(stack, loads, nx=32, ny=10, per_layer=1) -> np.ndarray:
 LOADS = (0.5, 2.0, 5.0, 10.0, 15.0)
 
 
-def test_the_strip_of_the_published_figure_is_this_one():
-    loads = (0.5, 5.0)
-    assert strip.deflections((8, 4), loads) == pytest.approx(shell_deflections(layers(), loads, 8, 4), rel=1e-7)
-
-
 @cache
 def solid_reference() -> np.ndarray:
     """On 16 x 6 x 7 quadratic elements; 32 x 10 x 7 differ by 0.02 %."""
@@ -88,9 +51,7 @@ def test_layered_strip(rubber_factor):
     """Within 1 %, whichever shear correction the rubber gets (plies 5/6): one is a little too stiff, the other too
     soft.
     """
-    stack = layers(shear=rubber_factor)
-    stack = tuple(Layer(item.law, item.thickness, item.angle, 5 / 6 if item.angle else rubber_factor) for item in stack)
-    shell, solid = shell_deflections(stack, LOADS, 64, 20), solid_reference()
+    shell, solid = deflections((64, 20), LOADS, layers(shear=rubber_factor)), solid_reference()
     print(
         f"\nshear correction of the rubber {rubber_factor:.3f}\n  load N  shell mm  solid mm  difference  over linear"
     )
@@ -112,8 +73,7 @@ def test_plies_along_the_strip():
     """
     solid = solid_deflections(layers(angle=0.0), LOADS[:1], 16, 6)[0]
     for factor in (1.0, 5 / 6):
-        stack = layers(angle=0.0, shear=factor)
-        shell = shell_deflections(stack, LOADS[:1], 64, 20)[0]
+        shell = deflections((64, 20), LOADS[:1], layers(0.0, factor))[0]
         print(
             f"\nplies at 0 degrees, shear correction {factor:.3f}: shell {1e3 * shell:.5f} mm, solid "
             f"{1e3 * solid:.5f} mm ({shell / solid - 1:+.2%})"
