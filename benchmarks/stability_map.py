@@ -13,7 +13,6 @@ import numpy as np
 from dbvfiv.studies.case import thesis_case
 from dbvfiv.studies.map.column import MapPlan
 from dbvfiv.studies.session import Session
-from dbvfiv.studies.stability.place import condition_of
 from dbvfiv.studies.stability.walk import StabilityWalk
 from eigen import leading_modes
 
@@ -57,7 +56,7 @@ def stability_map():
             place = plan.place(plan.x.values[i], plan.y.values[j], plan.laws[0])
             family = walk.family(place)
             begun, own = time.perf_counter(), time.process_time()
-            spectrum = leading_modes(family.pencil(condition_of(place)), 6, family.search(condition_of(place)))
+            spectrum = leading_modes(family.at(place), 6, family.search(place))
             each.append((time.perf_counter() - begun, time.process_time() - own))
             direct.append((i, j, complex(spectrum.eigenvalues[0]), spectrum.unstable_count))
     one, one_work = np.median(each, axis=0)

@@ -13,8 +13,9 @@ from .columns import Column, ColumnSolver
 from .count import Count, unstable_count
 from .derivative import PencilDerivative, difference, eigenvalue_derivative
 from .factor import SingularShiftError, Workspace
+from .family import PencilFamily, ReducedFamily
 from .krylov import KrylovPairs, krylov_pairs
-from .operator import Condition, CoupledPencil, PencilFamily, Relaxation
+from .operator import CoupledPencil, Relaxation
 from .reduction import FamilyReduction
 from .search import leading_modes
 from .spectrum import CLEAR, Mode, Oval, SearchedRegion, SearchOptions, Spectrum
@@ -27,7 +28,6 @@ __all__ = [
     "CertifiedSpectrum",
     "Column",
     "ColumnSolver",
-    "Condition",
     "Count",
     "CoupledPencil",
     "FamilyReduction",
@@ -39,6 +39,7 @@ __all__ = [
     "Oval",
     "PencilDerivative",
     "PencilFamily",
+    "ReducedFamily",
     "Relaxation",
     "SearchOptions",
     "SearchedRegion",

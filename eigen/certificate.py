@@ -9,7 +9,8 @@ from functools import partial
 import numpy as np
 
 from .basis import TransferBasis
-from .count import Count, Determinant, unstable_count
+from .count import Count, unstable_count
+from .determinant import Structure
 from .factor import ScaledLU, StructureMatrices, Workspace
 from .krylov import KrylovPairs, krylov_pairs
 from .operator import CoupledPencil, real_apply
@@ -261,7 +262,7 @@ def certified_spectrum(
     """
     search = partial(leading_modes, pencil, workspace=workspace or Workspace(), solver=solver)
     spectrum = search(count, options)
-    if pencil.n > Determinant.dense_below:
+    if pencil.n > Structure.dense_below:
         basis = basis or TransferBasis(pencil)
     else:
         basis = None
@@ -275,7 +276,7 @@ def certified_spectrum(
         if found.agrees or basis is None:
             break
         basis = _finer(pencil, basis, found, finer)
-        if basis.size > Determinant.dense_below:
+        if basis.size > Structure.dense_below:
             break
         found, basis = _judged(*asked, found.spectrum, basis, finer)
     return found

@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Hashable, Sequence
 from dataclasses import dataclass, field, fields, replace
 
 import numpy as np
 
 from .certificate import Certificate, certified_spectrum
+from .count import Count
 from .factor import SingularShiftError, Workspace
-from .operator import Condition, CoupledPencil, PencilFamily
-from .reduced_counts import CellCounts, count_unstable, uncounted
-from .reduction import FamilyReduction, ReducedFamily, StaticSolver
+from .family import PencilFamily, ReducedFamily
+from .operator import CoupledPencil
+from .reduction import FamilyReduction, StaticSolver
 from .search import leading_modes
+from .spectrum import Spectrum
 
 #: Estimated relative error of an eigenvalue above which a cell is treated directly.
 TOLERANCE = 1e-6
@@ -43,15 +45,16 @@ class Column:
     line, band : (cells,) arrays, 1/s, Hz
         Region counted.
     eigenvalues : callable or None
-        From any condition at the same state to its leading eigenvalues on the small model, sorted by growth rate.
+        From any parameter point at the same state to its leading eigenvalues on the reduced model, sorted by growth
+        rate.
     nearest : callable or None
-        From a condition and a place to the eigenvalue of the small model next to it.
+        From a parameter point and a place to the eigenvalue of the reduced model next to it.
     corrected : callable or None
-        From a condition and an eigenvalue of the small model to Newton's correction of it by the full matrices.
+        From a parameter point and an eigenvalue of the reduced model to Newton's correction of it by the full matrices.
     cell : callable or None
-        From any further condition at the same state to a column of this one cell.
-    pencil : callable or None
-        From any condition at the same state to its pencil on the small model.
+        From any further parameter point at the same state to a column of this one cell.
+    at : callable or None
+        From any parameter point at the same state to its operator on the reduced model.
     leading : list of arrays
         Leading eigenvalues of the cells.
     """
@@ -66,11 +69,11 @@ class Column:
     how: np.ndarray
     line: np.ndarray
     band: np.ndarray
-    eigenvalues: Callable[[Condition], np.ndarray] | None = None
-    nearest: Callable[[Condition, complex], complex] | None = None
-    corrected: Callable[[Condition, complex], complex] | None = None
-    cell: Callable[[Condition], Column] | None = None
-    pencil: Callable[[Condition], CoupledPencil] | None = None
+    eigenvalues: Callable[[Hashable], np.ndarray] | None = None
+    nearest: Callable[[Hashable, complex], complex] | None = None
+    corrected: Callable[[Hashable, complex], complex] | None = None
+    cell: Callable[[Hashable], Column] | None = None
+    at: Callable[[Hashable], CoupledPencil] | None = None
     leading: list[np.ndarray] = field(default_factory=list)
 
     @classmethod
@@ -99,7 +102,7 @@ class Column:
                 getattr(out, own.name)[list(cells)] = values
         for i, row in zip(cells, self.leading):
             out.leading[i] = row
-        small = {name: getattr(self, name) for name in ("eigenvalues", "nearest", "corrected", "cell", "pencil")}
+        small = {name: getattr(self, name) for name in ("eigenvalues", "nearest", "corrected", "cell", "at")}
         return replace(out, error=self.error, **small)
 
     @property
@@ -124,10 +127,12 @@ class Column:
 JOINT, CLOSE = 3e-3, 1e-5
 #: Leading eigenvalues kept of a cell.
 KEPT = 8
-#: Conditions at least at which they are taken where the loss factors differ.
+#: Points at least at which they are taken where the relaxations differ.
 LOSSES = 4
-#: Leading vectors taken at each condition: where damping orders the modes, and for a band.
+#: Leading vectors taken at each point: where damping orders the modes, and for a band.
 MOST, MOST_IN_BAND = 4, 12
+#: Share of a band up to which eigenvalues are counted, clear of those at its end.
+INSIDE = 0.999
 
 
 class ColumnSolver:
@@ -140,161 +145,135 @@ class ColumnSolver:
         self._counter: tuple[ReducedFamily, ReducedFamily, ReducedFamily] | None = None
 
     def reduction(self, family: PencilFamily) -> FamilyReduction:
-        """Small models of a family; the last one is kept."""
+        """Reduced models of a family; the last one is kept."""
         if self._last is None or self._last.family is not family:
             self._last = FamilyReduction(family, self._static, self._stiffened, self._structures)
         return self._last
 
     def solve(
-        self, family: PencilFamily, conditions, snapshots: int = 3, edges: bool = False, spectra=None, count: int = 2
+        self, family: PencilFamily, points, snapshots: int = 3, edges: bool = False, spectra=None, count: int = 2
     ) -> Column:
-        """All conditions at one state.
+        """All parameter points at one state.
 
         Parameters
         ----------
         family : PencilFamily
-        conditions : sequence of Condition
+        points : sequence of hashable
         snapshots : int
-            Conditions at which leading vectors are taken into the second space; fewer than three conditions are solved
-            with the full pencil.
+            Points at which leading vectors are taken into the second space; fewer than three points are solved with
+            the full operator.
         edges : bool
             Count only beside changes of the number of unstable eigenvalues along the list; no other cell gets a
             certificate.
         spectra : sequence of Spectrum, optional
-            Of the full pencils of fewer than three conditions, where they are known.
+            Of the full operators of fewer than three points, where they are known.
         count : int
-            Leading modes of each condition that the second space is made for.
+            Leading modes of each point that the second space is made for.
 
         Raises
         ------
         SingularShiftError
-            If the stiffness is singular, or a full pencil has no usable shift.
+            If the stiffness is singular, or a full operator has no usable shift.
         """
-        conditions = [Condition(*c) for c in conditions]
+        points = list(points)
         if not family.forces.shape[1]:
-            return self._uncoupled(family, conditions)
+            return self._uncoupled(family, points)
         reduction = self.reduction(family)
-        if len(conditions) < 3:
-            return self._directly(reduction, conditions, spectra)
-        first, fine, error = _accurate(reduction, conditions, snapshots, count)
-        column = self._on(first, fine, conditions, error, edges)
+        if len(points) < 3:
+            return self._directly(reduction, points, spectra)
+        first, fine, error = _accurate(reduction, points, snapshots, count)
+        return replace(
+            self._on(first, fine, points, error, edges),
+            eigenvalues=lambda mu: fine.leading(mu)[:KEPT],
+            nearest=lambda mu, place: complex(fine.near(mu, [place]).values[0]),
+            corrected=lambda mu, value: complex(reduction.correction(fine.near(mu, [value]), mu)[0]),
+            cell=lambda mu: self._on(first, fine, [mu], error),
+            at=fine.at,
+        )
 
-        def eigenvalues(condition):
-            condition = Condition(*condition)
-            return family.reach(condition).leading(fine.eigenvalues([condition])[0])[:KEPT]
-
-        def nearest(condition, place):
-            return fine.nearest(Condition(*condition), place)
-
-        def corrected(condition, eigenvalue):
-            condition = Condition(*condition)
-            return complex(reduction.correction(fine.near(condition, eigenvalue), condition)[0])
-
-        def cell(condition):
-            return self._on(first, fine, [Condition(*condition)], error)
-
-        def pencil(condition):
-            return fine.pencil(Condition(*condition))
-
-        return replace(column, eigenvalues=eigenvalues, nearest=nearest, corrected=corrected, cell=cell, pencil=pencil)
-
-    def _on(self, first: ReducedFamily, fine: ReducedFamily, conditions, error: float, edges: bool = False) -> Column:
-        """Cells on a small model, counted on that of the first stage; those without a certificate directly."""
+    def _on(self, first: ReducedFamily, fine: ReducedFamily, points, error: float, edges: bool = False) -> Column:
+        """Cells on a reduced model, counted on that of the first stage; those without a certificate directly."""
         family = first.family
-        values = fine.eigenvalues(conditions)
-        leading = [family.reach(c).leading(row) for row, c in zip(values, conditions)]
-        counted = _beside_changes(leading) if edges else np.arange(len(conditions))
-        counts = uncounted(family, conditions)
+        values = [fine.eigenvalues(mu) for mu in points]
+        leading = [family.reach(mu).leading(row) for row, mu in zip(values, points)]
+        column = _column(family, points, leading, values, error)
+        counted = _beside_changes(leading) if edges else np.arange(len(points))
 
         def count(counter, cells, within_band=False):
-            asked = [conditions[i] for i in cells], [leading[i] for i in cells]
-            return count_unstable(counter, *asked, within_band=within_band)
+            for i in cells:
+                found = _counted(counter, points[i], leading[i], within_band)
+                agrees = found.certain and found.number == _listed(values[i], found.line, found.band)
+                if not within_band or (agrees and len(leading[i])):
+                    _take(column, i, found, values[i])
 
-        joint = error <= TOLERANCE and any(conditions[i].loss for i in counted)
-        counter = self._joint(first, fine) if joint else first
-        if len(counted):
-            counts.enter(counted, count(counter, counted))
-        column = _column(leading, values, counts, error)
+        joint = error <= TOLERANCE and any(family.relaxation(points[i]) is not None for i in counted)
+        count(self._joint(first, fine) if joint else first, counted)
         doubtful = counted[~column.certified[counted]]
         if len(doubtful) and joint and self._counter[1] is not fine:
-            counts.enter(doubtful, count(self._joint(first, fine, anew=True), doubtful))
+            count(self._joint(first, fine, anew=True), doubtful)
             doubtful = doubtful[~column.certified[doubtful]]
         if len(doubtful) and joint:
             # a mode that is all but neutral has to be met to a fraction of its growth rate
-            found = count(ReducedFamily(family, fine.V, CLOSE, base=first), doubtful, within_band=True)
-            listed = [_listed(values[i], *region) for i, *region in zip(doubtful, found.line, found.band)]
-            agree = found.certain & (found.number == listed) & np.isfinite(column.growth_rate[doubtful])
-            counts.enter(doubtful[agree], found.select(agree))
-            column.unstable[doubtful[agree]] = np.array(listed)[agree]
+            count(ReducedFamily(family, fine.V, CLOSE, base=first), doubtful, within_band=True)
             doubtful = doubtful[~column.certified[doubtful]]
-        return self._repaired(column, family, conditions, doubtful)
+        return self._repaired(column, family, points, doubtful)
 
     def _joint(self, first: ReducedFamily, fine: ReducedFamily, anew: bool = False) -> ReducedFamily:
-        """Space of a count where stiffness relaxes: static responses alone say little of that; with the vectors that a
+        """Space of a count of a viscoelastic wall: static responses alone say little of that; with the vectors that a
         list rests on, of this column or of the one before at the same state, they are enough.
         """
         if anew or self._counter is None or self._counter[0] is not first:
             self._counter = first, fine, ReducedFamily(first.family, fine.V, JOINT, base=first)
         return self._counter[2]
 
-    def direct(self, family: PencilFamily, condition, count: int = 6):
-        """Leading modes of the full pencil, an `eigen.Spectrum`.
+    def direct(self, family: PencilFamily, mu: Hashable, count: int = 6) -> Spectrum:
+        """Leading modes of the full operator.
 
         Raises
         ------
         SingularShiftError
             If no usable shift was found.
         """
-        condition = Condition(*condition)
-        found = leading_modes(family.pencil(condition), count, family.search(condition), workspace=self._workspace)
-        return _modes_of(family, condition, found)
+        found = leading_modes(family.at(mu), count, family.search(mu), workspace=self._workspace)
+        return _modes_of(family, mu, found)
 
-    def _directly(self, reduction: FamilyReduction, conditions, spectra=None) -> Column:
-        family = reduction.family
-        if spectra:
-            spectra = [_modes_of(family, c, found) for c, found in zip(conditions, spectra)]
-        else:
-            spectra = [self.direct(family, c) for c in conditions]
-        banded = any(_is_banded(family, c) for c in conditions)
-        first = reduction.wide if banded else reduction.coarse
-        counts = count_unstable(first, conditions, [s.eigenvalues[:1] for s in spectra])
-        column = _counted(counts)
-        for i, spectrum in enumerate(spectra):
+    def _directly(self, reduction: FamilyReduction, points, spectra=None) -> Column:
+        family, column = reduction.family, Column.blank(len(points))
+        first = reduction.wide if any(_is_banded(family, mu) for mu in points) else reduction.coarse
+        for i, mu in enumerate(points):
+            spectrum = _modes_of(family, mu, spectra[i]) if spectra else self.direct(family, mu)
+            _take(column, i, _counted(first, mu, spectrum.eigenvalues), np.zeros(0))
             _enter(column, i, spectrum)
-        return self._recounted(column, family, conditions, np.flatnonzero(~column.certified))
+        return self._recounted(column, family, points, np.flatnonzero(~column.certified))
 
-    def _uncoupled(self, family: PencilFamily, conditions) -> Column:
+    def _uncoupled(self, family: PencilFamily, points) -> Column:
         """A structure that nothing couples: its full spectra and counts, each once for every damping."""
-        column, known = _counted(uncounted(family, conditions)), {}
-        for i, condition in enumerate(conditions):
-            key = condition.damping
+        column, known = Column.blank(len(points)), {}
+        for i, mu in enumerate(points):
+            key = family.structure(mu)
             if key not in known:
-                asked = family.pencil(condition), 6, family.search(condition)
-                known[key] = certified_spectrum(*asked, workspace=self._workspace)
-            found = known[key]
-            _enter(column, i, _modes_of(family, condition, found.spectrum))
-            _vouch(column, i, found.certificate)
+                known[key] = certified_spectrum(family.at(mu), 6, family.search(mu), workspace=self._workspace)
+            _enter(column, i, _modes_of(family, mu, known[key].spectrum))
+            _vouch(column, i, known[key].certificate)
         return column
 
-    def _repaired(self, column: Column, family, conditions, cells) -> Column:
+    def _repaired(self, column: Column, family, points, cells) -> Column:
         for i in cells:
             try:
-                spectrum = self.direct(family, conditions[i])
+                spectrum = self.direct(family, points[i])
             except (SingularShiftError, np.linalg.LinAlgError):
                 continue  # stays without a certificate
             if len(spectrum):
                 _enter(column, i, spectrum)
-        open_cells = [i for i in cells if not column.certificate(i).agrees]
-        return self._recounted(column, family, conditions, open_cells)
+        return self._recounted(column, family, points, [i for i in cells if not column.certificate(i).agrees])
 
-    def _recounted(self, column: Column, family, conditions, cells) -> Column:
+    def _recounted(self, column: Column, family, points, cells) -> Column:
         """Cells that still lack agreement, with a count of their own on a basis of structural modes, made finer as far
         as it takes.
         """
         for i in cells:
-            pencil, options = family.pencil(conditions[i]), family.search(conditions[i])
             try:
-                found = certified_spectrum(pencil, 6, options, workspace=self._workspace)
+                found = certified_spectrum(family.at(points[i]), 6, family.search(points[i]), workspace=self._workspace)
             except (SingularShiftError, np.linalg.LinAlgError):
                 continue
             if len(found.spectrum):
@@ -303,42 +282,56 @@ class ColumnSolver:
         return column
 
 
-def _modes_of(family: PencilFamily, condition: Condition, spectrum):
+def _modes_of(family: PencilFamily, mu: Hashable, spectrum: Spectrum) -> Spectrum:
     """The modes of a spectrum, without relaxations of the stiffness."""
-    if condition.loss == 0:
+    if family.relaxation(mu) is None:
         return spectrum
-    return spectrum.select(np.flatnonzero(family.reach(condition).is_mode(spectrum.eigenvalues)))
+    return spectrum.select(np.flatnonzero(family.reach(mu).is_mode(spectrum.eigenvalues)))
 
 
-def _accurate(reduction: FamilyReduction, conditions, snapshots: int, count: int):
-    """Both small models, and the error of leading eigenvalues on the second: with vectors corrected again and more of
-    them as far as it takes, which is far cheaper than every cell with the full pencil.
+def _accurate(reduction: FamilyReduction, points, snapshots: int, count: int):
+    """Both reduced models, and the error of leading eigenvalues on the second: with vectors corrected again and more of
+    them as far as it takes, which is far cheaper than every cell with the full operator.
     """
-    family, losses = reduction.family, [c.loss for c in conditions]
+    family = reduction.family
+    losses = [0.0 if own is None else own.strengths.sum() for own in map(family.relaxation, points)]
     mixed = len(set(losses)) > 1
     least = max(snapshots, LOSSES) if mixed else snapshots
     for number in (least, 2 * least + 1, 4 * least + 3):
-        places = spread(conditions, number)
-        taken = [conditions[i] for i in places]
-        banded = any(_is_banded(family, c) for c in taken)
+        places = spread(points, number)
+        taken = [points[i] for i in places]
+        banded = any(_is_banded(family, mu) for mu in taken)
         first, most = (reduction.wide, MOST_IN_BAND) if banded else (reduction.coarse, MOST)
         most = max(most, count)
         checked = between(places)
         if mixed:  # few corrections leave most where most relaxes, and of the quick modes that lead where least does
             checked += [int(np.argmax(losses)), int(np.argmin(losses))]
         fine = reduction.fine(first, taken, most)
-        error = _error(reduction, fine, conditions, checked)
+        error = _error(reduction, fine, points, checked)
         if error > TOLERANCE:
             fine = reduction.deeper(fine, taken, most)
-            error = _error(reduction, fine, conditions, checked)
+            error = _error(reduction, fine, points, checked)
         if error <= TOLERANCE:
             break
     return first, fine, error
 
 
-def _is_banded(family: PencilFamily, condition: Condition) -> bool:
+def _is_banded(family: PencilFamily, mu: Hashable) -> bool:
     """True where all modes of a band are close to neutral, as they are where only it makes modes leading."""
-    return condition.loss == 0 and np.isfinite(family.reach(condition).band)
+    return family.relaxation(mu) is None and np.isfinite(family.reach(mu).band)
+
+
+def _counted(reduced: ReducedFamily, mu: Hashable, leading: np.ndarray, within_band: bool = False) -> Count:
+    """Count of unstable eigenvalues: in the band, or of a viscoelastic wall, which damps all, over all frequencies."""
+    band = _counted_band(reduced.family, mu, within_band)
+    number = max(2, int((leading.real > 0).sum()) + 1)
+    return reduced.count(mu, leading[:number], None if np.isinf(band) else band)
+
+
+def _counted_band(family: PencilFamily, mu: Hashable, within_band: bool = False) -> float:
+    """Frequency up to which eigenvalues are counted, Hz."""
+    whole = family.relaxation(mu) is not None and not within_band
+    return np.inf if whole else INSIDE * family.reach(mu).band / (2 * np.pi)
 
 
 def _beside_changes(leading) -> np.ndarray:
@@ -348,15 +341,15 @@ def _beside_changes(leading) -> np.ndarray:
     return np.unique(np.concatenate([change, change + 1]))
 
 
-def _error(reduction: FamilyReduction, fine: ReducedFamily, conditions, places) -> float:
-    """Relative change of leading eigenvalues under a correction with the full matrices, at conditions the space was
-    not made for.
+def _error(reduction: FamilyReduction, fine: ReducedFamily, points, places) -> float:
+    """Relative change of leading eigenvalues under a correction with the full matrices, at points the space was not
+    made for.
     """
     worst = 0.0
     for i in places:
-        pairs = fine.pairs(conditions[i], 2)
+        pairs = fine.pairs(points[i], 2)
         if pairs.values.size:
-            change = np.abs(reduction.correction(pairs, conditions[i])) / np.maximum(np.abs(pairs.values), 1.0)
+            change = np.abs(reduction.correction(pairs, points[i])) / np.maximum(np.abs(pairs.values), 1.0)
             worst = max(worst, float(change.max()))
     return worst
 
@@ -371,6 +364,8 @@ def _enter(column: Column, cell: int, spectrum) -> None:
     inside = np.flatnonzero(spectrum.frequency <= column.band[cell])
     column.leading[cell] = spectrum.eigenvalues[:KEPT]
     column.unstable[cell] = spectrum.select(inside).count_right_of(column.line[cell])
+    # where all listed are unstable there may be more, whatever was counted on a reduced model
+    column.certain[cell] &= bool(spectrum.growth_rate[-1] <= column.line[cell])
 
 
 def _vouch(column: Column, cell: int, own) -> None:
@@ -379,39 +374,35 @@ def _vouch(column: Column, cell: int, own) -> None:
     column.line[cell], column.band[cell] = own.line, own.band
 
 
-def _counted(counts: CellCounts) -> Column:
-    """Cells of which nothing but the counts is known."""
-    blank = Column.blank(len(counts.number))
-    how = np.full(len(counts.number), DIRECT)
-    known = {"counted": counts.number, "certain": counts.certain, "line": counts.line, "band": counts.band}
-    return replace(blank, unstable=np.zeros(len(how), int), how=how, **known)
+def _take(column: Column, cell: int, count: Count, values: np.ndarray) -> None:
+    """Put a count into a cell, and the number of unstable eigenvalues listed in its region."""
+    column.counted[cell], column.certain[cell] = count.number, count.certain
+    column.line[cell], column.band[cell] = count.line, count.band
+    column.unstable[cell] = _listed(values, count.line, count.band)
 
 
 def _listed(values: np.ndarray, line: float, band: float) -> int:
-    """Number of unstable eigenvalues of a cell."""
-    return int(((values.real > line) & (np.abs(values.imag) <= 2 * np.pi * band)).sum())
+    """Number of eigenvalues right of a line up to a band, Hz, conjugates counted apart."""
+    inside = (values.real > line) & (values.imag <= 2 * np.pi * band)
+    return int(np.where(values.imag > 0, 2, 1)[inside].sum())
 
 
-def _column(leading, values, counts: CellCounts, error: float) -> Column:
-    first = [row[0] if len(row) else complex(np.nan, np.nan) for row in leading]
-    return Column(
-        growth_rate=np.array([value.real for value in first]),
-        frequency=np.array([value.imag / (2 * np.pi) for value in first]),
-        second=np.array([row[1].real if len(row) > 1 else np.nan for row in leading]),
-        unstable=np.array([_listed(*row) for row in zip(values, counts.line, counts.band)]),
-        counted=counts.number,
-        certain=counts.certain,
-        error=error,
-        how=np.full(len(leading), REDUCED),
-        line=counts.line,
-        band=counts.band,
-        leading=[row[:KEPT] for row in leading],
-    )
+def _column(family: PencilFamily, points, leading, values, error: float) -> Column:
+    """Cells that nobody counted."""
+    column = Column.blank(len(leading))
+    column.how[:] = REDUCED
+    for i, (mu, row) in enumerate(zip(points, leading)):
+        column.leading[i], column.band[i] = row[:KEPT], _counted_band(family, mu)
+        column.unstable[i] = _listed(values[i], 0.0, column.band[i])
+        if len(row):
+            column.growth_rate[i], column.frequency[i] = row[0].real, row[0].imag / (2 * np.pi)
+        column.second[i] = row[1].real if len(row) > 1 else np.nan
+    return replace(column, error=error)
 
 
-def spread(conditions, number: int) -> list[int]:
-    """Indices of conditions spread over the list."""
-    return sorted({int(round(x)) for x in np.linspace(0, len(conditions) - 1, min(number, len(conditions)))})
+def spread(points, number: int) -> list[int]:
+    """Indices of points spread over the list."""
+    return sorted({int(round(x)) for x in np.linspace(0, len(points) - 1, min(number, len(points)))})
 
 
 def between(places: list[int]) -> list[int]:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .determinant import CLOSE, MAX_LOG, MAX_PHASE, MAX_PREDICTED, Determinant, middle, principal, thinned
+from .determinant import CLOSE, MAX_LOG, MAX_PHASE, MAX_PREDICTED, Determinant, Structure, middle, principal, thinned
 from .operator import CoupledPencil
 
 
@@ -58,6 +58,7 @@ def unstable_count(
     hints=(),
     scale: float | None = None,
     max_points: int | None = None,
+    structure: Structure | None = None,
 ) -> Count:
     """Count the eigenvalues with growth rate above a line by the argument principle.
 
@@ -84,6 +85,8 @@ def unstable_count(
         A typical angular frequency, rad/s.
     max_points : int, optional
         Default 4000 for dense, 300 for sparse pencils.
+    structure : Structure, optional
+        Of the pencil, where it is known; its line is that of the count.
 
     Returns
     -------
@@ -97,21 +100,25 @@ def unstable_count(
     (1, True)
     """
     scale = scale or _typical_frequency(pencil)
-    if line is None:
-        relaxes = pencil.relaxation is not None and pencil.relaxation.strengths.any()
-        undamped = (pencil.C.nnz == 0 or abs(pencil.C).max() == 0) and not relaxes
-        line = 1e-3 * scale if undamped else 0.0
-    determinant = Determinant(pencil, line)
-    dense = pencil.n <= Determinant.dense_below
+    if structure is None:
+        structure = Structure(pencil, counted_line(pencil, scale) if line is None else line)
+    line, determinant = structure.line, Determinant(pencil, structure)
+    dense = pencil.n <= Structure.dense_below
     # a zero of the pencil can hide from a coarse walk only beside a zero of the reference
-    hints = [complex(h) for h in hints] + [line + z for z in determinant.reference_zeros()]
+    own = [line + z for z in structure.reference_zeros()]
+    hints = [complex(h) for h in hints]
+    if pencil.relaxation is None:
+        hints, own = hints + own, []
     if pencil.b > 1:
         zeros = pencil.fluid.zeros
         hints += list(zeros[zeros.imag > 0])
     walk = _Walk(determinant, max_points or (4000 if dense else 300), band)
-    walk.start(scale, hints)
+    walk.start(scale, hints, own)
     walk.refine()
     return walk.count()
+
+
+BESIDE = (-10, -3, -1, 0, 1, 3, 10)
 
 
 class _Walk:
@@ -147,7 +154,7 @@ class _Walk:
         if sentence not in self.notes:
             self.notes.append(sentence)
 
-    def start(self, scale, hints):
+    def start(self, scale, hints, zeros=()):
         self._add(0.0)
         self.smallest = 1e-9 * scale
         self.values.setdefault(0.0, 0j)  # kept as a place even where the value is lost
@@ -155,11 +162,13 @@ class _Walk:
         places, widths = list(steps), []
         if np.isfinite(self.turn):
             places += [self.turn, *(self.turn + steps)]
-        for h in hints:
+        for h, offsets in [*((h, BESIDE) for h in hints), *((h, (0,)) for h in zeros)]:
             if h.imag == 0 or abs(h.imag) > self.turn:
                 continue
             width = max(abs(h.real - self.f.line), 1e-9 * abs(h))
-            beside = [abs(h.imag) + offset * width for offset in (-10, -3, -1, 0, 1, 3, 10)]
+            # on a grid, so that pencils of one structure share its responses
+            step = 2.0 ** np.floor(np.log2(0.5 * width))
+            beside = [step * round((abs(h.imag) + offset * width) / step) for offset in offsets]
             places += [omega for omega in beside if omega > 0]
             widths += [width for omega in beside if omega > 0]
         if self.f.pencil.relaxation is not None:
@@ -272,6 +281,13 @@ class _Walk:
             evaluations=self.f.evaluations,
             notes=tuple(self.notes),
         )
+
+
+def counted_line(pencil: CoupledPencil, scale: float) -> float:
+    """Growth rate to count from: zero, or without any damping a small share of a typical frequency."""
+    relaxes = pencil.relaxation is not None and pencil.relaxation.strengths.any()
+    undamped = (pencil.C.nnz == 0 or abs(pencil.C).max() == 0) and not relaxes
+    return 1e-3 * scale if undamped else 0.0
 
 
 def _typical_frequency(pencil) -> float:

@@ -22,34 +22,16 @@ import scipy.sparse as sp
 from .factor import ScaledLU, SingularShiftError, StructureMatrices, condensed_matrix, is_positive_definite
 from .operator import CoupledPencil, Relaxation, real_apply
 
-#: Largest accepted step of the phase between neighbours, rad.
-LARGEST_STEP = np.pi / 3
-#: Distance of the last phase from its limit that calls for higher frequencies, rad.
-LATE = 0.1
-#: Places between far below and far above the frequencies of a structure that every walk looks at.
-GRID = 17
-
 
 def principal(angle):
     """Angles brought to -pi..pi."""
     return (np.asarray(angle) + np.pi) % (2 * np.pi) - np.pi
 
 
-def grid(scale: float, top: float, beside) -> list[float]:
-    """Places to begin with: zero, those spread over the frequencies of a structure, and those given."""
-    return [0.0, *np.geomspace(0.1 * scale, top, GRID), *beside]
-
-
 def middle(a, b) -> np.ndarray:
     """Places at which intervals are parted: on the positive axis in proportion where they are wide, else in length."""
     a, b = np.asarray(a, float), np.asarray(b, float)
     return np.where((a > 0) & (b > 4 * a), np.sqrt(np.abs(a * b)), 0.5 * (a + b))
-
-
-def wide(omega: np.ndarray, phase: np.ndarray) -> np.ndarray:
-    """Intervals between ascending places over which the phase turns too far and which are not yet too short."""
-    far = np.flatnonzero(np.abs(principal(np.diff(phase))) > LARGEST_STEP)
-    return far[np.diff(omega)[far] > 1e-10 * omega[far + 1]]
 
 
 def thinned(places, widths, apart: float) -> list[float]:
@@ -153,24 +135,17 @@ _LARGEST_CONDITION = 1e6
 _LIGHT = 0.02
 
 
-class Determinant:
-    """log det T(s) - log det D_ref(s) of a pencil, dense or sparse.
+class Structure:
+    """det D(s) of a structure over that of a stable one, and J D(s)^-1 G; dense or sparse.
 
     Parameters
     ----------
     pencil : CoupledPencil
+        Its fluid does not matter.
     line : float
-        Growth rate; the reference is stable to the right of it.
-
-    Attributes
-    ----------
-    degree : int or None
-        The ratio grows like leading * s**degree; None if the leading coefficient vanishes.
-    leading_phase : float
-        0 or pi.
-    fluid : (k,) array
-        Zeros of what the ratio is divided by where the fluid has several unknowns, see `eigen.operator.FluidMotions`.
-    evaluations : int
+        Growth rate; the stable structure is so to the right of it.
+    keep : bool
+        Keep what was computed, for further pencils of one structure.
 
     Raises
     ------
@@ -180,17 +155,40 @@ class Determinant:
 
     dense_below = 400
 
-    def __init__(self, pencil: CoupledPencil, line: float = 0.0):
-        self.pencil, self.line = pencil, line
-        self.evaluations = 0
+    def __init__(self, pencil: CoupledPencil, line: float = 0.0, keep: bool = False):
+        self.pencil, self.line, self._evaluations = pencil, line, 0
+        self._known: dict[complex, tuple[np.ndarray, complex]] | None = {} if keep else None
         self._dense = pencil.n <= self.dense_below
         if abs(pencil.M - pencil.M.T).max() > 1e-10 * abs(pencil.M).max():
             raise ValueError("The count needs a symmetric mass matrix.")
         if not is_positive_definite(pencil.M):
             raise ValueError("The count needs a positive definite mass matrix.")
         self._prepare_reference()
-        self.fluid = pencil.fluid.stable(line)
-        self.degree, self.leading_phase = self._at_infinity()
+
+    def at(self, z: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """J D^-1 G at places line + z, (k, m, m), and the logarithm of the ratio, (k,); NaN where D is singular."""
+        if self._known is None:
+            return self._computed(z)
+        new = np.array([place for place in z.tolist() if place not in self._known], complex)
+        if new.size:
+            self._known.update(zip(new.tolist(), zip(*self._computed(new))))
+        H, total = zip(*(self._known[place] for place in z.tolist()))
+        return np.array(H), np.array(total)
+
+    def _computed(self, z):
+        stack = max(1, int(_STACK / self.pencil.n**2)) if self._dense else 1
+        pieces = [self._tried(z[i : i + stack]) for i in range(0, z.size, stack)]
+        return tuple(np.concatenate(parts) for parts in zip(*pieces))
+
+    def _tried(self, z):
+        self._evaluations += z.size
+        try:
+            return self._structure_at(z) if self._dense else self._sparse_structure_at(complex(z[0]))
+        except (SingularShiftError, np.linalg.LinAlgError):
+            if z.size == 1:
+                m = self.pencil.m
+                return np.full((1, m, m), np.nan + 0j), np.full(1, complex(np.nan, np.nan))
+            return tuple(np.concatenate(parts) for parts in zip(*(self._tried(z[[i]]) for i in range(z.size))))
 
     def _prepare_reference(self):
         p, g = self.pencil, self.line
@@ -252,33 +250,12 @@ class Determinant:
         if self._modal:
             self._modes, self._modal = _StructureModes.of(*self._parts[:3], self._G, self._J), False
 
-    def _at_infinity(self):
-        p = self.pencil
+    @cached_property
+    def inertance(self) -> np.ndarray:
+        """J M^-1 G."""
         if self._dense:
-            H = self._J @ la.solve(self._parts[0], self._G, assume_a="pos")
-        else:
-            H = p.J @ ScaledLU(p.M).solve(p.G.toarray())
-        grows = (p.B1 != 0).any(axis=0) | (p.S1 != 0).any(axis=0)
-        leading = condensed_matrix(
-            np.zeros_like(p.A0), np.where(grows, p.B1, p.B0), np.zeros_like(p.R0), np.where(grows, p.S1, p.S0), H
-        )
-        m = p.m
-        if leading.size:
-            leading[:m, :m] -= p.A2 @ H
-            leading[m:, :m] = p.R2 @ H
-        if not leading.size:
-            return 0, 0.0
-        size = np.abs(leading).max(axis=1)
-        if (size == 0).any():
-            return None, 0.0
-        leading = leading / size[:, None]
-        columns = np.abs(leading).max(axis=0)
-        if (columns == 0).any():
-            return None, 0.0
-        leading = leading / columns
-        if np.linalg.cond(leading) > 1e12:
-            return None, 0.0
-        return int(grows.sum()) - len(self.fluid), 0.0 if np.linalg.slogdet(leading)[0] > 0 else np.pi
+            return self._J @ la.solve(self._parts[0], self._G, assume_a="pos")
+        return self.pencil.J @ ScaledLU(self.pencil.M).solve(self.pencil.G.toarray())
 
     def reference_zeros(self) -> np.ndarray:
         """Eigenvalues of the reference in the upper half-plane, relative to the line.
@@ -298,34 +275,9 @@ class Determinant:
         M, _, _, C, K = self._parts
         return la.eigvals(_first_order(M, C, K))
 
-    def __call__(self, z: complex) -> complex:
-        """log |ratio| + i arg ratio at line + z; the argument is known modulo 2 pi.
-
-        NaN where the structure is singular to the last bit.
-        """
-        return complex(self.at([z])[0])
-
-    def at(self, places) -> np.ndarray:
-        """Values at many places, shape (k,); a dense pencil is evaluated in stacks."""
-        places = np.asarray(places, complex)
-        self.evaluations += places.size
-        stack = max(1, int(_STACK / self.pencil.n**2)) if self._dense else 1
-        pieces = [self._tried(places[i : i + stack]) for i in range(0, places.size, stack)]
-        return np.concatenate(pieces) if pieces else np.zeros(0, complex)
-
-    def _tried(self, z):
-        with np.errstate(all="ignore"):
-            try:
-                H, total = self._structure_at(z) if self._dense else self._sparse_structure_at(complex(z[0]))
-            except (SingularShiftError, np.linalg.LinAlgError):
-                if z.size == 1:
-                    return np.full(1, complex(np.nan, np.nan))
-                return np.concatenate([self._tried(z[[i]]) for i in range(z.size)])
-            return total + self._fluid_log(self.line + z, H) - np.log(z[:, None] - self.fluid).sum(axis=1)
-
     def _structure_at(self, z):
         """H at a stack of places, shape (k, m, m), and log det D - log det D_ref there."""
-        if self.evaluations > _MODAL_AFTER:
+        if self._evaluations > _MODAL_AFTER:
             self._take_modes()
         if self._modes is not None:
             H, total = self._modes.response(self.line + z)
@@ -361,11 +313,71 @@ class Determinant:
         twin = ScaledLU(self._twin.columns(self._twin.values(z).astype(complex)))
         return H, np.array([factor.log_determinant() - twin.log_determinant()])
 
-    def _fluid_log(self, s, H):
-        if not self.pencil.m + self.pencil.b:
-            return np.zeros(s.size)
-        coupling, total = self.pencil.fluid.condensed(s)
-        return total + _log_determinant(np.eye(self.pencil.m) - coupling @ H)
+
+class Determinant:
+    """log det T(s) - log det D_ref(s) of a pencil.
+
+    Parameters
+    ----------
+    pencil : CoupledPencil
+    structure : Structure
+        Of the pencil.
+
+    Attributes
+    ----------
+    degree : int or None
+        The ratio grows like leading * s**degree; None if the leading coefficient vanishes.
+    leading_phase : float
+        0 or pi.
+    fluid : (k,) array
+        Zeros of what the ratio is divided by where the fluid has several unknowns, see `eigen.operator.FluidMotions`.
+    evaluations : int
+    """
+
+    def __init__(self, pencil: CoupledPencil, structure: Structure):
+        self.pencil, self.structure, self.line = pencil, structure, structure.line
+        self.evaluations = 0
+        self.fluid = pencil.fluid.stable(self.line)
+        self.degree, self.leading_phase = self._at_infinity()
+
+    def _at_infinity(self):
+        p, H = self.pencil, self.structure.inertance
+        grows = (p.B1 != 0).any(axis=0) | (p.S1 != 0).any(axis=0)
+        leading = condensed_matrix(
+            np.zeros_like(p.A0), np.where(grows, p.B1, p.B0), np.zeros_like(p.R0), np.where(grows, p.S1, p.S0), H
+        )
+        m = p.m
+        if leading.size:
+            leading[:m, :m] -= p.A2 @ H
+            leading[m:, :m] = p.R2 @ H
+        if not leading.size:
+            return 0, 0.0
+        size = np.abs(leading).max(axis=1)
+        if (size == 0).any():
+            return None, 0.0
+        leading = leading / size[:, None]
+        columns = np.abs(leading).max(axis=0)
+        if (columns == 0).any():
+            return None, 0.0
+        leading = leading / columns
+        if np.linalg.cond(leading) > 1e12:
+            return None, 0.0
+        return int(grows.sum()) - len(self.fluid), 0.0 if np.linalg.slogdet(leading)[0] > 0 else np.pi
+
+    def at(self, places) -> np.ndarray:
+        """Values at line + z for places z, shape (k,), the argument modulo 2 pi; NaN where the structure is singular to
+        the last bit.
+        """
+        z = np.asarray(places, complex)
+        self.evaluations += z.size
+        if not z.size:
+            return np.zeros(0, complex)
+        with np.errstate(all="ignore"):
+            H, total = self.structure.at(z)
+            if self.pencil.m + self.pencil.b:
+                coupling, own = self.pencil.fluid.condensed(self.line + z)
+                total = total + own + _log_determinant(np.eye(self.pencil.m) - coupling @ H)
+            return total - np.log(z[:, None] - self.fluid).sum(axis=1)
 
 
 class _StructureModes:
@@ -441,7 +453,7 @@ def _gap(a, b) -> float:
     return float(abs(a - b).max() / size) if size else 0.0
 
 
-MAX_PHASE = np.pi / 4  # largest accepted phase increment between neighbours
+MAX_PHASE = np.pi / 3
 MAX_LOG = 1.0  # largest accepted increment of log |f|: feels zeros beside the line
 CLOSE = 0.4  # distance of two places beside zeros that relax, over the distance of the zero from the line
 MAX_PREDICTED = 1.5  # largest increment of log f that a neighbour's slope may predict

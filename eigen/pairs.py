@@ -27,68 +27,64 @@ def all_pairs(pencil: CoupledPencil, *, left: bool):
     w, W : ndarray or None
         Left vectors of the polynomial, w^H T = 0.
     """
-    F, E, unit, row, col = _scaled(pencil)
-    n = pencil.n
-    inner = slice(2 * n, 2 * n + pencil.b)
-    values, right, conjugate_left = _standard(F, E, left)
-    if values is None:
-        values, right, conjugate_left = _general(F, E, left)
+    n, (matrix, lu) = pencil.n, _standard(pencil)
+    rates, inner = slice(n, 2 * n), slice(2 * n, 2 * n + pencil.b)
+    if matrix is None:
+        values, right, z = _general(pencil, left)
+    elif left:
+        values, below, right = la.eig(matrix, left=True, right=True, check_finite=False)
+        # y^H E^-1 F = l y^H, hence z = E^-T y
+        z = below.copy()
+        z[n : 2 * n + pencil.b] = la.lu_solve(lu, below[n : 2 * n + pencil.b], trans=1, check_finite=False)
+    else:
+        values, right = la.eig(matrix, check_finite=False)
     keep = values.imag >= 0
-    values, x = values[keep] * unit, right[:, keep] * col[:, None]
+    x = right[:, keep]
     if not left:
-        return values, x[:n], x[inner], None, None
-    z = conjugate_left[:, keep] * row[:, None]
-    return values, x[:n], x[inner], z[n : 2 * n], z[inner]
+        return values[keep], x[:n], x[inner], None, None
+    return values[keep], x[:n], x[inner], z[rates][:, keep], z[inner][:, keep]
 
 
 def all_eigenvalues(pencil: CoupledPencil) -> np.ndarray:
     """Finite eigenvalues without vectors, conjugates given once; several times as fast."""
-    F, E, unit, _, _ = _scaled(pencil)
-    getrf, getrs, gecon = la.get_lapack_funcs(("getrf", "getrs", "gecon"), (E,))
-    lu, pivots, info = getrf(E)
-    if info != 0 or gecon(lu, np.linalg.norm(E, 1))[0] < 1e-9:
-        values = all_pairs(pencil, left=False)[0]
-        return values
-    values = la.eigvals(getrs(lu, pivots, F)[0], check_finite=False) * unit
+    matrix, _ = _standard(pencil)
+    values = _general(pencil, False)[0] if matrix is None else la.eigvals(matrix, check_finite=False)
     return values[values.imag >= 0]
 
 
-def _scaled(pencil):
-    """F, E in units of a typical frequency, rows equilibrated, and the scales."""
+def _standard(pencil):
+    """E^-1 F and the LU of the one block of E that is not diagonal; None where that is nearly singular."""
     F, E = pencil.first_order()
-    n = pencil.n
-    # else infinite eigenvalues are hard to tell
+    block = slice(pencil.n, 2 * pencil.n + pencil.b)
+    inertia = E[block, block]
+    size = np.abs(inertia).max(axis=1, initial=0.0)
+    scaled = inertia / np.where(size > 0, size, 1.0)[:, None]
+    scaled /= np.where(scaled.any(axis=0), np.abs(scaled).max(axis=0, initial=0.0), 1.0)
+    if not np.linalg.cond(scaled, 1) < 1e9:
+        return None, None
+    lu = la.lu_factor(inertia, check_finite=False)
+    matrix = F / np.where(E.diagonal() != 0, E.diagonal(), 1.0)[:, None]
+    matrix[block] = la.lu_solve(lu, F[block], check_finite=False)
+    return matrix, lu
+
+
+def _general(pencil, left):
+    """Eigenpairs by QZ, in units of a typical frequency and with rows equilibrated, else infinite ones are hard to
+    tell.
+    """
+    F, E = pencil.first_order()
     unit = np.sqrt(_largest(pencil.K) / (_largest(pencil.M) or 1.0)) or 1.0
     col = np.ones(pencil.order)
-    col[n : 2 * n] = unit
+    col[pencil.n : 2 * pencil.n] = unit
     F, E = F * col, E * (col * unit)
     size = np.maximum(np.abs(F).max(axis=1), np.abs(E).max(axis=1))
     row = 1.0 / np.where(size > 0, size, 1.0)
-    return F * row[:, None], E * row[:, None], unit, row, col
-
-
-def _standard(F, E, left):
-    """Eigenpairs of E^-1 F where E is far from singular: twice as fast as QZ."""
-    getrf, gecon = la.get_lapack_funcs(("getrf", "gecon"), (E,))
-    *lu, info = getrf(E)
-    if info != 0 or gecon(lu[0], np.linalg.norm(E, 1))[0] < 1e-9:
-        return None, None, None
-    matrix = la.lu_solve(lu, F, check_finite=False)
-    if not left:
-        values, right = la.eig(matrix, check_finite=False)
-        return values, right, None
-    values, below, right = la.eig(matrix, left=True, right=True, check_finite=False)
-    # y^H E^-1 F = l y^H, hence z = E^-T y
-    z = la.lu_solve(lu, below.real, trans=1, check_finite=False) + 1j * la.lu_solve(
-        lu, below.imag, trans=1, check_finite=False
+    (alpha, beta), below, right = la.eig(
+        F * row[:, None], E * row[:, None], left=True, right=True, homogeneous_eigvals=True
     )
-    return values, right, z
-
-
-def _general(F, E, left):
-    (alpha, beta), below, right = la.eig(F, E, left=True, right=True, homogeneous_eigvals=True)
     finite = np.abs(beta) > 1e-13 * np.hypot(np.abs(alpha), np.abs(beta))
-    return alpha[finite] / beta[finite], right[:, finite], below[:, finite] if left else None
+    z = below[:, finite] * row[:, None] if left else None
+    return unit * alpha[finite] / beta[finite], right[:, finite] * col[:, None], z
 
 
 def _largest(matrix) -> float:

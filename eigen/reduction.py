@@ -16,11 +16,10 @@ import numpy as np
 import scipy.linalg as la
 import scipy.sparse as sp
 
-from .basis import TransferBasis, orthonormal, outside
+from .basis import TransferBasis, orthonormal
 from .factor import MumpsFactorization, SingularShiftError, StructureMatrices, Workspace
-from .operator import Condition, CoupledPencil, PencilFamily, Relaxation, real_apply
-from .reduced_counts import Reference
-from .viscoelastic import Refined, SmallSpectra
+from .family import Pairs, PencilFamily, ReducedFamily
+from .operator import CoupledPencil, Relaxation, fluid_values, real_apply
 
 
 class StaticSolver:
@@ -82,263 +81,14 @@ class StaticSolver:
             inner.setMumpsIcntl(9, 1)
 
 
-#: Power of sqrt(inertia) that each part of the coupling goes with.
-POWERS = {"A0": 0, "A1": 1, "A2": 2, "B0": 0, "B1": 1, "R0": 0, "R1": 1, "R2": 2, "S0": 0, "S1": 1}
-
-
-@dataclass(frozen=True)
-class Pairs:
-    """Eigenvalues with right and left vectors (columns): structural parts and inner unknowns."""
-
-    values: np.ndarray
-    q: np.ndarray
-    u: np.ndarray
-    w: np.ndarray
-    c: np.ndarray
-
-
-class ReducedFamily:
-    """The pencils of a family on a space.
-
-    Parameters
-    ----------
-    family : PencilFamily
-    space : (n, k) array
-        Made orthonormal in the mass here; directions below `compression` of the largest are left out.
-    base : ReducedFamily, optional
-        Of the same family: its space is kept as it is, and made wider by what `space` has outside it; directions below
-        `compression` of a vector's length are left out then.
-    """
-
-    def __init__(
-        self,
-        family: PencilFamily,
-        space: np.ndarray,
-        compression: float = 1e-9,
-        base: ReducedFamily | None = None,
-    ):
-        self.family, self._base = family, base
-        if base is None:
-            self._own, _ = orthonormal(family.mass, space, compression)
-            self.V = self._own
-        else:
-            self._own = outside(base.V, family.mass, space, compression)
-            self.V = np.hstack([base.V, self._own])
-        self._images: dict[object, np.ndarray] = {}
-        self.K = self._projected("K", family.stiffness, None if base is None else base.K)
-        self.D = self._projected("D", family.damping, None if base is None else base.D)
-        self.M = self._projected("M", family.mass, None if base is None else base.M)
-        self.G = family.forces.T.dot(self.V).T
-        self.J = family.slope @ self.V
-        self._coupled: dict[object, dict[str, np.ndarray]] = {}
-        #: What `eigen.reduced_counts` keeps of the structure's response, by damping.
-        self.responses: dict[tuple, object] = {}
-
-    def _projected(self, name, matrix, known: np.ndarray | None) -> np.ndarray:
-        """V^T A V, of which the part on the base may be known, and A V of the base under a name."""
-        image = matrix @ self._own
-        if known is None:
-            self._images[name] = image
-            return self._own.T @ image
-        first, before = self._base.V, self._base._images.get(name)
-        back = (first.T @ (matrix.T @ self._own)).T if before is None else self._own.T @ before
-        return np.block([[known, first.T @ image], [back, self._own.T @ image]])
-
-    @property
-    def size(self) -> int:
-        """Number k of basis vectors."""
-        return self.V.shape[1]
-
-    @cached_property
-    def relaxing(self) -> np.ndarray:
-        """V^T K_g V of what relaxes, (g, k, k)."""
-        relaxation = self.family.relaxation(1.0)
-        matrices = () if relaxation is None else relaxation.matrices
-        known = [None] * len(matrices) if self._base is None else self._base.relaxing
-        parts = [self._projected(i, *pair) for i, pair in enumerate(zip(matrices, known))]
-        return np.array(parts).reshape(-1, self.size, self.size)
-
-    def relaxation(self, loss: float) -> Relaxation | None:
-        """Relaxation on the space."""
-        full = self.family.relaxation(loss)
-        return None if full is None else Relaxation(tuple(self.relaxing), full.strengths, full.times)
-
-    @cached_property
-    def reference(self) -> Reference:
-        """Positive matrices near those of the space."""
-        return Reference.of(self.M, self.K, self.D, self.relaxing)
-
-    @cached_property
-    def small(self) -> SmallSpectra:
-        """Leading eigenvalues of what relaxes."""
-        return SmallSpectra(self)
-
-    def coupling(self, law) -> dict[str, np.ndarray]:
-        """Parts of the coupling at unit inertia between the vectors of the space."""
-        if law not in self._coupled:
-            if len(self._coupled) > 256:
-                self._coupled.clear()
-            p = self.family.parts(law)
-            side = {"A": (self.G, self.J), "B": (self.G, None), "R": (None, self.J), "S": (None, None)}
-            parts = {}
-            for name, value in p.items():
-                left, right = side[name[0]]
-                value = value if left is None else left @ value
-                parts[name] = value if right is None else value @ right
-            self._coupled[law] = parts
-        return self._coupled[law]
-
-    def laden_frequencies(self, condition: Condition) -> np.ndarray:
-        """Angular frequencies of the undamped structure with the inertia that its coupling brings, rad/s; none where
-        the family says that it brings none.
-        """
-        if not self.family.added:
-            return np.zeros(0)
-        added = self.G[:, -self.family.added :]
-        weight = -condition.inertia * np.diag(self.family.parts(condition.law)["A2"])[-self.family.added :]
-        symmetric = 0.5 * (self.K + self.K.T)
-        squares = la.eigh(symmetric, self.M + (added * weight) @ added.T, eigvals_only=True)
-        return np.sqrt(squares[squares > 0])
-
-    def pencil(self, condition: Condition) -> CoupledPencil:
-        """The pencil of a condition on the space, inner unknowns scaled."""
-        root = np.sqrt(condition.inertia)
-        fluid = {name: value * root ** POWERS[name] for name, value in self.family.parts(condition.law).items()}
-        return CoupledPencil(
-            self.M,
-            condition.alpha * self.M + condition.beta * self.D,
-            self.K,
-            self.G,
-            self.J,
-            **fluid,
-            relaxation=self.relaxation(condition.loss),
-        )
-
-    def first_order(self, conditions, stiffening=None, damping=None) -> np.ndarray:
-        """Matrices whose eigenvalues are those of the pencils without what relaxes, (cells, 2k + b, 2k + b).
-
-        Parameters
-        ----------
-        conditions : sequence of Condition
-        stiffening, damping : (cells, k, k) arrays, optional
-            Added to the stiffness and to the damping.
-        """
-        k, cells = self.size, len(conditions)
-        b = self.coupling(conditions[0].law)["S0"].shape[0]
-        left, right = np.zeros((cells, k + b, k + b)), np.zeros((cells, k + b, 2 * k + b))
-        for i, condition in enumerate(conditions):
-            c, root = self.coupling(condition.law), np.sqrt(condition.inertia)
-            left[i] = self._leading(condition)
-            right[i, :k, :k] = c["A0"] - self.K
-            right[i, :k, k : 2 * k] = root * c["A1"] - condition.alpha * self.M - condition.beta * self.D
-            if b:
-                right[i, :k, 2 * k :], right[i, k:, 2 * k :] = c["B0"], -c["S0"]
-                right[i, k:, :k], right[i, k:, k : 2 * k] = -c["R0"], -root * c["R1"]
-        if stiffening is not None:
-            right[:, :k, :k] -= stiffening
-        if damping is not None:
-            right[:, :k, k : 2 * k] -= damping
-        out = np.zeros((cells, 2 * k + b, 2 * k + b))
-        out[:, :k, k : 2 * k] = np.eye(k)
-        out[:, k:] = np.linalg.solve(left, right)
-        return out
-
-    def _leading(self, condition: Condition) -> np.ndarray:
-        """Matrix that multiplies the rates of velocities and inner unknowns, (k + b, k + b)."""
-        k, c, root = self.size, self.coupling(condition.law), np.sqrt(condition.inertia)
-        b = c["S0"].shape[0]
-        matrix = np.zeros((k + b, k + b))
-        matrix[:k, :k] = self.M - condition.inertia * c["A2"]
-        if b:
-            matrix[:k, k:], matrix[k:, k:] = -root * c["B1"], root * c["S1"]
-            matrix[k:, :k] = condition.inertia * c["R2"]
-        return matrix
-
-    def eigenvalues(self, conditions) -> np.ndarray:
-        """All eigenvalues (cells, 2k + b), complex; of cells that relax the leading ones, and NaN."""
-        conditions = list(conditions)
-        relaxes = [self.family.relaxation(c.loss) is not None for c in conditions]
-        if any(relaxes):
-            return self._mixed(conditions, np.array(relaxes))
-        matrices = self.first_order(conditions)
-        return np.linalg.eigvals(matrices) if len(matrices) else np.zeros((0, matrices.shape[1]), complex)
-
-    def _mixed(self, conditions, relaxes) -> np.ndarray:
-        """Eigenvalues where some of the cells relax."""
-        parts = []
-        for group, solve in ((~relaxes, self.eigenvalues), (relaxes, self.small.leading)):
-            cells = np.flatnonzero(group)
-            if cells.size:
-                parts.append((cells, solve([conditions[i] for i in cells])))
-        out = np.full((len(conditions), max(found.shape[1] for _, found in parts)), complex(np.nan, np.nan))
-        for cells, found in parts:
-            out[cells, : found.shape[1]] = found
-        return out
-
-    def several_pairs(self, conditions, most: int = 8, share: float = 1.0) -> list[Pairs]:
-        """`pairs` of several conditions; those that relax at once."""
-        relaxing = [c for c in conditions if self.family.relaxation(c.loss) is not None]
-
-        def chosen(condition, values):
-            reach = self.family.reach(condition)
-            return np.array([v for v in reach.leading(values) if v.real > share * reach.floor][:most])
-
-        found = iter(self.small.leading_pairs(relaxing, chosen) if relaxing else ())
-        return [
-            self._linear_pairs(c, most, share)
-            if self.family.relaxation(c.loss) is None
-            else self.of_rational(next(found))
-            for c in conditions
-        ]
-
-    def pairs(self, condition: Condition, most: int = 8, share: float = 1.0) -> Pairs:
-        """Leading eigenpairs in the reach of a condition, lifted to the full unknowns; down to a share of its floor."""
-        return self.several_pairs([condition], most, share)[0]
-
-    def _linear_pairs(self, condition: Condition, most: int, share: float) -> Pairs:
-        """Small pencil of a condition where nothing relaxes."""
-        reach = self.family.reach(condition)
-        floor, band = reach.floor, reach.band
-        values, left, right = la.eig(self.first_order([condition])[0], left=True, right=True)
-        keep = np.flatnonzero((values.imag >= 0) & (values.imag <= band) & (values.real > share * floor))
-        return self._lifted(condition, values, left, right, keep[np.argsort(-values.real[keep])][:most])
-
-    def nearest(self, condition: Condition, place: complex) -> complex:
-        """The eigenvalue nearest to a place close to it."""
-        if self.family.relaxation(condition.loss) is not None:
-            return complex(self.small.pairs(condition, [place]).values[0])
-        values = np.linalg.eigvals(self.first_order([condition])[0])
-        return complex(values[int(np.argmin(np.abs(values - place)))])
-
-    def near(self, condition: Condition, eigenvalue: complex) -> Pairs:
-        """The eigenpair nearest to a place."""
-        if self.family.relaxation(condition.loss) is not None:
-            return self.of_rational(self.small.pairs(condition, [eigenvalue]))
-        values, left, right = la.eig(self.first_order([condition])[0], left=True, right=True)
-        return self._lifted(condition, values, left, right, [int(np.argmin(np.abs(values - eigenvalue)))])
-
-    def of_rational(self, found: Refined) -> Pairs:
-        """Eigenpairs of the small pencils of what relaxes, lifted."""
-        k = self.size
-        right, left = found.right.T, found.left.T
-        return Pairs(found.values, real_apply(self.V, right[:k]), right[k:], real_apply(self.V, left[:k]), left[k:])
-
-    def _lifted(self, condition, values, left, right, keep) -> Pairs:
-        k = self.size
-        # left vectors of F - lambda E from those of E^-1 F
-        under = np.linalg.solve(self._leading(condition).T, left[k:, keep])
-        right = right[:, keep]
-        return Pairs(
-            values[keep], real_apply(self.V, right[:k]), right[2 * k :], real_apply(self.V, under[:k]), under[k:]
-        )
-
-
 #: Static corrections below this share of the largest are left out of the first space.
 COMPRESSION = 1e-4
 #: Share of the floor down to which vectors are taken into the second space.
 SNAPSHOT = 0.75
 #: Share of a vector corrected again that the second space lacks, below which it is left out.
 DEEPER = 1e-5
+#: Lowest motions of which a typical frequency is taken.
+TYPICAL = 8
 #: Low motions that inertia corrections are made for.
 MOTIONS = 20
 #: Corrections of a vector where parts of the stiffness relax: one leaves 1e-6 of an eigenvalue, two 1e-8, and more do
@@ -371,15 +121,15 @@ class _Products:
 
 
 class _Block:
-    """Eigenpairs of several conditions side by side; `columns` says which are whose."""
+    """Eigenpairs at several parameter points of one relaxation side by side; `columns` says which are whose."""
 
-    def __init__(self, several: list[Pairs], conditions):
-        self.several, self.conditions = several, conditions
+    def __init__(self, family: PencilFamily, several: list[Pairs], points):
+        self.several, self.points = several, points
         sizes = [len(pairs.values) for pairs in several]
         ends = np.cumsum(sizes)
         self.columns = [slice(end - size, end) for size, end in zip(sizes, ends)]
         self.values = np.concatenate([pairs.values for pairs in several])
-        self.beta = np.repeat([c.beta for c in conditions], sizes)
+        self.beta = np.repeat([family.rayleigh(mu)[1] for mu in points], sizes)
         self.q, self.w = np.hstack([pairs.q for pairs in several]), np.hstack([pairs.w for pairs in several])
 
 
@@ -412,7 +162,7 @@ class FamilyReduction:
         self._matrices: StructureMatrices | None = None
         self.solver = solver or StaticSolver()
         self.solver.factor(family)
-        self._stiffened, self._loss = stiffened or StaticSolver(), None
+        self._stiffened, self._relaxed = stiffened or StaticSolver(), None
         family.model = weakref.ref(self)
 
     @cached_property
@@ -443,7 +193,7 @@ class FamilyReduction:
         none where the first stage does not lead to them.
         """
         family, coarse = self.family, self.coarse
-        squares, turn = la.eigh(0.5 * (coarse.K + coarse.K.T))
+        squares, turn = la.eigh(0.5 * (coarse.stiffness + coarse.stiffness.T))
         order = np.argsort(np.abs(squares))[: count + GUARD]  # those next to zero, as shift and invert finds them
         X, squares = coarse.V @ turn[:, order], squares[order]
         symmetric = ((family.stiffness + family.stiffness.T) * 0.5).tocsr()
@@ -462,12 +212,8 @@ class FamilyReduction:
                 return np.sort(np.sqrt(np.maximum(found, 0.0))) / (2 * np.pi)
         return np.zeros(0)
 
-    def residual(self, values, q, u, condition: Condition, left: bool = False):
-        """T(lambda) x of pairs, or T^H w of left vectors: force part (n, k) and inner part (b, k)."""
-        return self._residual(self._products(q, condition.beta, condition.loss, left), values, u, condition, left)
-
-    def _products(self, q, beta: float, loss: float, left: bool = False) -> _Products:
-        family, relaxation = self.family, self.family.relaxation(loss)
+    def _products(self, q, beta: float, relaxation: Relaxation | None, left: bool = False) -> _Products:
+        family = self.family
         turn = (lambda a: a.T) if left else (lambda a: a)
         q = np.asarray(q, complex)
         return _Products(
@@ -478,18 +224,21 @@ class FamilyReduction:
             real_apply(family.forces.T if left else family.slope, q),
         )
 
-    def _residual(self, products: _Products, values, u, condition: Condition, left: bool = False):
+    def _residual(self, products: _Products, values, u, mu, left: bool = False):
+        """T(lambda) x of pairs, or T^H w of left vectors: force part (n, k) and inner part (b, k)."""
         family, s, y = self.family, np.conj(values) if left else values, products.coupled
-        force = products.mass * (s * s + condition.alpha * s) + products.stiffness
+        alpha, beta = family.rayleigh(mu)
+        force = products.mass * (s * s + alpha * s) + products.stiffness
         if products.damping is not None:
-            force += products.damping * (condition.beta * s)
+            force += products.damping * (beta * s)
         if products.relaxing:
-            for factor, image in zip(family.relaxation(condition.loss).factors(s), products.relaxing):
+            for factor, image in zip(family.relaxation(mu).factors(s), products.relaxing):
                 force += image * factor
+        parts = family.coupling(mu)
         inner = np.zeros((u.shape[0], len(values)), complex)
         pressure = np.zeros_like(y)
         for i, value in enumerate(s):
-            A, B, R, S = family.coupling_at(value, condition)
+            A, B, R, S = fluid_values(parts, value)
             if left:
                 pressure[:, i] = A.T @ y[:, i] - R.T @ u[:, i]
                 inner[:, i] = -B.T @ y[:, i] + S.T @ u[:, i]
@@ -499,99 +248,97 @@ class FamilyReduction:
         force -= real_apply(family.slope.T if left else family.forces, pressure)
         return force, inner
 
-    def corrected(self, pairs: Pairs, condition: Condition) -> tuple[np.ndarray, np.ndarray]:
-        """Right and left structural vectors corrected once with the full matrices, (n, k) each."""
-        return self._all_corrected([pairs], [condition])[0]
+    def _corrected(self, several: list[Pairs], points) -> list[tuple[np.ndarray, np.ndarray]]:
+        """Right and left structural vectors corrected with the full matrices, (n, k) each, those of one relaxation in
+        one block.
+        """
+        found, relaxations = {}, [self.family.relaxation(mu) for mu in points]
+        for relaxation in {id(own): own for own in relaxations}.values():
+            members = [i for i, own in enumerate(relaxations) if own is relaxation]
+            block = _Block(self.family, [several[i] for i in members], [points[i] for i in members])
+            found |= zip(members, self._block_corrected(block, relaxation))
+        return [found[i] for i in range(len(points))]
 
-    def _all_corrected(self, several: list[Pairs], conditions) -> list[tuple[np.ndarray, np.ndarray]]:
-        """Spectra of several conditions, those of one factor on the loss factors in one block."""
-        found = {}
-        for loss in dict.fromkeys(c.loss for c in conditions):
-            members = [i for i, c in enumerate(conditions) if c.loss == loss]
-            block = _Block([several[i] for i in members], [conditions[i] for i in members])
-            found |= zip(members, self._block_corrected(block, loss))
-        return [found[i] for i in range(len(conditions))]
-
-    def _block_corrected(self, block: _Block, loss: float) -> Iterator[tuple[np.ndarray, np.ndarray]]:
-        relaxation, values = self.family.relaxation(loss), block.values
+    def _block_corrected(self, block: _Block, relaxation) -> Iterator[tuple[np.ndarray, np.ndarray]]:
         # far from the leading modes T is nearly (1 + lambda beta) K
-        solver, passes, scale = self.solver, 1, 1.0 / (1.0 + values * block.beta)
+        values, solver, passes, scale = block.values, self.solver, 1, 1.0 / (1.0 + block.values * block.beta)
         if relaxation is not None:
             # with the stiffness that a typical motion sees, and repeated for what that differs from one mode and one
             # part to another
-            small = self.coarse.small
-            typical, share = relaxation.factors(1j * small.frequency).real, small.stiff_shares
-            solver, passes = self._stiffened_by(typical, block.conditions[0]), CORRECTIONS
+            frequency, share = self._typical(block.points[0])
+            typical = relaxation.factors(1j * frequency).real
+            solver, passes = self._stiffened_by(typical, relaxation), CORRECTIONS
             scale = (1.0 + share @ typical) / (1.0 + values * block.beta + share @ relaxation.factors(values))
         q, w = block.q, block.w
         for _ in range(passes):
-            force, back = self._forces(block, q, loss), self._forces(block, w, loss, left=True)
+            force, back = self._forces(block, q, relaxation), self._forces(block, w, relaxation, left=True)
             q, w = q - solver.solve(force) * scale, w - solver.solve_transposed(back) * np.conj(scale)
         return ((q[:, own], w[:, own]) for own in block.columns)
 
-    def _forces(self, block: _Block, vectors: np.ndarray, loss: float, left: bool = False) -> np.ndarray:
+    def _forces(self, block: _Block, vectors: np.ndarray, relaxation, left: bool = False) -> np.ndarray:
         """Force parts of the residuals of a block with other structural vectors, (n, k)."""
-        products = self._products(vectors, block.beta.max(initial=0.0), loss, left)
+        products = self._products(vectors, block.beta.max(initial=0.0), relaxation, left)
         return np.hstack(
             [
-                self._residual(products[own], pairs.values, pairs.c if left else pairs.u, condition, left)[0]
-                for own, pairs, condition in zip(block.columns, block.several, block.conditions)
+                self._residual(products[own], pairs.values, pairs.c if left else pairs.u, mu, left)[0]
+                for own, pairs, mu in zip(block.columns, block.several, block.points)
             ]
         )
 
-    def _stiffened_by(self, factors: np.ndarray, condition: Condition) -> StaticSolver:
+    def _typical(self, mu) -> tuple[float, np.ndarray]:
+        """Angular frequency of typical motions, rad/s, and shares of the relaxing parts in the stiffness, (g,)."""
+        coarse = self.coarse
+        squares = la.eigvalsh(0.5 * (coarse.stiffness + coarse.stiffness.T))
+        low = squares[squares > 0][:TYPICAL]
+        frequency = float(np.exp(0.5 * np.log(low).mean())) if low.size else 1.0
+        return frequency, np.array([m.diagonal().sum() for m in coarse.relaxation(mu).matrices]) / squares.sum()
+
+    def _stiffened_by(self, factors: np.ndarray, relaxation: Relaxation) -> StaticSolver:
         """Solver of the stiffness with its relaxing parts as stiff as factors say; that of the last one is kept."""
-        if self._loss != condition.loss:
+        if self._relaxed is not relaxation:
             if self._matrices is None:
-                mass, relaxation = self.family.mass, self.family.relaxation(condition.loss)
+                mass = self.family.mass
                 pencil = CoupledPencil(mass, sp.csr_matrix(mass.shape), self.family.stiffness, relaxation=relaxation)
                 self._matrices = self._workspace.structure(pencil)
             self._stiffened.factor_sum(self._matrices, np.array([0.0, 0.0, 1.0, *factors]))
-            self._loss = condition.loss
+            self._relaxed = relaxation
         return self._stiffened
 
-    def fine(self, first: ReducedFamily, conditions, most: int = 4) -> ReducedFamily:
-        """Second stage: a space made of the corrected leading vectors of a first one at some conditions."""
-        columns = self._corrected_leading(first, conditions, most)
-        if not columns.shape[1]:
-            return first  # nothing leads anywhere: there is nothing to be found better
-        return ReducedFamily(self.family, columns, 3e-7)
+    def fine(self, first: ReducedFamily, points, most: int = 4) -> ReducedFamily:
+        """Second stage: a space made of the corrected leading vectors of a first one at some parameter points."""
+        columns = self._corrected_leading(first, points, most)
+        # where nothing leads anywhere there is nothing to be found better
+        return ReducedFamily(self.family, columns, 3e-7) if columns.shape[1] else first
 
-    def deeper(self, fine: ReducedFamily, conditions, most: int = 4) -> ReducedFamily:
+    def deeper(self, fine: ReducedFamily, points, most: int = 4) -> ReducedFamily:
         """A second stage made wider by its own leading vectors, corrected once more.
 
         What the first space has by too little is corrected by too little at once: an error of 1e-2 of its vectors
-        leaves 1e-5 of an eigenvalue however many conditions they come from.
+        leaves 1e-5 of an eigenvalue however many points they come from.
         """
-        columns = self._corrected_leading(fine, conditions, most)
+        columns = self._corrected_leading(fine, points, most)
         return ReducedFamily(self.family, columns, DEEPER, base=fine) if columns.shape[1] else fine
 
-    def _corrected_leading(self, model: ReducedFamily, conditions, most: int) -> np.ndarray:
-        """Right and left leading vectors of a small model at some conditions, corrected by the full matrices, real and
+    def _corrected_leading(self, model: ReducedFamily, points, most: int) -> np.ndarray:
+        """Right and left leading vectors of a reduced model at some points, corrected with the full matrices, real and
         imaginary parts side by side.
         """
-        several = model.several_pairs(conditions, most, SNAPSHOT)
-        parts = [
-            part
-            for right, left in self._all_corrected(several, conditions)
-            for part in (right.real, right.imag, left.real, left.imag)
-        ]
-        return np.hstack(parts)
+        several = [model.pairs(mu, most, SNAPSHOT) for mu in points]
+        corrected = self._corrected(several, points)
+        return np.hstack([part for both in corrected for x in both for part in (x.real, x.imag)])
 
-    def correction(self, pairs: Pairs, condition: Condition) -> np.ndarray:
+    def correction(self, pairs: Pairs, mu) -> np.ndarray:
         """Newton's correction of eigenvalues by the full matrices, -w^H T x / (w^H T' x), complex (k,).
 
         Vectors are corrected once outside the space first; what the space lacks shows in it.
         """
-        return self._newton(pairs, *self.corrected(pairs, condition), condition)
-
-    def _newton(self, pairs: Pairs, right, left, condition: Condition) -> np.ndarray:
-        products = self._products(right, condition.beta, condition.loss)
-        force, inner = self._residual(products, pairs.values, pairs.u, condition)
+        right, left = self._corrected([pairs], [mu])[0]
+        products = self._products(right, self.family.rayleigh(mu)[1], self.family.relaxation(mu))
+        force, inner = self._residual(products, pairs.values, pairs.u, mu)
         top = np.einsum("ij,ij->j", left.conj(), force) + np.einsum("ij,ij->j", pairs.c.conj(), inner)
         # T' by a difference quotient, good enough for the size of a correction
         step = 1e-3 * np.maximum(np.abs(pairs.values), 1.0)
-        ahead = self._residual(products, pairs.values + step, pairs.u, condition)
+        ahead = self._residual(products, pairs.values + step, pairs.u, mu)
         slope = (
             np.einsum("ij,ij->j", left.conj(), ahead[0] - force)
             + np.einsum("ij,ij->j", pairs.c.conj(), ahead[1] - inner)

@@ -7,16 +7,16 @@ import scipy.sparse as sp
 
 from eigen import (
     ColumnSolver,
-    Condition,
     CoupledPencil,
+    FamilyReduction,
     PencilFamily,
+    ReducedFamily,
     Relaxation,
     SearchOptions,
     lowest_frequencies,
-    reduced_counts,
 )
-from eigen.reduced_counts import phase_counts
-from eigen.reduction import POWERS, FamilyReduction, ReducedFamily
+from eigen.operator import FLUID_PARTS
+from tests.eigen.test_columns import Point
 
 SIZE, GROUPS, TIMES = 12, 2, 3
 
@@ -39,7 +39,7 @@ class RelaxingFamily(PencilFamily):
         self.strengths, self.times = rng.uniform(0, 0.5, (GROUPS, TIMES)), 10 ** rng.uniform(-2, 1.5, TIMES)
         self.forces, self.slope = sp.csr_matrix(normal(SIZE, 3)), sp.csr_matrix(normal(3, SIZE))
         shapes = {"A": (3, 3), "B": (3, 1), "R": (1, 3), "S": (1, 1)}
-        quasi_steady = {name: coupling * normal(*shapes[name[0]]) for name in POWERS} | {
+        quasi_steady = {name: coupling * normal(*shapes[name[0]]) for name in FLUID_PARTS} | {
             "A2": np.zeros((3, 3)),
             "R2": np.zeros((1, 3)),
             "S0": np.ones((1, 1)),
@@ -49,31 +49,28 @@ class RelaxingFamily(PencilFamily):
         self._parts = {0.0: quasi_steady, 1.0: quasi_steady | {"A2": -0.1 * added @ added.T}}
         self._known: dict[float, Relaxation] = {}
 
-    def relaxation(self, loss):
+    def relaxation(self, mu):
+        loss = mu.loss
         if loss and loss not in self._known:
             # a time that some factors leave out
             kept = slice(None) if loss < 1.0 else slice(1, None)
             self._known[loss] = Relaxation(self.relaxing, loss * self.strengths[:, kept], self.times[kept])
         return self._known[loss] if loss else None
 
-    def parts(self, law):
-        return self._parts[law]
+    def rayleigh(self, mu):
+        return mu.alpha, mu.beta
 
-    def pencil(self, condition):
-        inertia, alpha, beta, law, loss = condition
-        parts = {name: value * inertia ** (POWERS[name] / 2) for name, value in self.parts(law).items()}
-        damping = alpha * self.mass + beta * self.damping
-        structure = (self.mass, damping, self.stiffness, self.forces, self.slope)
-        return CoupledPencil(*structure, **parts, relaxation=self.relaxation(loss))
+    def coupling(self, mu):
+        return {name: value * mu.inertia ** (int(name[1]) / 2) for name, value in self._parts[mu.law].items()}
 
     def search(self, condition):
         return SearchOptions()
 
 
-def random_conditions(seed: int, number: int) -> list[Condition]:
+def random_conditions(seed: int, number: int) -> list[Point]:
     rng = np.random.default_rng(seed)
     return [
-        Condition(
+        Point(
             10 ** rng.uniform(-2, 0.5),
             rng.uniform(0, 0.1) * rng.integers(2),
             10 ** rng.uniform(-3, -1) * rng.integers(2),
@@ -85,7 +82,7 @@ def random_conditions(seed: int, number: int) -> list[Condition]:
 
 
 def dense(family, condition) -> np.ndarray:
-    values = la.eigvals(*family.pencil(condition).first_order())
+    values = la.eigvals(*family.at(condition).first_order())
     return values[np.isfinite(values)]
 
 
@@ -93,19 +90,15 @@ def dense(family, condition) -> np.ndarray:
 def test_growth_and_counts_are_those_of_the_exact_linear_form(seed):
     family, conditions = RelaxingFamily(seed), random_conditions(seed, 20)
     reduced = ReducedFamily(family, np.eye(SIZE))
-    found = reduced.eigenvalues(conditions)
-    leading = [family.reach(c).leading(row) for c, row in zip(conditions, found)]
-    counts = phase_counts(reduced, conditions, leading)
-    for condition, row, own, number, certain in zip(conditions, found, leading, counts.number, counts.certain):
+    unstable = []
+    for condition in conditions:
         values = dense(family, condition)
-        true = family.reach(condition).leading(values)
-        unstable = int((values.real > 0).sum())
-        assert certain and number == unstable
-        if int((row.real > 0).sum()) == unstable:  # else the counts disagree, and the cell is solved in full
-            assert abs(own[0].real - true[0].real) <= 1e-8 * abs(true[0])
-        else:
-            assert unstable > 4
-    assert len({int((row.real > 0).sum()) for row in found}) > 1
+        true, own = family.reach(condition).leading(values), reduced.leading(condition)
+        count = reduced.count(condition, own)
+        unstable.append(int((values.real > 0).sum()))
+        assert count.certain and count.number == unstable[-1]
+        assert np.abs(own - true).max() <= 1e-7 * np.abs(true).max()
+    assert len(set(unstable)) > 1
 
 
 def test_a_slow_real_eigenvalue_is_found_beside_cells_that_creep_nearer_to_zero():
@@ -118,12 +111,12 @@ def test_a_slow_real_eigenvalue_is_found_beside_cells_that_creep_nearer_to_zero(
     family.relaxing = [sp.csr_matrix(hold @ part @ hold.T) for part in family.relaxing]
     others = sum(family.relaxing) + 200.0 * hold @ family.mass @ hold.T
     family.stiffness = sp.csr_matrix(others + 6.0 * np.outer(family.mass @ soft, family.mass @ soft) / weight)
-    conditions = [Condition(1.0, 10.0, 0.0, 0.0, loss) for loss in (0.1, 0.8, 2.0)]
+    conditions = [Point(1.0, 10.0, 0.0, 0.0, loss) for loss in (0.1, 0.8, 2.0)]
     reaches = [family.reach(c) for c in conditions]
     true = -5.0 + np.sqrt(25.0 - 6.0)  # s^2 + 10 s + 6 = 0
     assert reaches[0].creep < true < reaches[1].creep
-    rows = ReducedFamily(family, np.eye(SIZE)).eigenvalues(conditions)
-    found = [reach.leading(row) for reach, row in zip(reaches, rows)]
+    reduced = ReducedFamily(family, np.eye(SIZE))
+    found = [reduced.leading(condition) for condition in conditions]
     assert abs(found[0][0] - true) < 1e-9
     assert all(np.abs(row - true).min() > 1e-3 for row in found[1:])
 
@@ -147,18 +140,14 @@ class Unstable(RelaxingFamily):
 
 
 @pytest.mark.parametrize("seed", range(12))
-@pytest.mark.parametrize("followed", [30, 10])
-def test_counts_where_the_structure_is_unstable_by_itself(seed, followed, monkeypatch):
-    """Also where its own phase is followed once for all cells from the lower modes on."""
-    monkeypatch.setattr(reduced_counts, "BESIDE", followed)
+def test_counts_where_the_structure_is_unstable_by_itself(seed):
     family, conditions = Unstable(seed), random_conditions(seed, 12)
     reduced = ReducedFamily(family, np.eye(SIZE))
     values = [dense(family, c) for c in conditions]
-    hints = [v[(v.imag >= 0) & (v.real > -0.05 * np.abs(v))] for v in values]
-    counts = phase_counts(reduced, conditions, hints)
-    assert counts.certain.all()
-    assert counts.number.tolist() == [int((v.real > 0).sum()) for v in values]
-    assert sum(counts.number) > 0
+    counts = [reduced.count(c, v[(v.imag >= 0) & (v.real > -0.05 * np.abs(v))]) for c, v in zip(conditions, values)]
+    assert all(count.certain for count in counts)
+    assert [count.number for count in counts] == [int((v.real > 0).sum()) for v in values]
+    assert sum(count.number for count in counts) > 0
 
 
 def test_lowest_frequencies_of_a_small_model():
@@ -174,7 +163,7 @@ def test_lowest_frequencies_of_a_small_model():
 def test_columns_carry_certificates_whatever_relaxes():
     """Elastic cells and cells of several factors in one column."""
     family = RelaxingFamily(3)
-    conditions = [Condition(0.3, 0.02, 0.0, 1.0, loss) for loss in (0.0, 0.2, 0.7, 1.2)]
+    conditions = [Point(0.3, 0.02, 0.0, 1.0, loss) for loss in (0.0, 0.2, 0.7, 1.2)]
     column = ColumnSolver().solve(family, conditions)
     assert column.certified.all()
     for i, condition in enumerate(conditions):
@@ -185,7 +174,7 @@ def test_columns_carry_certificates_whatever_relaxes():
 
 
 def test_correction_is_that_of_newton_on_the_full_pencil():
-    family, condition = RelaxingFamily(5), Condition(0.3, 0.0, 0.0, 0.0, 0.4)
+    family, condition = RelaxingFamily(5), Point(0.3, 0.0, 0.0, 0.0, 0.4)
     reduction = FamilyReduction(family)
     some = np.linalg.qr(np.random.default_rng(0).standard_normal((SIZE, SIZE)))[0][:, :-1]
     pairs = ReducedFamily(family, some).pairs(condition, 1)
@@ -195,22 +184,22 @@ def test_correction_is_that_of_newton_on_the_full_pencil():
     assert abs(better[0] - exact) <= 0.2 * abs(pairs.values[0] - exact)
 
 
-def test_divergence_that_the_surrogate_does_not_see():
+def test_slow_divergence_is_found_and_counted():
     """Soft while it creeps, stiff while it moves: one real eigenvalue right of zero, slower than the relaxation."""
     family = RelaxingFamily(1, coupling=0.0)
-    parts = dict(family.parts(0.0))
+    parts = dict(family._parts[0.0])
     unit = (family.slope @ np.linalg.solve(family.stiffness.toarray(), family.forces.toarray()))[0, 0]
     parts["A0"] = np.diag([1.05 / unit, 0.0, 0.0])
     family._parts = {0.0: parts}
-    condition = Condition(1.0, 0.1, 0.0, 0.0, 1.4)
+    condition = Point(1.0, 0.1, 0.0, 0.0, 1.4)
     reduced = ReducedFamily(family, np.eye(SIZE))
     values = dense(family, condition)
     (slow,) = values[values.real > 0]
-    found = reduced.eigenvalues([condition])[0]
+    found = reduced.eigenvalues(condition)
     (own,) = found[found.real > 0]
     assert slow.imag == 0 and slow.real * family.times.max() < 1
     assert own == pytest.approx(slow, rel=1e-8)
-    assert phase_counts(reduced, [condition]).number[0] == 1
+    assert reduced.count(condition).number == 1
 
 
 def test_columns_without_any_mode():

@@ -6,7 +6,7 @@ import scipy.sparse as sp
 
 from eigen import CoupledPencil, Relaxation, SearchOptions, TransferBasis, certified_spectrum, unstable_count
 from eigen.certificate import response_error
-from eigen.count import Determinant
+from eigen.determinant import Structure
 from tests.systems.plate_over_channel import plate_over_channel
 from tests.systems.random_pencils import dense_eigenvalues, random_pencil
 from tests.systems.relaxing import STRENGTHS, TIMES, relaxing_random
@@ -74,7 +74,7 @@ def test_counts_where_the_stiffness_relaxes(seed):
 
 @pytest.mark.parametrize("dense_below", [400, 0])
 def test_of_a_relaxing_stiffness_that_is_not_passive_a_part_makes_the_reference(dense_below, monkeypatch):
-    monkeypatch.setattr(Determinant, "dense_below", dense_below)
+    monkeypatch.setattr(Structure, "dense_below", dense_below)
     relaxation = Relaxation([np.diag([1.0, -0.4]), [[0.0, 0.3], [-0.3, 0.0]]], [[0.5], [1.0]], [0.7])
     for damping in (0.0, 0.01):
         pencil = CoupledPencil(np.eye(2), damping * np.eye(2), np.diag([1.0, 0.3]), relaxation=relaxation)
@@ -99,7 +99,7 @@ def test_lines_beside_the_axis_where_the_stiffness_relaxes(line):
 def test_certificate_where_the_stiffness_relaxes(storage, density, monkeypatch):
     elastic, stiffness = plate_over_channel(5, 8, beta=0.0, storage=storage, density=density, with_parts=True)
     pencil = elastic.replace(relaxation=Relaxation([stiffness], [STRENGTHS], TIMES))
-    monkeypatch.setattr(Determinant, "dense_below", 100)
+    monkeypatch.setattr(Structure, "dense_below", 100)
     result = certified_spectrum(pencil, 4, SearchOptions(max_frequency=40.0))
     assert result.agrees, result.statement
     values = dense_eigenvalues(pencil)
@@ -115,7 +115,7 @@ def test_a_basis_for_materials_that_relax_unlike_each_other():
     halves = [sp.diags(w) @ stiffness @ sp.diags(w) for w in (weight, np.sqrt(1 - weight**2))]
     pencil = elastic.replace(relaxation=Relaxation(halves, [[0.4] * 4, [0.03] * 4], TIMES))
     result = certified_spectrum(pencil, 4, SearchOptions(max_frequency=40.0))
-    assert pencil.n > Determinant.dense_below
+    assert pencil.n > Structure.dense_below
     assert result.agrees, result.statement
     assert result.response_error < 1e-4
     plain = TransferBasis(pencil)
@@ -175,7 +175,7 @@ def test_poles_of_the_fluid_in_the_right_half_plane_are_no_trouble():
 def test_sparse_and_dense_determinants_agree(monkeypatch):
     pencil = plate_over_channel(4, 6, storage=True, density=300.0)
     dense = unstable_count(pencil)
-    monkeypatch.setattr(Determinant, "dense_below", 0)
+    monkeypatch.setattr(Structure, "dense_below", 0)
     sparse = unstable_count(pencil, scale=50.0)
     assert dense.certain and sparse.certain
     assert dense.number == sparse.number == int(np.sum(dense_eigenvalues(pencil).real > 0))
@@ -187,7 +187,7 @@ def test_sparse_and_dense_determinants_agree(monkeypatch):
 )
 def test_large_pencils_by_basis(velocity, storage, density):
     pencil = plate_over_channel(6, 15, inlet_velocity=velocity, storage=storage, density=density)
-    assert pencil.n > Determinant.dense_below
+    assert pencil.n > Structure.dense_below
     result = certified_spectrum(pencil, 4)
     assert result.agrees, result.statement
     assert result.unstable_count == int(np.sum(dense_eigenvalues(pencil).real > result.count.line))

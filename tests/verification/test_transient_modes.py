@@ -19,7 +19,6 @@ from dbvfiv.motion.control import RunOptions
 from dbvfiv.motion.start import steady_positions
 from dbvfiv.motion.stepper import StepOptions
 from dbvfiv.studies.case import thesis_case
-from dbvfiv.studies.stability.place import condition_of
 from dbvfiv.studies.stability.walk import StabilityWalk
 from dbvfiv.studies.transient.run import Runner
 
@@ -65,7 +64,7 @@ def three_routes(
     walk.give(place, q)
     # the reduced-order model is made beside the state itself
     column = walk.column([place.at(beta=share * BETA) for share in (0.9, 0.95, 1.05, 1.1)])
-    reduced = column.nearest(condition_of(place), eigenvalue)
+    reduced = column.nearest(place, eigenvalue)
     lip = model.shell.dofs.index[model.mesh.rows[0, 0], 1]
     rings = []
     for count in steps:

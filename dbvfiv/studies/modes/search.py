@@ -521,7 +521,7 @@ def critical_damping_factor(walk: StabilityWalk, place: Mu, verdict: Verdict) ->
         if not (np.isfinite(low) and np.isfinite(high)):
             return np.nan
         if low * high <= 0 and line.is_reduced:
-            at = lambda factor: growth(line.column.eigenvalues(line.condition(own * factor)))  # noqa: E731
+            at = lambda factor: growth(line.column.eigenvalues(line.place(own * factor)))  # noqa: E731
             found = brentq(at, min(a, b), max(a, b), rtol=ACCURACY)
             return float(f"{found:.8g}")  # rounding of factorisations would part a resumed run from a whole one
     return np.nan

@@ -23,7 +23,7 @@ from ...record.states import read_states, state_row, state_table
 from ...record.table import TEXT, Column, TableSpec
 from ..result import StudyResult
 from ..session import Session, describe_surroundings
-from ..stability.place import condition_of, describe_fixed
+from ..stability.place import describe_fixed
 from ..stability.walk import ValveFamily, name_state_in_failures
 from ..state import State, states_of
 from ..study import Study
@@ -95,7 +95,7 @@ def _find_mode(session: Session, state: SteadyState, mu: Mu) -> Mode:
     linear = linearise(model, state.q, state.pressure)
     family = ValveFamily(linear, session.case.modes.max_frequency, session.case.modes.count)
     with name_state_in_failures(state.pressure):
-        options = replace(family.search(condition_of(Mu.of(session.case))), left=True)
+        options = replace(family.search(Mu.of(session.case)), left=True)
         found = leading_modes(linear.pencil(mu), number + _MARGIN, options)
     if len(found) < number:
         raise SolveError(f"The state at {state.pressure:.6g} Pa has {len(found)} leading modes, and no mode {number}.")

@@ -20,11 +20,11 @@ import numpy as np
 from scipy.optimize import brentq, linear_sum_assignment
 
 from eigen import Column as Cells
-from eigen import Condition, Spectrum
+from eigen import Spectrum
 
 from ...case.parameters import Mu
 from ...errors import CaseError, NotValidError, SolveError
-from .place import condition_of, is_surrounding
+from .place import is_surrounding
 from .samples import WATCHED, Sample, SampleKey
 from .walk import StabilityWalk
 
@@ -234,14 +234,14 @@ class OnsetCorrection:
     Parameters
     ----------
     column : eigen.Column
-    condition : callable
-        From a value along the line to its condition.
+    place : callable
+        From a value along the line to its parameter point.
     direct : callable
         From a value to leading eigenvalues of the full pencil, where corrections on the small model do not settle.
     """
 
     column: Cells
-    condition: Callable[[float], Condition]
+    place: Callable[[float], Mu]
     direct: Callable[[float], np.ndarray]
 
     def __call__(self, value: float, frequency: float) -> tuple[float, float, float]:
@@ -273,7 +273,7 @@ class OnsetCorrection:
 
     def _small(self, value: float, near: complex) -> complex | None:
         """Eigenvalue of the small model; None where it has none near, as where all cells needed the full matrices."""
-        found = self.column.nearest(self.condition(value), near)
+        found = self.column.nearest(self.place(value), near)
         return found if abs(found - near) <= MOVED * max(abs(near), 1.0) else None
 
     def _slope(self, eigenvalue, value: float, near: complex) -> float:
@@ -285,7 +285,7 @@ class OnsetCorrection:
         found = self._small(value, near)
         if found is None:
             return None
-        change = self.column.corrected(self.condition(value), found)
+        change = self.column.corrected(self.place(value), found)
         return found + change if abs(change) < SAME * max(abs(found), 1.0) else None
 
     def _by_solving(self, value: float, near: complex) -> complex | None:
@@ -385,9 +385,6 @@ class ParameterLine:
         """Parameter point at a value."""
         return self.base.at(**{self.parameter: float(value)})
 
-    def condition(self, value: float) -> Condition:
-        return condition_of(self.place(value))
-
     @property
     def stays(self) -> bool:
         """True where all values share one steady state."""
@@ -460,7 +457,7 @@ class ParameterLine:
         if self.stays:
             self.walk.require_valid(place)
             if self.is_reduced:
-                return self.column.cell(condition_of(place))
+                return self.column.cell(place)
         return self.walk.column([place], spectra=None if spectrum is None else [spectrum])
 
     def _is_certified(self, value: float) -> bool:
@@ -482,17 +479,17 @@ class ParameterLine:
                 raise SolveError(sample.failure or sample.refusal)
             return sample
         if self.is_reduced:
-            return Sample(value, self.column.eigenvalues(self.condition(value)))
+            return Sample(value, self.column.eigenvalues(self.place(value)))
         return Sample(value, self.spectrum(value))
 
     def _inside(self, value: float) -> Sample:
         """A sample on the way to a crossing. Where the wall relaxes the count costs most by far, and next to a neutral
         mode it is of no use, so it is left out there and the sample is not kept.
         """
-        counted = value in self.samples or (self.counts == "all" and not self.condition(value).loss)
+        counted = value in self.samples or (self.counts == "all" and not self.place(value).loss_factor)
         if counted or not self.is_reduced:
             return self._scanned(value)
-        return Sample(value, self.column.eigenvalues(self.condition(value)))
+        return Sample(value, self.column.eigenvalues(self.place(value)))
 
     def bracket(self, crossing: Crossing, tolerance: float) -> tuple[float, complex]:
         """Value and eigenvalue of a crossing as samples have it, without a correction.
@@ -514,7 +511,7 @@ class ParameterLine:
         value, eigenvalue = self.bracket(crossing, tolerance)
         if not self.is_reduced:
             return LineOnset(value, eigenvalue, abs(eigenvalue.real) / max(abs(eigenvalue), 1.0))
-        correct = OnsetCorrection(self.column, self.condition, self.spectrum)
+        correct = OnsetCorrection(self.column, self.place, self.spectrum)
         found, frequency, residual = correct(value, abs(eigenvalue.imag) / (2 * np.pi))
         if np.isfinite(residual):
             return LineOnset(found, 2j * np.pi * frequency, residual)

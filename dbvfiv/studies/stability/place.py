@@ -4,18 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 
-from eigen import Condition
-
 from ...case.materials import RUBBERS
 from ...case.parameters import OUTSIDE, PARAMETERS, PIPES, Mu
 from ...errors import CaseError, SolveError
 from ...model import ValveModel
 from ..case import Case
-
-
-def condition_of(mu: Mu) -> Condition:
-    """(density, alpha, beta, law, loss factor) of a parameter point, the law as `ValveFamily` has it."""
-    return Condition(mu.density, mu.alpha, mu.beta, flow_law(mu), mu.loss_factor)
 
 
 def flow_law(mu: Mu) -> Mu:
@@ -26,12 +19,6 @@ def flow_law(mu: Mu) -> Mu:
     """
     outside = (OUTSIDE,) if mu.outside else ()
     return mu.only("storage", *PIPES, *(("density",) if mu.wave_speed or outside else ()), *outside)
-
-
-def condition_point(condition: Condition) -> Mu:
-    """Parameter point of a condition."""
-    density, alpha, beta, law, loss_factor = condition
-    return Mu(law, density=density, alpha=alpha, beta=beta, loss_factor=loss_factor)
 
 
 def fixed_conditions(case: Case, *moved: str) -> dict[str, float | str]:

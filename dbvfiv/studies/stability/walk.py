@@ -13,7 +13,6 @@ import numpy as np
 from eigen import (
     Column,
     ColumnSolver,
-    Condition,
     CoupledPencil,
     PencilFamily,
     Relaxation,
@@ -21,7 +20,8 @@ from eigen import (
     Workspace,
     lowest_frequencies,
 )
-from eigen.operator import Reach, edge_of
+from eigen.family import Reach
+from eigen.operator import edge_of
 
 from ...case.parameters import Mu
 from ...errors import CaseError, NotValidError, SolveError
@@ -35,7 +35,7 @@ from ...model.state import SteadyState
 from ...model.symmetry import Symmetry, equilibria_of
 from ...observer import Observer
 from ..case import Case
-from .place import condition_of, condition_point, moving_surroundings, rebuilder
+from .place import flow_law, moving_surroundings, rebuilder
 from .samples import Sample
 from .verdict import Verdict
 
@@ -46,9 +46,7 @@ LEAST_MODES = 10
 
 
 class ValveFamily(PencilFamily):
-    """Conditions are (density, alpha, beta, law, loss factor); the law as `flow_law` makes it.
-
-    At unit density the fluid's unknown is the inlet velocity, at others that times the root of the density.
+    """Operator of a steady state over fluid, damping and pipes.
 
     Parameters
     ----------
@@ -74,7 +72,6 @@ class ValveFamily(PencilFamily):
         self.modes = max(modes, LEAST_MODES)
         self.mass, self.damping, self.stiffness = linear.mass, linear.structure, linear.stiffness
         self.forces, self.slope = linear.coupling
-        self.added = 0 if linear.added is None else linear.added.rank
         self._parts: dict[object, dict[str, np.ndarray]] = {}
         self._relaxations: dict[float, Relaxation | None] = {}
         self._searches: dict[tuple[float, float], LeadingSearch] = {}
@@ -89,9 +86,13 @@ class ValveFamily(PencilFamily):
             self._frequencies = lowest_frequencies(structure, count, self._workspace)
         return self._frequencies[:count]
 
-    def search(self, condition: Condition) -> SearchOptions:
+    def search(self, mu: Mu) -> SearchOptions:
         """Search options for the spectrum, by the rule that every study follows."""
-        return self.leading(condition_point(condition)).options
+        return self.leading(mu).options
+
+    def rayleigh(self, mu: Mu) -> tuple[float, float]:
+        """Damping parameters."""
+        return mu.alpha, mu.beta
 
     def leading(self, mu: Mu, in_vacuo: bool = False) -> LeadingSearch:
         """Search for the leading modes, with the frequency up to which it is a verdict on the state."""
@@ -108,26 +109,29 @@ class ValveFamily(PencilFamily):
         """
         if not mu.loss_factor:
             return np.ones(len(values), bool)
-        return Reach(-np.inf, 2 * np.pi * band, edge_of(self.relaxation(mu.loss_factor))).is_mode(values)
+        return Reach(-np.inf, 2 * np.pi * band, edge_of(self.relaxation(mu))).is_mode(values)
 
-    def relaxation(self, loss: float) -> Relaxation | None:
-        """Viscoelastic part of the stiffness, with a factor on all loss factors; None for an elastic wall."""
-        loss = float(loss)
+    def relaxation(self, mu: Mu) -> Relaxation | None:
+        """Viscoelastic part of the stiffness, with the factor on all loss factors; None for an elastic wall."""
+        loss = mu.loss_factor
         if loss not in self._relaxations:
             if len(self._relaxations) > _KEPT:
                 self._relaxations.clear()
             self._relaxations[loss] = self.linear.relaxation(loss)
         return self._relaxations[loss]
 
-    def parts(self, law: Mu) -> dict[str, np.ndarray]:
-        """A0 to S1 at density 1."""
+    def coupling(self, mu: Mu) -> dict[str, np.ndarray]:
+        """A0 to S1, with the inlet velocity times the root of the density as unknown."""
+        law = flow_law(mu)
         if law not in self._parts:
             if len(self._parts) > _KEPT:
                 self._parts.clear()
             self._parts[law] = self._computed(law)
-        return self._parts[law]
+        root = np.sqrt(mu.density)
+        return {name: value * root ** int(name[1]) for name, value in self._parts[law].items()}
 
     def _computed(self, law: Mu) -> dict[str, np.ndarray]:
+        """A0 to S1 at density 1, from which those at others follow with powers of its root."""
         linear, flow = self.linear, self.linear.model.flow
         line = law.pipes
         if "wave_speed" in line:  # so that the compressibility is that of the fluid
@@ -138,9 +142,9 @@ class ValveFamily(PencilFamily):
             return parts
         return linear.added.parts(parts, law.outside / law.density if law.outside else 1.0)
 
-    def pencil(self, condition: Condition) -> CoupledPencil:
-        """The full pencil, with the inlet velocity itself as unknown."""
-        return self.linear.pencil(condition_point(condition))
+    def at(self, mu: Mu) -> CoupledPencil:
+        """The full operator, with the inlet velocity itself as unknown."""
+        return self.linear.pencil(mu)
 
 
 @contextmanager
@@ -359,7 +363,7 @@ class StabilityWalk:
         SolveError
             If there is no steady state.
         """
-        loss = condition_of(place).loss
+        loss = place.loss_factor
         if not loss:
             return ""
         key = place.pressure, self._key(place), loss
@@ -394,7 +398,7 @@ class StabilityWalk:
         self.require_valid(place)
         family = self.family(place)
         with name_state_in_failures(place.pressure):
-            return self.built(place).solver.direct(family, condition_of(place), count)
+            return self.built(place).solver.direct(family, place, count)
 
     def column(self, places: list[Mu], snapshots: int = 3, edges: bool = False, spectra=None, count: int = 2) -> Column:
         """Cells that share a steady state; those whose rubber has lost stability are left blank.
@@ -422,8 +426,8 @@ class StabilityWalk:
             self.require_valid(places[-1])
         family = self.family(places[0])
         with name_state_in_failures(places[0].pressure):
-            conditions = [condition_of(places[i]) for i in sound]
-            column = self.built(places[0]).solver.solve(family, conditions, snapshots, edges, spectra, count)
+            points = [places[i] for i in sound]
+            column = self.built(places[0]).solver.solve(family, points, snapshots, edges, spectra, count)
         return column if len(sound) == len(places) else column.spread(sound, len(places))
 
     def sample(self, place: Mu, column: Column, cell: int = 0, value: float = np.nan) -> Sample:

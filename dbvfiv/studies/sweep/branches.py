@@ -109,9 +109,9 @@ class Tracking:
 
     def _error(self, value: float) -> float:
         """Largest relative correction, by the full matrices, of the leading eigenvalues of the reduced-order model."""
-        condition, column = self.line.condition(value), self.line.column
-        leading = column.eigenvalues(condition)[: self.options.count]
-        return max((abs(column.corrected(condition, x)) / max(abs(x), 1.0) for x in leading), default=0.0)
+        mu, column = self.line.place(value), self.line.column
+        leading = column.eigenvalues(mu)[: self.options.count]
+        return max((abs(column.corrected(mu, x)) / max(abs(x), 1.0) for x in leading), default=0.0)
 
     @property
     def is_reduced(self) -> bool:
@@ -122,9 +122,9 @@ class Tracking:
         """Pencil at a value, of the reduced-order model or in full."""
         value = float(value)
         if value not in self.pencils:
-            condition = self.line.condition(value)
-            family = self.line.column if self.is_reduced else self.walk.family(self.line.place(value))
-            self.pencils[value] = family.pencil(condition)
+            mu = self.line.place(value)
+            family = self.line.column if self.is_reduced else self.walk.family(mu)
+            self.pencils[value] = family.at(mu)
             self.values[self.pencils[value]] = value
         return self.pencils[value]
 

@@ -2,6 +2,7 @@
 
 import os
 import signal
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -17,8 +18,7 @@ from dbvfiv.studies.map.figures import stability_map
 from dbvfiv.studies.map.study import MapResult, keep_column, tables_of
 from dbvfiv.studies.modes.search import run_modes
 from dbvfiv.studies.session import load_result
-from eigen import SingularShiftError
-from eigen.reduced_counts import CellCounts
+from eigen import SingularShiftError, unstable_count
 from tests.small_valves import THESIS_SET
 
 from .axes import AXES, run_map
@@ -172,7 +172,7 @@ def test_without_mpiexec_there_is_one_process(monkeypatch):
 
 def test_cells_that_the_count_does_not_confirm_are_uncertain(case, monkeypatch):
     # a count that sees one pair too many, whatever the model
-    monkeypatch.setattr("eigen.reduced_counts.phase_counts", lambda reduced, conditions, hints: _more(conditions))
+    monkeypatch.setattr("eigen.family.unstable_count", lambda pencil, **_: replace(unstable_count(pencil), number=4))
     monkeypatch.setattr("eigen.columns.certified_spectrum", _refuse)
     result = run_map(case.replace({"map.x": "pressure=3000:8000:2", "map.refine": 0, "map.checks": 0}))
     assert not result.grid("certified").any()
@@ -187,11 +187,6 @@ def test_cells_that_the_count_does_not_confirm_are_uncertain(case, monkeypatch):
     axes = stability_map(results).axes[0]
     assert any(getattr(part, "get_hatch", lambda: None)() for part in axes.collections)
     assert {text.get_text() for text in axes.texts} <= {"uncertain"}
-
-
-def _more(conditions):
-    cells = len(conditions)
-    return CellCounts(np.full(cells, 4), np.ones(cells, bool), np.zeros(cells), np.full(cells, np.inf))
 
 
 def _refuse(*_arguments, **_options):

@@ -9,7 +9,6 @@ from dbvfiv.case.parameters import Mu
 from dbvfiv.errors import CaseError, SolveError
 from dbvfiv.studies.case import thesis_case
 from dbvfiv.studies.onset.search import OnsetOptions, run_onset
-from dbvfiv.studies.stability.place import condition_of
 from dbvfiv.studies.stability.walk import StabilityWalk
 from tests.small_valves import FORMER
 from tests.studies.map.axes import run_map
@@ -88,7 +87,8 @@ def test_criticality_and_uncertainty(coarse_case):
 
 def test_a_parameter_point_is_changed(coarse_case):
     place = Mu.of(coarse_case).at(density=3.0, thickness=0.9)
-    assert condition_of(place) == (3.0, 0.0, 0.003, Mu(storage=0.0), 0.0) and place.design == {"thickness": 0.9}
+    assert (place.density, place.alpha, place.beta, place.storage) == (3.0, 0.0, 0.003, 0.0)
+    assert place.design == {"thickness": 0.9}
     assert place.for_system()["inlet"] == 6000.0 and place.for_system()["thickness"] == 0.9
 
 

@@ -5,11 +5,14 @@ import pytest
 
 from dbvfiv.case.parameters import Mu
 from dbvfiv.studies.stability.walk import ValveFamily
-from eigen import ColumnSolver, Condition, FamilyReduction
-from eigen.reduced_counts import phase_counts
-from eigen.reduction import POWERS, StaticSolver
+from eigen import ColumnSolver, FamilyReduction
+from eigen.reduction import StaticSolver
 
 DENSITIES = np.geomspace(1.0, 1000.0, 13)
+
+
+def points(storage: float) -> list[Mu]:
+    return [Mu(density=rho, beta=0.003, storage=storage) for rho in DENSITIES]
 
 
 @pytest.fixture(scope="module", params=[0.0, 1.0], ids=["quasi-steady", "storage"])
@@ -22,13 +25,13 @@ def family(walk, coarse_case) -> ValveFamily:
     return walk.family(Mu.of(coarse_case))
 
 
-def test_fluid_parts_go_with_powers_of_the_root_of_density(family):
-    linear, unit = family.linear, family.parts(Mu(storage=0.3))
-    parts = linear.fluid_parts(7.0, 0.3)
-    for name, power in POWERS.items():
-        power += name[0] in "BS"  # the velocity there is not scaled
-        assert parts[name] == pytest.approx(
-            unit[name] * 7.0 ** (power / 2), rel=1e-9, abs=1e-9 * np.abs(unit[name]).max()
+def test_the_coupling_is_that_of_the_full_operator_with_a_scaled_velocity(family):
+    mu = Mu(density=7.0, storage=0.3)
+    full, unit = family.linear.pencil(mu), family.coupling(mu)
+    for name, value in unit.items():
+        power = name[0] in "BS"  # the velocity there is not scaled
+        assert getattr(full, name) == pytest.approx(
+            value * 7.0 ** (power / 2), rel=1e-9, abs=1e-9 * np.abs(value).max()
         )
 
 
@@ -44,10 +47,10 @@ def test_block_solves_with_the_transpose(family):
 
 def test_cells_agree_with_the_full_pencil(family, storage):
     solver = ColumnSolver()
-    column = solver.solve(family, [(rho, 0.0, 0.003, Mu(storage=storage)) for rho in DENSITIES])
+    column = solver.solve(family, points(storage))
     assert column.certified.all() and (column.how == 0).all()
     for i in range(0, len(DENSITIES), 2):
-        full = solver.direct(family, (DENSITIES[i], 0.0, 0.003, Mu(storage=storage)))
+        full = solver.direct(family, points(storage)[i])
         found = complex(column.growth_rate[i], 2 * np.pi * column.frequency[i])
         assert abs(found - full.eigenvalues[0]) < 1e-6 * abs(full.eigenvalues[0])
         assert column.unstable[i] == full.unstable_count
@@ -55,16 +58,16 @@ def test_cells_agree_with_the_full_pencil(family, storage):
 
 def test_the_count_needs_no_hints_and_sees_both_verdicts(family, storage):
     coarse = FamilyReduction(family).coarse
-    conditions = [Condition(rho, 0.0, 0.003, Mu(storage=storage)) for rho in DENSITIES]
-    counts = phase_counts(coarse, conditions)
-    full = coarse.eigenvalues(conditions)
-    assert counts.certain.all()
-    assert counts.number.tolist() == (full.real > 0).sum(axis=1).tolist()
-    assert set(counts.number) == {0, 2}
+    conditions = points(storage)
+    counts = [coarse.count(mu) for mu in conditions]
+    values = [coarse.eigenvalues(mu) for mu in conditions]
+    assert all(count.certain for count in counts)
+    assert [count.number for count in counts] == [2 * int((v.real > 0).sum()) for v in values]
+    assert {count.number for count in counts} == {0, 2}
 
 
 def test_the_error_estimate_sees_a_poor_space(family):
-    reduction, condition = FamilyReduction(family), Condition(10.0, 0.0, 0.003, Mu(storage=0.0))
+    reduction, condition = FamilyReduction(family), Mu(density=10.0, beta=0.003, storage=0.0)
     good, poor = (
         np.abs(reduction.correction(pairs, condition) / pairs.values)
         for pairs in (
@@ -77,7 +80,9 @@ def test_the_error_estimate_sees_a_poor_space(family):
 
 def test_damping_may_change_within_a_column(family):
     solver = ColumnSolver()
-    conditions = [(10.0, alpha, beta, Mu(storage=0.0)) for alpha in (0.0, 5.0) for beta in (0.001, 0.003)]
+    conditions = [
+        Mu(density=10.0, alpha=alpha, beta=beta, storage=0.0) for alpha in (0.0, 5.0) for beta in (0.001, 0.003)
+    ]
     column = solver.solve(family, conditions)
     assert column.certified.all()
     for i, condition in enumerate(conditions):

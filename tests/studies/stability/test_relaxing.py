@@ -10,7 +10,6 @@ from dbvfiv.observer import Observer
 from dbvfiv.studies.case import thesis_case
 from dbvfiv.studies.onset.search import run_onset
 from dbvfiv.studies.session import load_result
-from dbvfiv.studies.stability.place import condition_of
 from dbvfiv.studies.stability.walk import StabilityWalk
 from eigen import certified_spectrum
 from tests.small_valves import FORMER
@@ -87,7 +86,7 @@ def test_maps_against_certified_spectra(lossy_case, lossy_walk, continuity, seco
     for i, j in ((0, 0), (1, 3)):
         place = result.plan.place(result.plan.x.values[i], result.plan.y.values[j], result.plan.laws[0])
         family = lossy_walk.family(place)
-        found = certified_spectrum(family.pencil(condition_of(place)), 6, family.search(condition_of(place)))
+        found = certified_spectrum(family.at(place), 6, family.search(place))
         assert found.unstable_count == found.unstable_count_independent == unstable[j, i]
         assert growth[j, i] == pytest.approx(
             found.spectrum.growth_rate[0], abs=1e-6 * abs(found.spectrum.eigenvalues[0])
