@@ -33,7 +33,6 @@ from .style import (
     colour_bar,
     driven,
     headline,
-    kilopascals,
     new_figure,
 )
 
@@ -252,7 +251,8 @@ def layer_stress(state: Any) -> Figure:
         axes.plot(*middle, "+", color=PUBLISHED, ms=9, mew=1.6)
         axes.set_title(axes.get_title(loc="right"), loc="right", fontsize=9, color=PUBLISHED)
         axes.set_xlim(arc.min() * 1e3, arc.max() * 1e3)
-    headline(figure, f"Von Mises stress in the layers at {kilopascals(state.pressure)} (largest in each element)")
+    at = state.results.case.units.pressure(state.pressure)
+    headline(figure, f"Von Mises stress in the layers at {at} (largest in each element)")
     return figure
 
 

@@ -252,6 +252,9 @@ def _margin(result, units) -> str:
     safety = result.safety
     if safety is None:
         return ""
+    if result.case.closure.rated_pressure is None:
+        to = units.pressure(safety.followed_to if safety.at_least else safety.limit_pressure, 3)
+        return f"no limit up to {to}" if safety.at_least else f"{safety.limit} at {to}"
     least = "at least " if safety.at_least else ""
     limit = "" if safety.at_least else f", then {safety.limit}"
     return f"{least}{safety.factor:.2f} times {units.pressure(safety.rated_pressure, 3)}{limit}"

@@ -88,3 +88,31 @@ def pipe_figure(found: Gathered, sweeps: dict) -> Figure:
     axes.set_ylabel("Damping ratio of\nthe least damped mode, %")
     axes.legend(loc="best", fontsize=8)
     return figure
+
+
+def closure_figure(result) -> Figure:
+    """Sealed length and largest displacement, and the lowest stiffness of the wall, over the back pressure."""
+    units, walk = result.case.units, [point for point in result.walk if not point.arclength]
+    at = np.array([point.pressure for point in walk]) / units.factor("pressure")
+    figure = new_figure(8.4, 3.1)
+    shape, stiffness = figure.subplots(1, 2)
+    for name, label, colour in (
+        ("sealed_length", "sealed length", COMPUTED),
+        ("max_displacement", "largest displacement", PUBLISHED),
+    ):
+        values = [getattr(point, name) / units.factor("size") for point in walk]
+        shape.plot(at, values, color=colour, label=label)
+    shape.set_ylabel(f"Length, {units.name('size')}")
+    shape.legend(loc="best", fontsize=8)
+    lowest = np.array([point.lowest_eigenvalue for point in walk])
+    known = np.isfinite(lowest)
+    stiffness.plot(at[known], 100 * lowest[known] / lowest[known][0], color=COMPUTED)
+    stiffness.axhline(0.0, color=UNSTABLE, lw=1.0)
+    stiffness.set_ylabel("Lowest stiffness of the wall\nover that at the start, %")
+    rated = result.case.closure.rated_pressure
+    for axes in (shape, stiffness):
+        axes.set_xlabel(f"Back pressure, {units.name('pressure')}")
+        axes.set_xlim(left=0)
+        if rated is not None:
+            axes.axvline(rated / units.factor("pressure"), color="0.2", lw=1.0, ls="--")
+    return figure

@@ -150,7 +150,7 @@ def heads_of(case: Case) -> tuple[float, ...]:
     rest = case.rest_pressure
     given = case.steady.pressures if "pressures" in case.steady.model_fields_set else ()
     top = max([case.drive.pressure, *given])
-    return tuple(float(f"{rest + share * (top - rest):.9g}") for share in _HEADS)
+    return (*(float(f"{rest + share * (top - rest):.9g}") for share in _HEADS[:-1]), top)
 
 
 def second_mesh(case: Case) -> dict[str, Any]:

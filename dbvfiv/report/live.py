@@ -34,7 +34,7 @@ def valve(state: State) -> str:
     quads = skin.quads
     triangles = np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]])
     size = np.tile(np.linalg.norm(state.nodal[:, :3], axis=1)[skin.valve.node], 2) * 1e3
-    figure = go.Figure(layout=_LAYOUT | {"height": 560})
+    figure = go.Figure(layout=_LAYOUT | {"height": 420})
     figure.add_mesh3d(
         x=_short(points[:, 0]),
         y=_short(points[:, 1]),
@@ -49,7 +49,7 @@ def valve(state: State) -> str:
         hovertemplate="z %{x:.0f} mm, x %{y:.0f} mm, y %{z:.0f} mm<br>displacement %{intensity:.2f} mm<extra></extra>",
     )
     axes = {"xaxis": {"title": "z, mm"}, "yaxis": {"title": "x, mm"}, "zaxis": {"title": "y, mm"}}
-    figure.update_scenes(aspectmode="data", camera={"eye": {"x": -1.3, "y": -1.4, "z": 0.8}}, **axes)
+    figure.update_scenes(aspectmode="data", camera={"eye": {"x": -1.8, "y": -1.9, "z": 1.1}}, **axes)
     return _html(figure, "valve-live")
 
 

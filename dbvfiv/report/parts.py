@@ -16,7 +16,7 @@ from ..record.mesh import MeshData
 from . import live
 from .answers import listed, loss_range
 from .content import Part, Picture, Table, picture, pictures_of
-from .figures import headloss_figure, pipe_figure, vibration_figure
+from .figures import closure_figure, headloss_figure, pipe_figure, vibration_figure
 from .gather import Gathered, is_on_own_mesh
 
 
@@ -241,12 +241,13 @@ def closure_part(found: Gathered) -> Part:
         "contact force, N",
         f"largest displacement, {units.name('size')}",
     )
-    captions = {"closure-curve": "How the passage shuts as the back pressure rises."} | _MEASURED
+    caption = "Sealed length, largest displacement and stiffness of the wall over the back pressure."
+    curve = picture("closure", caption, lambda: closure_figure(result))
     sentences = tuple(units.say(line) for line in result.remarks() if not line.startswith("Forces balance"))
     trust = tuple(
         units.say(line) for line in (*result.failures, *(l for l in result.remarks() if l.startswith("Forces")))
     )
-    return Part("closure", _CLOSURE, sentences, (Table(head, rows),), pictures_of(result, captions), trust)
+    return Part("closure", _CLOSURE, sentences, (Table(head, rows),), (curve, *pictures_of(result, _MEASURED)), trust)
 
 
 def valve_part(found: Gathered) -> Part | None:
