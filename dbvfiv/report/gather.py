@@ -282,9 +282,11 @@ def gather(
         path = folder / f"{name}-operating-point.h5"
         point = kept_run("steady", session, path, bar.of("operating point")).states[0].pressure
         session = session.replace({"drive.pressure": point})
-    bar.expect([Run("settled", "levels", "strain levels", {}, 12), *planned(session.case)])
-    session = session.settle(bar.of("settled"))
-    bar.done("settled")
+    bar.expect(list(planned(session.case)))
+    if session.case.seeks_levels:
+        bar.expect([Run("settled", "levels", "strain levels", {}, 12)])
+        session = session.settle(bar.of("settled"))
+        bar.done("settled")
     found = Gathered(session.case, name, heads_of(session.case))
     found.missing = dict.fromkeys(leave_out, "It was left out.")
     found.not_asked = set(leave_out)
@@ -412,10 +414,10 @@ class Bar:
 
     def left(self) -> str:
         """Time that is left, in words, from what the part that is done has taken."""
-        part = self.part
-        if part < 0.02:
+        part, elapsed = self.part, time.monotonic() - self._started
+        if part < 0.02 or elapsed < 3.0:
             return "time left not known yet"
-        left = (time.monotonic() - self._started) * (1 - part) / part
+        left = elapsed * (1 - part) / part
         return f"{left:.0f} s left" if left < 100 else f"{left / 60:.0f} min left"
 
     @property

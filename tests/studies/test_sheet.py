@@ -18,7 +18,7 @@ def rows_of(path):
 
 def test_a_sheet_of_two_sizes_in_units_of_choice(command_line, tmp_path):
     path = tmp_path / "catalogue.csv"
-    asked = ("-p", "0.2 m", "-p", "1 m", "--scale", 0.5, "--scale", 1, "--units", "ft, gpm, in")
+    asked = ("-p", "0.2 m", "-p", "1 m", "--scale", "131 mm", "--scale", 1, "--units", "ft, gpm, in")
     assert command_line("steady", *OPTIONS, *asked, "-o", path).status == 0
     assert [each.name for each in tmp_path.iterdir()] == ["catalogue.csv"]  # and no HDF5
     rows = rows_of(path)
@@ -48,6 +48,7 @@ def test_a_sheet_of_two_sizes_in_units_of_choice(command_line, tmp_path):
         (("steady", "-o", "s.csv", "--units", "m, ft"), "second unit"),
         (("steady", "-o", "no/such/folder/s.csv"), "cannot be written"),
         (("steady", "--scale", "2", "-o", "s.h5"), "goes with a sheet"),
+        (("steady", "--scale", "4 kPa", "-o", "s.csv"), "not a length"),
         (("modes", "-o", "s.csv"), "names a sheet"),
     ],
 )

@@ -13,7 +13,7 @@ from ...case.axis import parse_axis
 from ...case.measured import AREA, DISCHARGE, MEASURED_FILES, SHAPE, TAPS, find_measured
 from ...case.model import Case
 from ...case.physics import LoadPressure
-from ...case.quantity import Number, number_or_text
+from ...case.quantity import Number, Quantity, number_or_text
 from ...case.section import Section, key
 from ...errors import CaseError
 from ..request import Request, is_sheet, with_unit
@@ -69,9 +69,11 @@ Pressures = Annotated[
 
 
 Sizes = Annotated[
-    list[float] | None,
+    list[str] | None,
     typer.Option(
-        "--scale", metavar="S", min=1e-3, max=1e3, help="Of a sheet: valve.scale of one size; repeated for several."
+        "--scale",
+        metavar="S",
+        help="Of a sheet: one size, valve.scale as a number or the bore, '100 mm' or '4 in'; repeated for several.",
     ),
 ]
 Units = Annotated[
@@ -109,13 +111,26 @@ def command(
         if sizes:
             raise CaseError("--scale goes with a sheet; name one with -o, such as catalogue.csv.")
         return Request(changes)
-    first, *others = sizes or [None]
+    first, *others = [_scale(text, case) for text in sizes] if sizes else [None]
     require_sheet(output)
     return Request(
         changes | {"valve.scale": first},
         sheet=lambda results: write_sheet(output, [state for result in results for state in result.states]),
         variants=tuple({"valve.scale": scale} for scale in others),
     )
+
+
+def _scale(text: str, case: Case) -> float:
+    """Factor valve.scale of a size that is given as a factor or as the bore of its flange."""
+    given, valve = number_or_text(text), case.valve.as_given
+    try:
+        bore = 2 * (valve.inlet_radius - valve.flange_wall_deduction)
+        scale = given if isinstance(given, float) else Quantity("m", "mm").parse(given) / bore
+    except ValueError as error:
+        raise CaseError(f"--scale is given as {text!r}, {error}; it must be a factor or a bore.") from None
+    if not 1e-3 <= scale <= 1e3:
+        raise CaseError(f"--scale is given as {text!r}, {scale:.3g} times the valve; it must be within 0.001 and 1000.")
+    return scale
 
 
 def _read(texts: Iterable[str], density: float) -> Iterable[float | str]:
