@@ -33,7 +33,7 @@ bench: setup
 	@$(PYTHON) -m benchmarks
 
 demo: setup
-	@$(PYTHON) -m dbvfiv report cases/dbv12.toml --workers $(JOBS) -o out/demo/dbv12.html
+	@$(PYTHON) -m dbvfiv report cases/dbv12.toml --set report.heads="2 kPa:18 kPa:4" --workers $(JOBS) -o out/demo/dbv12.html
 
 demo-full: setup
 	@PYTHON="$(PYTHON)" tools/demo

@@ -30,9 +30,12 @@ def report(
         typer.Option(
             "--without",
             metavar="PART",
-            help="Leave out steady, heads, pipe, onset, law, mesh, levels, closure or cycle; may be repeated.",
+            help="Leave out steady, heads, pipe, onset, law, mesh, levels or closure; may be repeated.",
         ),
     ] = None,
+    cycle: Annotated[
+        bool, typer.Option("--cycle", help="Also follow the limit cycle where the valve chatters; takes minutes.")
+    ] = False,
     overrides: Override = None,
     as_json: AsJson = False,
 ) -> None:
@@ -53,7 +56,8 @@ def report(
     case = load_case(case_file, overrides or ())
     name = case_file.stem if case_file else "dbv12"
     page = output or Path(f"{name}-report.html")
-    found = gather(case, name, runs or page.with_suffix(""), tuple(without or ()), workers, as_json)
+    leave_out = (*(without or ()), *(() if cycle else ("cycle",)))
+    found = gather(case, name, runs or page.with_suffix(""), leave_out, workers, as_json)
     write_page(found, page)
     written = [page, *([write_pdf(page, page.with_suffix(".pdf"))] if pdf else [])]
     answered = answers(found)

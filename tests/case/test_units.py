@@ -1,5 +1,7 @@
 """Units in which results are read: chosen, or those of the pressure that was given, in tables and sentences."""
 
+import json
+
 import pytest
 
 from dbvfiv.errors import CaseError
@@ -34,10 +36,10 @@ def test_units_that_are_none(one_sentence, units, words):
 
 
 def test_a_table_speaks_in_heads_and_json_in_si(command_line):
-    import json
-
     asked = ("steady", *COARSE, "-p", "1 m", "--units", "m, gpm")
-    printed = command_line(*asked).out.splitlines()
+    outcome = command_line(*asked)
+    assert outcome.status == 0, outcome.err
+    printed = outcome.out.splitlines()
     document = json.loads(command_line(*asked, "--json").out)
     point = document["points"][0]
     assert point["pressure"] == pytest.approx(9806.65)
