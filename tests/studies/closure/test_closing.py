@@ -112,16 +112,7 @@ def test_a_history_that_opens_again_is_not_shut_before_it_shuts_for_good():
 
 
 def test_water_is_turned_round_and_the_valve_shuts_and_stays_shut():
-    case = thesis_case(
-        COARSE
-        | {
-            "mesh.around": 8,
-            "mesh.along": 14,
-            "closure.reversal_time": "0.2 s",
-            "closure.reversal_hold": "0.2 s",
-            **FORMER,
-        }
-    )
+    case = thesis_case(COARSE | {"closure.reversal_time": "0.2 s", "closure.reversal_hold": "0.2 s", **FORMER})
     model, samples = closing_valve(case), []
     halvings, failure = run_closing(model, lambda sample: samples.append(SimpleNamespace(**sample)))
     result = Closing(samples, Turn.of(case), model.shut_below, halvings, failure)

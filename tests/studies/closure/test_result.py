@@ -92,6 +92,10 @@ def test_the_states_of_the_flow_can_be_asked(run):
     result, path = run
     opened = load_result(path).opened
     assert len(opened) == 10 and opened[0].pressure == pytest.approx(10e3)
+    flows = [state.mass_flow for state in opened]
+    assert flows == sorted(flows, reverse=True) and flows[-1] < 0.1 * flows[0]
+    rest = load(thesis_case(), COARSE | {"closure.start": "rest"}).closure(["2 kPa", 9e3]).states[0]
+    assert result.states[0].max_displacement == pytest.approx(rest.max_displacement, rel=1e-8)
     assert np.array_equal(opened[0].layers.von_mises, result.opened[0].layers.von_mises)
     assert {"pressure", "lip_opening", "lip_displacement", "outlet_area", "mass_flow"} <= set(
         result.summary()["opened"][0]

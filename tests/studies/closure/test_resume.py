@@ -60,25 +60,6 @@ def agree(result, whole):
     assert result.warnings == whole.warnings and not result.failures
 
 
-def test_an_interrupted_run_goes_on_as_if_it_had_not_been(whole, tmp_path):
-    path = tmp_path / "run.h5"
-    first = load(thesis_case(), COARSE).closure(PRESSURES, output=path, observer=StopAfter(1))
-    assert not first.complete and len(load_result(path).states) == 1
-    assert len(load_result(path).walk) > len(
-        [p for p in whole.walk if p.pressure <= PRESSURES[0]]
-    )  # a part of the way to the next state too
-    agree(resume(path), whole)
-    with pytest.raises(CaseError, match="nothing to resume"):
-        resume(path)
-
-
-def test_a_run_interrupted_before_its_first_state_begins_anew(whole, tmp_path):
-    path = tmp_path / "run.h5"
-    load(thesis_case(), COARSE).closure(PRESSURES, output=path, observer=StopAfter(0))
-    assert not load_result(path).states
-    agree(resume(path), whole)
-
-
 class StopAt(Observer):
     """Interrupts at the `count`-th piece of progress that begins with a text, once `after` states were found."""
 
@@ -95,20 +76,19 @@ class StopAt(Observer):
                 raise KeyboardInterrupt
 
 
-def test_a_flow_that_is_turned_back_goes_on_from_its_last_state(whole, tmp_path):
+def test_a_run_goes_on_wherever_it_was_interrupted(whole, tmp_path):
+    """While a flow is turned back, before the first state, on the way from the second to the third, and at its end."""
     path = tmp_path / "run.h5"
     load(thesis_case(), COARSE).closure(PRESSURES, output=path, observer=StopAt("steady state at", 4))
     assert len(load_result(path).opened) == 3
+    first = resume(path, observer=StopAt("equilibrium at 1050 Pa", 1))
+    assert len(first.opened) == 10 and not first.states and first.walk
+    second = resume(path, observer=StopAfter(2))
+    assert not second.complete and len(second.states) == 2
+    assert len(load_result(path).walk) > len([p for p in whole.walk if p.pressure <= PRESSURES[1]])
     agree(resume(path), whole)
-
-
-def test_a_file_may_be_taken_up_twice(whole, tmp_path):
-    path = tmp_path / "run.h5"
-    load(thesis_case(), COARSE).closure(PRESSURES, output=path, observer=StopAt("equilibrium at 1050 Pa", 1))
-    assert not load_result(path).states and load_result(path).walk
-    again = resume(path, observer=StopAfter(2))
-    assert not again.complete and len(again.states) == 2
-    agree(resume(path), whole)
+    with pytest.raises(CaseError, match="nothing to resume"):
+        resume(path)
 
 
 def test_supports_to_compare_with_and_the_turn_in_time_are_taken_up_too(tmp_path):
