@@ -11,6 +11,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
+from scipy.optimize import brentq
 
 from continuation.branch import Branch, CurvePoint
 from continuation.options import NotConverged, Reason, Said, SingularSystem
@@ -178,29 +179,19 @@ class Tracer:
         return s, away
 
     def root(self, before: CurvePoint, after: CurvePoint, function, tolerance=1e-10) -> CurvePoint | None:
-        """Zero of a function of points between two of opposite sign (Illinois); None where the curve is lost."""
-        a, b = 0.0, 1.0
-        fa, fb = function(before), function(after)
-        point, side = None, 0
-        for _ in range(60):
-            s = (a * fb - b * fa) / (fb - fa)
-            width = b - a
-            s = min(max(s, a + 1e-3 * width), b - 1e-3 * width)
-            point = self.at(before, after, s)
+        """Zero of a function of points between two of opposite sign (Brent); None where the curve is lost."""
+        met = {0.0: before, 1.0: after}
+
+        def value(share: float) -> float:
+            point = met[share] = met.get(share) or self.at(before, after, share)
             if point is None:
-                return None
-            f = function(point)
-            if abs(f) == 0.0 or width < tolerance:
-                return point
-            if (f > 0) == (fb > 0):
-                b, fb = s, f
-                fa = fa / 2 if side == 1 else fa
-                side = 1
-            else:
-                a, fa = s, f
-                fb = fb / 2 if side == -1 else fb
-                side = -1
-        return point if b - a < np.sqrt(tolerance) else None
+                raise NotConverged(Reason.LOST_AT_LIMIT())
+            return function(point)
+
+        try:
+            return met[brentq(value, 0.0, 1.0, xtol=tolerance, rtol=1e-14)]
+        except (NotConverged, RuntimeError, ValueError):  # lost, slow, or no change of sign
+            return None
 
     # -- the run
 

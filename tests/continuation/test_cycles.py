@@ -7,7 +7,6 @@ from scipy.integrate import solve_ivp
 
 from continuation import ContinuationOptions, NotConverged, OrbitOptions, OutOfDomain
 from continuation.cycle_branch import CycleTracer
-from continuation.cycle_linearisation import gmres
 from continuation.cycle_points import DOUBLING, FOLD, TORUS
 from continuation.cycles import CycleSolver
 from continuation.harmonics import Harmonics, Rates
@@ -51,15 +50,6 @@ def test_series_are_exact():
     shifted = Rates(h, 2.0, 0.5 + 1j)
     assert np.allclose(shifted.apply(1, h.evaluate(c)), h.evaluate(2.0 * h.rate(c) + (0.5 + 1j) * c))
     assert np.allclose(shifted.apply(lambda s: s**2, h.evaluate(c)), shifted.apply(2, h.evaluate(c)))
-
-
-def test_gmres_solves_to_its_tolerance():
-    rng = np.random.default_rng(1)
-    a = np.eye(30) + 0.1 * rng.standard_normal((30, 30)) + 0.05j * rng.standard_normal((30, 30))
-    b = rng.standard_normal(30)
-    x, count, missed = gmres(lambda v: a @ v, b, 1e-8, 30)
-    assert np.linalg.norm(a @ x - b) <= 1.01e-8 * np.linalg.norm(b) and missed <= 1e-8 and count < 30
-    assert gmres(lambda v: a @ v, np.zeros(30), 1e-8, 30)[1] == 0
 
 
 # -- orbits
