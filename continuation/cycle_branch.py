@@ -101,32 +101,23 @@ class CycleTracer:
     # -- the branch
     # ----
 
-    def start(self, first: Cycle, second: Cycle, report: Callable[[CyclePoint], None] = lambda item: None) -> None:
-        """Begin with two cycles; the branch goes on from the second, away from the first."""
-        self.begin(first, False, report)
-        self.extend(second, False, report)
-
-    def begin(
+    def extend(
         self,
-        first: Cycle,
-        asked: bool,
+        cycle: Cycle,
+        asked: bool = False,
         report: Callable[[CyclePoint], None] = lambda item: None,
         origin: Cycle | None = None,
     ) -> None:
-        """Begin with one cycle; `extend` gives the way to go.
+        """Take a cycle as the next point; two of them give the way to go.
 
         `origin` is what the branch starts from, at rest at an onset; it helps predictions and is no point of the
         branch.
         """
-        point = self._accept(first, asked)
+        point = self._accept(cycle, asked)
         if origin is not None:
             length = -self._distance(point.cycle, origin)
             self._origin = [CyclePoint(origin, origin.mu[self.parameter], length, None)]
         report(point)
-
-    def extend(self, cycle: Cycle, asked: bool, report: Callable[[CyclePoint], None] = lambda item: None) -> None:
-        """Take a cycle as the next point."""
-        report(self._accept(cycle, asked))
 
     def restore(self, points: Sequence[CyclePoint]) -> None:
         """Go on from points that are known; `extend` where there is but one."""
@@ -141,30 +132,33 @@ class CycleTracer:
         """Go on until the parameter leaves its limits, the cycles shrink to nothing, the points are used up or no cycle
         is found; the reason of the end. `step` is the first step, that of the options by default.
         """
-        options = self.options
-        step = options.step if step is None else step
-        while len(self.points) < options.max_points:
+        self.reason = self._steps(report, self.options.step if step is None else step)
+        return self.reason
+
+    def _steps(self, report, step: float) -> Said:
+        while len(self.points) < self.options.max_points:
             if len(self.points) > 1 and self._is_over():
-                self.reason = self._limit()
-                return self.reason
-            done, step, again = self._advance(step)
+                return self._limit()
+            done, step, reason = self._advance(step)
             if done is None:
-                for special in self._ahead():
-                    self.special.append(special)
-                    report(special)
-                self.reason = again
-                return self.reason
+                self._report(report, self._ahead())
+                return reason
             self.next_step = step
             if self._has_turned_back():
                 del self.points[-1]
-                self.reason = Reason.VANISHED(name=self.parameter, value=self.points[-1].value)
-                return self.reason
-            for special in self._between(self.points[-2], self.points[-1]):
-                self.special.append(special)
-                report(special)
+                return Reason.VANISHED(name=self.parameter, value=self.points[-1].value)
+            found = self._between(self.points[-2], self.points[-1])
+            self._report(report, found)
             report(self.points[-1])
-        self.reason = self._limit() if self._is_over() else Reason.POINTS()
-        return self.reason
+            stopping = [special for special in found if special.title in self.options.stop_at]
+            if stopping:
+                return Reason.STOPPED(kind=stopping[0].title)
+        return self._limit() if self._is_over() else Reason.POINTS()
+
+    def _report(self, report, found: list[SpecialCycle]) -> None:
+        self.special += found
+        for special in found:
+            report(special)
 
     def _limit(self) -> Said:
         return Reason.LIMIT(name=self.parameter, value=self.points[-1].value)

@@ -77,6 +77,11 @@ class SpecialCycle:
     frequency: float = 0.0
     located: bool = True
 
+    @property
+    def title(self) -> str:
+        """Kind, told apart from those of equilibria."""
+        return self.kind if self.kind != FOLD else "fold of cycles"
+
 
 def value_at_zero(met: Sequence[tuple[float, CyclePoint]], one: float, other: float) -> float:
     """The parameter where a test vanishes, from tests and points by decreasing nearness: by the polynomial through all,

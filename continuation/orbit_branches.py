@@ -16,7 +16,7 @@ from continuation.branch import Branch, CurvePoint, SpecialPoint
 from continuation.branches import branch_tracer
 from continuation.curves import STARTS, curve_tracer
 from continuation.cycle_branch import CycleTracer
-from continuation.cycle_points import FOLD, TORUS, CyclePoint, SpecialCycle
+from continuation.cycle_points import TORUS, CyclePoint, SpecialCycle
 from continuation.cycles import Cycle, cycles_beside_onset
 from continuation.harmonics import Harmonics
 from continuation.hill import Exponents
@@ -98,7 +98,7 @@ def continue_orbits(
     first = Cycle(orbit.motion, dict(orbit.mu), 0.0, 0, 0)
 
     def steps():
-        follower.tracer.begin(first, False, follower.take)
+        follower.tracer.extend(first, False, follower.take)
         follower.tracer.extend(follower.second_orbit(first), False, follower.take)
         return follower.tracer.run(follower.take)
 
@@ -153,7 +153,7 @@ def orbits_from_hopf(
 
     def steps():
         rest, first, second = follower.beside_hopf(special)
-        follower.tracer.begin(first, False, follower.take, rest)
+        follower.tracer.extend(first, False, follower.take, rest)
         follower.tracer.extend(second, False, follower.take)
         return follower.tracer.run(follower.take)
 
@@ -236,7 +236,6 @@ class _Follower:
         shape = replace(self.shape, exponents=min(self.shape.exponents, max(n - 1, 1)))
         self.parameter, self.tracer = parameter, CycleTracer(OrbitSolver(system, shape), parameter, kept, shape)
         self.observers: list = []
-        self._met: list[str] = []
 
     def second_orbit(self, first: Cycle) -> Cycle:
         """Orbit a first step along the parameter away from the first one."""
@@ -301,13 +300,7 @@ class _Follower:
 
     def run(self, steps: Callable[[], Said], observers) -> Branch:
         self.observers = as_observers(observers)
-        return run_observed(self.branch, self.observers, lambda: self._until_stopped(steps))
-
-    def _until_stopped(self, steps) -> Said:
-        try:
-            return steps()
-        except _Stop as stop:
-            return Reason.STOPPED(kind=stop)
+        return run_observed(self.branch, self.observers, steps)
 
     def take(self, item: CyclePoint | SpecialCycle) -> None:
         """Record a point or a special point, and notify the observers."""
@@ -318,13 +311,9 @@ class _Follower:
             self._fill()
             for observer in self.observers:
                 observer.accepted(branch)
-            stopping, self._met = [kind for kind in self._met if kind in self.options.stop_at], []
-            if stopping:
-                raise _Stop(stopping[0])
             return
         special = self._special(item)
         branch.special.append(special)
-        self._met.append(special.kind)
         for observer in self.observers:
             observer.found(branch, special)
 
@@ -362,7 +351,6 @@ class _Follower:
 
     def _special(self, item: SpecialCycle) -> SpecialPoint:
         orbit = self._orbit(item.point)
-        kind = "fold of cycles" if item.kind == FOLD else item.kind
         lengths = [point.arclength for point in self.tracer.points]
         index = int(np.clip(np.searchsorted(lengths, item.point.arclength, "right") - 1, 0, len(lengths) - 2))
         values = {"period": orbit.period}
@@ -373,12 +361,8 @@ class _Follower:
         z[-1] = item.value
         reason = "" if item.located else "the location did not settle"
         vectors = {"multipliers": orbit.multipliers}
-        return SpecialPoint(kind, index, z[:-1], mu, z, np.zeros_like(z), item.located, reason, values, vectors)
+        return SpecialPoint(item.title, index, z[:-1], mu, z, np.zeros_like(z), item.located, reason, values, vectors)
 
 
 def _padded(z: np.ndarray, size: int) -> np.ndarray:
     return np.concatenate([z[:-2], np.zeros(size - len(z)), z[-2:]])
-
-
-class _Stop(Exception):
-    """End of a branch at a special point of a kind in ``stop_at``."""

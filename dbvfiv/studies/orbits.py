@@ -291,7 +291,7 @@ class Follower:
         cycles.sort(key=lambda cycle: abs(cycle.mu[self.name] - onset.value))
         tracer = self.tracer(values, first.motion)
         asked = [cycle.mu[self.name] in values for cycle in cycles]
-        tracer.begin(cycles[0], asked[0], tell, rest)
+        tracer.extend(cycles[0], asked[0], tell, rest)
         for cycle, is_asked in zip(cycles[1:], asked[1:]):
             tracer.extend(cycle, is_asked, tell)
         return tracer, missed

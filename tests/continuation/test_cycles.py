@@ -121,7 +121,8 @@ def test_folds_of_the_forced_duffing():
         max_step=0.4, parameter_scales={"w": 0.2}, limits={"w": (0.5, 1.3)}, max_points=150, location_tolerance=1e-2
     )
     tracer = CycleTracer(solver, "w", options, OrbitOptions(exponents=2, tail=1e-3))
-    tracer.start(first, second)
+    tracer.extend(first)
+    tracer.extend(second)
     assert tracer.run() == "ended on the limit w = 1.3"
     folds = [s for s in tracer.special if s.kind == FOLD]
     assert len(folds) == 2 and all(s.located for s in folds)
@@ -158,7 +159,8 @@ def trace(system, guess, mu, other, name, limits, tail=1e-3, max_harmonics=24, l
         limits={name: limits}, parameter_scales={name: 1.0}, max_angle=1.5, location_tolerance=located, **options
     )
     tracer = CycleTracer(solver, name, options, OrbitOptions(tail=tail, max_harmonics=max_harmonics, exponents=4))
-    tracer.start(first, second)
+    tracer.extend(first)
+    tracer.extend(second)
     return tracer, tracer.run()
 
 
@@ -280,7 +282,8 @@ def test_events_are_located():
     event = {"radius": lambda cycle: float(np.linalg.norm(cycle.motion.at([0.0]))) - 0.6}
     options = ContinuationOptions(limits={"mu": (0.0, 0.5)}, location_tolerance=1e-9)
     tracer = CycleTracer(solver, "mu", options, values=(0.2, 0.3), events=event)
-    tracer.start(first, second)
+    tracer.extend(first)
+    tracer.extend(second)
     told = []
     tracer.run(told.append)
     (special,) = tracer.special
@@ -311,7 +314,8 @@ def test_an_event_that_ends_a_branch_is_located_from_one_side():
     second = solver.solve(first.motion, {"mu": 0.12})
     event = {"wall": lambda cycle: 0.6 - float(np.linalg.norm(cycle.motion.at([0.0])))}
     tracer = CycleTracer(solver, "mu", ContinuationOptions(limits={"mu": (0.0, 0.5)}), events=event)
-    tracer.start(first, second)
+    tracer.extend(first)
+    tracer.extend(second)
     told = []
     assert "no further cycle" in tracer.run(told.append)
     (special,) = tracer.special

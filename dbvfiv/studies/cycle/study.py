@@ -297,7 +297,7 @@ def _from_file(case: Case, walk: StabilityWalk, record: GrowingRecord) -> None:
         if not known:
             cycle = follower.near(given.motion, given.value)
             tracer = follower.tracer(axis.values, cycle.motion)
-            tracer.begin(cycle, given.value in axis.values, keeper.keep)
+            tracer.extend(cycle, given.value in axis.values, keeper.keep)
         else:
             tracer = follower.tracer(axis.values, known[0].motion)
             tracer.restore(known)
