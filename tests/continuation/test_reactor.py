@@ -9,7 +9,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from continuation import ContinuationOptions, continue_branch
+from continuation import ContinuationOptions, OrbitOptions, continue_branch, orbit_at, orbits_from_hopf
 from continuation.jax_system import JaxSystem
 
 FIRST = 1e-4
@@ -63,3 +63,24 @@ def test_a_hundred_branches_meet_their_folds_hopf_points_and_limits():
 def test_two_hundred_more_branches_do_too():
     for seed in range(100, 300):
         _branch_is_right(seed)
+
+
+@pytest.mark.parametrize("seed", [2, 5, 7, 9])
+def test_orbits_of_the_reactor_have_the_mean_divergence_for_exponent(seed):
+    """Liouville: the exponent of a planar orbit is the mean of the trace along it; towards homoclinic orbits too."""
+    draw = np.random.default_rng(seed)
+    B, b, limit = draw.uniform(5, 25), draw.uniform(0.5, 4), 10 ** draw.uniform(-2.5, 0.5)
+    limits, mu = {"D": (0.0, limit)}, {"D": FIRST, "B": B, "b": b}
+    branch = continue_branch(REACTOR, [0.0, 0.0], mu, "D", ContinuationOptions(eigenvalues=2, limits=limits))
+    for hopf in branch.of_kind("hopf"):
+        orbits = orbits_from_hopf(
+            REACTOR, hopf, "D", ContinuationOptions(limits=limits), OrbitOptions(max_harmonics=40)
+        )
+        assert all(special.located for special in orbits.special), orbits
+        assert orbits.points[0].unstable == (0 if hopf.values["criticality"] == "super" else 1)
+        for i in range(0, len(orbits), 2):
+            orbit = orbit_at(REACTOR, orbits, i)
+            states = orbit(np.linspace(0, orbit.period, 400, endpoint=False))
+            trace = np.mean([np.trace(REACTOR.linear(u, orbit.mu).jacobian) for u in states])
+            if orbits.unstable[i] >= 0:
+                assert np.isclose(orbit.exponents[0].real, trace, rtol=1e-5, atol=1e-7 * orbit.motion.omega)
