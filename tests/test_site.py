@@ -36,6 +36,12 @@ def test_every_page_is_in_the_contents():
     assert [page for page in pages if f": {page}\n" not in contents] == []
 
 
+def test_files_that_the_guide_to_the_code_names_are_there():
+    named = set(re.findall(r"`([\w/]+/[\w/]+\.py)`", (DOCS / "developing.md").read_text()))
+    missing = [name for name in named if not any((ROOT / room / name).exists() for room in ("", "dbvfiv"))]
+    assert missing == ["dbvfiv/flow/terms/NAME.py"]  # the reader's own
+
+
 def test_equations_are_numbered_and_known_to_their_modules():
     """Each number stands at one equation, in the table with its modules, and in their docstrings."""
     text = (DOCS / "theory.md").read_text()
