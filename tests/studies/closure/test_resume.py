@@ -138,7 +138,7 @@ def test_a_killed_run_has_lost_no_finished_state(whole, tmp_path):
         "dbvfiv",
         "closure",
         *words,
-        *(f"--pressure={p:g} Pa" for p in PRESSURES),
+        *(f"--pressure={p / 1e3:g} kPa" for p in PRESSURES),
         "-o",
         str(path),
     ]
