@@ -1,4 +1,6 @@
-"""The case model: defaults, units, overrides, copies, and the texts made from the declarations."""
+"""The case model: defaults, units, overrides, copies, damping, words of the trade, texts made from the declarations."""
+
+from __future__ import annotations
 
 import inspect
 import math
@@ -11,7 +13,8 @@ import pytest
 
 from dbvfiv.case import Case as PhysicsCase
 from dbvfiv.case import CaseError, make_case, parse_axis
-from dbvfiv.case.describe import explain, page, walk
+from dbvfiv.case.describe import SYNONYMS, explain, page, walk
+from dbvfiv.case.materials import shear_modulus_of
 from dbvfiv.case.write import case_toml
 from dbvfiv.studies import KINDS
 from dbvfiv.studies.case import THESIS, Case, load_case, thesis_case
@@ -259,3 +262,90 @@ def test_heads_in_ranges_are_those_of_the_fluid_of_the_case():
     weight = 1025 * 9.80665
     assert case.onset.axis.log and case.onset.axis.values[::7] == pytest.approx([0.1 * weight, 4 * 0.3048 * weight])
     assert case.sweep.axis.values == pytest.approx([weight, 1.5 * weight, 2 * weight])
+
+
+def test_numbers_that_are_not_given_follow_from_the_model():
+    damping = Case().damping
+    assert (damping.model, damping.alpha, damping.beta, damping.loss_factor) == ("loss factor", 0.0, 0.0, 1.0)
+    assert (damping.band, damping.branches) == ((1.0, 200.0), 4)
+    damping = Case().replace(RAYLEIGH).damping
+    assert (damping.alpha, damping.beta, damping.loss_factor) == (5.0, 0.003, 0.0)
+    assert Case().replace(RAYLEIGH).replace(LOSS) == Case()
+    assert Case().replace({"damping.band": ["0.1 Hz", "1 kHz"]}).damping.branches == 6
+
+
+def test_what_is_given_stays():
+    damping = Case().replace(LOSS | {"damping.alpha": 3, "damping.loss_factor": "1/2", "damping.branches": 6}).damping
+    assert (damping.alpha, damping.loss_factor, damping.branches) == (3.0, 0.5, 6)
+    assert Case().replace(LOSS | {"damping.beta": 0, "damping.loss_factor": 0}).damping.loss_factor == 0.0
+
+
+def test_cases_of_earlier_versions_are_read():
+    data = Case().to_dict() | {"damping": {"alpha": 5.0, "beta": 0.003}}
+    assert Case.from_dict(data).damping.model == "rayleigh"
+
+
+A = "[materials.A]\nkind='neo-hookean'\nshear_modulus=1e6\ndensity=1000\n"
+ON = "[damping]\nmodel='loss factor'\n"
+
+
+def test_materials_that_no_layer_uses_need_say_nothing(tmp_path):
+    (tmp_path / "good.toml").write_text(ON + A)
+    assert load_case(tmp_path / "good.toml").damping.relaxes
+
+
+def test_parameters_that_the_model_lacks():
+    rayleigh = Case().replace(RAYLEIGH)
+    assert rayleigh.damping.lacks("beta") is None and Case().damping.lacks("loss_factor") is None
+    assert "damping.model = 'rayleigh'" in rayleigh.damping.lacks("loss_factor")
+    assert "damping.model = 'loss factor'" in Case().damping.lacks("beta")
+
+
+RUBBER = "materials.NR"
+
+
+def _of_hardness(hardness):
+    text = f'{{kind="neo-hookean", shear_modulus="{hardness}", density=1100}}'
+    return load_case(None, (f"{RUBBER}={text}",))
+
+
+def test_modulus_is_that_of_gent():
+    # E = 0.0981 x 515.6 / (0.137505 x 101.6) = 3.6205 MPa at 60 Shore A
+    assert shear_modulus_of(60.0) == pytest.approx(3.6205e6 / 3, rel=1e-4)
+    assert 0.18 < shear_modulus_of(65.0) / shear_modulus_of(60.0) - 1 < 0.24  # five points, a fifth
+
+
+@pytest.mark.parametrize("words", ("60 Shore A", "60 ShA", "60 shore a", "60.0 Shore-A"))
+def test_hardness_stands_where_the_modulus_does(words):
+    assert _of_hardness(words).materials.card("NR").shear_modulus == pytest.approx(shear_modulus_of(60.0), rel=1e-12)
+
+
+@pytest.mark.parametrize("words", ("120 Shore A", "10 Shore A", "60 Shore D"))
+def test_other_hardness_is_refused_with_a_sentence(words):
+    with pytest.raises(CaseError, match="shear_modulus"):
+        _of_hardness(words)
+
+
+@pytest.mark.parametrize("word", SYNONYMS)
+def test_word_of_the_trade_leads_to_a_key_that_exists(word):
+    key = SYNONYMS[word]
+    assert key in {info.key for info in walk(Case)}
+    with pytest.raises(CaseError, match="is not a key") as raised:
+        explain(Case, f"valve.{word}")
+    assert key in str(raised.value)
+
+
+@pytest.mark.parametrize(
+    ("given", "key"),
+    [
+        ("pipe_length=30 m", "upstream.length"),
+        ("valve.hardness=60", "materials.NAME(neo-hookean).shear_modulus"),
+        ("closure.back_pressure=5 m", "closure.rated_pressure"),
+        ("head=2 m", "drive.head"),
+        ("steady.heads=[1]", "steady.pressures"),
+    ],
+)
+def test_unknown_key_names_the_one_that_holds_it(given, key):
+    with pytest.raises(CaseError) as raised:
+        load_case(None, [given])
+    assert f"the nearest valid key is {key}" in str(raised.value)
