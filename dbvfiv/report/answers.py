@@ -171,6 +171,8 @@ def _sure(found: Gathered, verdicts: dict) -> tuple[str, ...]:
         holds = not any(low <= factor <= high for factor in factors)
         word = "holds" if holds else "does not hold"
         said.append(f"over the range of the loss factors, {low:.2g} to {high:.2g} times: the verdict {word}")
+    else:
+        said.append("range of the damping: not examined (none is known of given constants)")
     for level in _by_level(found, "modes"):
         said.append(f"strain level {float(level):.0%}: {_verdict(found.get(f'levels-modes-{level}').verdict)}")
     return tuple(said)
