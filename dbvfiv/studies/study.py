@@ -31,8 +31,6 @@ class Study:
         the record holds already, from an interrupted attempt, is not computed again. Ctrl-C may end it at any point.
     result : type
         `StudyResult` of its records.
-    resumable : bool
-        Whether an interrupted run goes on where it ended.
     rows_to_keep : callable, optional
         From what an earlier attempt kept and the case as it is to go on, to how many rows of each table the run goes on
         from; it refuses with a `CaseError` if there is nothing left to do. Without it a run goes on from all rows, and
@@ -48,7 +46,6 @@ class Study:
     tables: Callable[[MeshData], tuple[TableSpec, ...]]
     run: Callable[..., None]
     result: type[Any]
-    resumable: bool = True
     rows_to_keep: Callable[[Record, Case], Mapping[str, int]] | None = None
     live: Callable[[Case], Callable[[Any], str]] | None = None
     compare: Callable[[Sequence[Any]], Any] | None = None

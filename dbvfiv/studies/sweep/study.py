@@ -382,4 +382,4 @@ def _row(value: float, growth: float, frequency: float, unstable: int) -> str:
     return f"{value:>12.6g} {growth:>12.4f} {frequency:>11.4f} {unstable:>9d}"
 
 
-STUDY = Study("sweep", tables_of, run, SweepResult, resumable=False, rows_to_keep=rows_to_keep, live=print_live)
+STUDY = Study("sweep", tables_of, run, SweepResult, rows_to_keep=rows_to_keep, live=print_live)
