@@ -45,7 +45,8 @@ class SpecialPoint:
         values are those of the best bracket and ``reason`` tells why.
     reason : str
     values : dict of str to float
-        Numbers such as ``omega``, ``first_lyapunov_coefficient``, ``iterations``.
+        Numbers such as ``omega``, ``first_lyapunov_coefficient``, ``iterations``; of a fold or branch point
+        ``unstable``, the unstable eigenvalues besides the critical one.
     vectors : dict of str to ndarray
         Null vectors or eigenvectors: ``right``, ``left``, ``direction``, ...
     """

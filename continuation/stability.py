@@ -171,6 +171,8 @@ class SpectrumMonitor(Monitor):
             if s.kind in ("fold", "branch point") and -SLACK <= tracer.fraction(before, after, s.z)[0] <= 1 + SLACK
         ]
         hidden = len(real) >= 2 and len(real) > len(explained)
+        # Next to a fold a pair may have crossed back within the same step.
+        hidden |= known and len(explained) == 1 and not self._agrees(tracer, explained[0], before, after)
         if (contradictory or hidden) and depth < SUBDIVISIONS:
             middle = tracer.at(before, after, 0.5)
             if middle is not None:
@@ -191,6 +193,15 @@ class SpectrumMonitor(Monitor):
         if len(real) > len(explained):
             for i, j in real:
                 special += self._real(tracer, before, after, index, i, j, explained + special)
+
+    def _agrees(self, tracer, special, before, after):
+        """True where the eigenvalues at a fold or branch point leave one more or none for the points beside it."""
+        if "unstable" not in special.values:
+            options, ask = tracer.options, self._spectrum or tracer.problem.system.spectrum
+            values, _ = ask(special.u, special.mu, options.eigenvalues, options.near).upper_half()
+            nearest = np.argmin(np.abs(values)) if values.size else []
+            special.values["unstable"] = count_unstable(np.delete(values, nearest))
+        return all(point.unstable - special.values["unstable"] in (0, 1) for point in (before, after))
 
     def _real(self, tracer, before, after, index, i, j, known):
         """A real eigenvalue through zero that nobody else explains: a branch point, most likely."""
