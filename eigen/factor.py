@@ -458,8 +458,8 @@ class ShiftedPencil:
 
     Attributes
     ----------
-    motion, force : FullRows
-        J and the transpose of G.
+    motion : FullRows
+        J.
 
     Raises
     ------
@@ -473,7 +473,7 @@ class ShiftedPencil:
         self.shift = shift.real if shift.imag == 0.0 else shift
         self.damping_shifted = structure.combine(self.shift, 1.0, 0.0)
         self._A, self._B, self._R, self._S = pencil.fluid_at(self.shift)
-        self.motion, self.force = FullRows(pencil.J), FullRows(pencil.G.T)
+        self.motion = FullRows(pencil.J)
         # m further right-hand sides, once
         self.response = factor.solve(pencil.G.toarray())
         self.transfer = self.motion @ self.response
