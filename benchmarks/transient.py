@@ -51,7 +51,7 @@ class Unit(Observer):
         start, wall = process_time(), perf_counter()
         for kept, function in (
             (self.force, lambda: self.motion.model.shell.force(self.q)),
-            (self.solve, lambda: self.motion.solve(self.q, 0.0)),
+            (self.solve, lambda: self.motion.solve(self.q)),
         ):
             for _ in range(2):  # the first for the caches
                 begin = process_time()

@@ -19,8 +19,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from .law import FlowLaw, FlowMotion, FlowParameter, above_floor, solve_steady
-from .stepping import MovingFluid
+from .law import FlowLaw, FlowParameter, above_floor, solve_steady
 from .term import VISCOSITY, FlowTerm, Stream, upstream_integral, wall_share
 
 
@@ -184,15 +183,45 @@ class Channel(FlowLaw):
         """Momenta (m,) that the terms add; traceable."""
         return sum((term.momentum(stream, parameters) for term in self.terms), jnp.zeros_like(stream.speed))
 
-    def equations(self, motion: FlowMotion, parameters):
-        area, rate, acceleration, inner, inner_rate = motion
-        inertia = 0.0
-        if self.unsteady:
-            momentum = lambda a, r, u: self.psi(a, r, u, parameters)  # noqa: E731
-            _, inertia = jax.jvp(momentum, (area, rate, inner), (rate, acceleration, inner_rate))
-        head = self.heads(area, rate, inner, parameters)
-        p = parameters["inlet"] - self.back - parameters["density"] * (head + inertia) + self.static
-        return jnp.concatenate([jnp.zeros(1), p[1:]]), p[:1]
+    def sources(self, area, area_rate, inner, parameters, drive=None):
+        """Heads (m + 1,), m2/s2, as `FlowLaw.sources` has them; `drive` is the static one at the flange over `back`."""
+        if drive is None:
+            source, back = self.supply(parameters)
+            drive = source - back
+        head = drive - self.heads(area, area_rate, inner, parameters)
+        return self._outlet_behind(head + self.static / parameters["density"])
+
+    def held(self, area, area_rate, inner, parameters):
+        return -self._outlet_behind(self.psi(area, area_rate, inner, parameters))
+
+    def scales(self, area, parameters):
+        return jnp.full(self.count + 1, parameters["density"])
+
+    @staticmethod
+    def _outlet_behind(values):
+        """Values (m + 1,) from those at the stations (m,): that at the outlet, which must vanish, behind a zero."""
+        return jnp.concatenate([jnp.zeros(1), values[1:], values[:1]])
+
+    # -- the flange, where a line may stand in front
+    # ----
+
+    def supply(self, parameters):
+        """Enthalpy at the far end of a line, m2/s2, and what of it stands against the flow at rest; traceable."""
+        return parameters["inlet"] / parameters["density"], self.back / parameters["density"]
+
+    def flange(self, inner, parameters):
+        """Velocity of the flange, m/s, that mass flows with at the density around the jet, and half the square of that
+        of the fluid; traceable.
+        """
+        return inner[0], 0.5 * inner[0] ** 2
+
+    @property
+    def drive_share(self):
+        """Derivative (m + 1,) of `sources` by the enthalpy at the flange."""
+        return self._outlet_behind(jnp.ones(self.count))
+
+    def speeds_of(self, area, area_rate, inner, parameters):
+        return self.speeds(area, area_rate, inner[0], self._blend(parameters))
 
     def _blend(self, parameters):
         return parameters["storage"] if self.unsteady else 0.0
@@ -228,13 +257,13 @@ class Channel(FlowLaw):
 
     def without_drives(self) -> Channel:
         """Copy of the channel with only those terms that act on steady flow."""
-        leaves, kept = self._flatten()
-        leaves[self.DATA.index("terms")] = self.losses
-        return self._unflatten(kept, leaves)
+        return self.changed(terms=self.losses)
 
-    def stepping(self, density: float) -> MovingFluid:
-        """Evaluators for time steps, in which the flow may run either way."""
-        return MovingFluid(self, density)
+    def with_velocity(self, inner, velocity):
+        return np.array([velocity])
+
+    def reversed(self) -> Channel:
+        return self.changed(reversible=True)
 
 
 def _trial(count: int, size: float) -> Stream:
@@ -278,6 +307,11 @@ class AroundChannel(FlowLaw):
     @property
     def count(self) -> int:
         return self.channel.count
+
+    @property
+    def step(self):
+        """Distances (m - 1,) of the stations, m."""
+        return self.channel.step
 
     @property
     def terms(self):

@@ -20,15 +20,17 @@ Equation (T.13) of docs/theory.md.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any, ClassVar, NamedTuple
+from typing import Any, NamedTuple
 
+import jax
 import jax.numpy as jnp
 import numpy as np
 
 from .channel import AroundChannel, Channel
-from .law import FlowMotion, FlowParameter, Traceable
+from .energy import LINE_BOOKS, LineInstant, line_books, line_energies, line_powers
+from .gas import GasChannel
+from .law import FlowParameter, Traceable
 from .line_elements import DEGREE, chain, element
-from .line_stepping import LineFluid
 from .terms.line import Line, PiecedLine
 from .terms.pump import Pump
 
@@ -143,69 +145,98 @@ class ElasticLine(Traceable):
                 inertance, loss = inertance.at[node].add(ratio * length), loss.at[node].add(lost)
         return Segments(*jnp.stack(columns, axis=1), inertance, loss)
 
-    def far_head(self, velocity, inlet_area, parameters, steady: bool = False):
-        """Total pressure at the far end over the density, m2/s2, from the velocity there referred to the flange."""
+    def far_head(self, velocity, source, inlet_area, parameters, steady: bool = False):
+        """Total pressure at the far end over the density, m2/s2, from the velocity there referred to the flange and the
+        enthalpy of what drives the flow.
+        """
         speed = self.line.section(inlet_area)[1] * velocity
         gained = jnp.minimum(speed, 0.0) if self.line.reservoir else speed
-        head = parameters["inlet"] / parameters["density"] + 0.5 * gained**2
+        head = source + 0.5 * gained**2
         if self.pump is None or steady:
             return head
         return head + self.pump.gain(velocity, inlet_area, parameters)
 
-    def equations(self, velocity, rate, pressure, pressure_rate, inlet_area, parameters):
-        """Momentum but for the flange's pressure, m2/s2, at all nodes; continuity, m2/s2, at the points; traceable.
+    def held(self, velocity, pressure, inlet_area, parameters):
+        """Momentum (k + 1,) at the nodes, m2/s, and compression (k,) at the points, whose rates the equations contain;
+        linear, traceable.
 
         Parameters
         ----------
-        velocity, rate : (k + 1,) arrays
-            w and its rate, that of the flange last.
-        pressure, pressure_rate : (k,) arrays
-            pi and its rate, m/s and m/s2.
+        velocity : (k + 1,) array
+            w, that of the flange last.
+        pressure : (k,) array
+            pi, m/s.
         """
         one, nodes, segments = element(), chain(self.elements), self.segments(inlet_area, parameters)
-        length, ratio, speed, lost = (column[:, None] for column in segments[:4])
-        w, w_rate = velocity[nodes], rate[nodes]
-        at, flows = pressure.reshape(self.elements, -1), w @ one.value.T
-        local = ratio * (length * (w_rate @ one.mass.T) - speed * ((one.weights * at) @ one.slope))
-        local = local + lost * ((one.weights * flows * jnp.abs(flows)) @ one.value)
-        momentum = (segments.inertance * rate + segments.loss * velocity * jnp.abs(velocity)).at[nodes].add(local)
-        momentum = momentum.at[0].add(-self.far_head(velocity[0], inlet_area, parameters))
-        stretched = length * pressure_rate.reshape(self.elements, -1) + speed * (w @ one.slope.T)
-        return momentum, (ratio * one.weights * stretched).ravel()
+        length, ratio = segments.length[:, None], segments.ratio[:, None]
+        momentum = (segments.inertance * velocity).at[nodes].add(ratio * length * (velocity[nodes] @ one.mass.T))
+        return momentum, (ratio * one.weights * length * pressure.reshape(self.elements, -1)).ravel()
 
-    def steady_pressure(self, velocity, inlet_area, parameters):
+    def sources(self, velocity, pressure, source, inlet_area, parameters):
+        """Momentum but for the flange's pressure, m2/s2, at all nodes (k + 1,), and continuity, m2/s2, at the points
+        (k,), without rates; traceable. Arguments as `held` and `far_head` have them.
+        """
+        one, nodes, segments = element(), chain(self.elements), self.segments(inlet_area, parameters)
+        ratio, speed = segments.ratio[:, None], segments.speed[:, None]
+        push = ratio * speed * ((one.weights * pressure.reshape(self.elements, -1)) @ one.slope)
+        momentum = self.friction(velocity, inlet_area, parameters).at[nodes].add(-push)
+        momentum = momentum.at[0].add(-self.far_head(velocity[0], source, inlet_area, parameters))
+        return momentum, (ratio * one.weights * speed * (velocity[nodes] @ one.slope.T)).ravel()
+
+    def friction(self, velocity, inlet_area, parameters):
+        """Friction (k + 1,) at the nodes, m2/s2; traceable."""
+        one, nodes, segments = element(), chain(self.elements), self.segments(inlet_area, parameters)
+        flows = velocity[nodes] @ one.value.T
+        spread = segments.lost[:, None] * ((one.weights * flows * jnp.abs(flows)) @ one.value)
+        return (segments.loss * velocity * jnp.abs(velocity)).at[nodes].add(spread)
+
+    def steady_head(self, velocity, source, inlet_area, parameters):
+        """Total pressure at the flange over the density, m2/s2, in steady flow of a velocity; traceable."""
+        segments = self.segments(inlet_area, parameters)
+        lost = jnp.sum(segments.lost) + jnp.sum(segments.loss)
+        return self.far_head(velocity, source, inlet_area, parameters, steady=True) - lost * velocity * jnp.abs(
+            velocity
+        )
+
+    def steady_pressure(self, velocity, source, inlet_area, parameters):
         """pi (k,) of the steady flow with an inlet velocity."""
         segments = self.segments(inlet_area, parameters)
         lost = segments.lost_before[:, None] + segments.lost[:, None] * element().points
-        head = self.far_head(velocity, inlet_area, parameters, steady=True) - lost * velocity * jnp.abs(velocity)
+        head = self.far_head(velocity, source, inlet_area, parameters, steady=True)
+        head = head - lost * velocity * jnp.abs(velocity)
         return (head / (segments.ratio * segments.speed)[:, None]).ravel()
 
 
 class LineChannel(AroundChannel):
-    """A channel behind an elastic line.
+    """A passage behind an elastic line.
 
-    Its unknowns are the inlet velocity, the velocities in the line from the far end and the pressures in it, each as
-    `ElasticLine` has them.
+    Its unknowns are those of the passage, the velocities in the line from the far end and the pressures in it, each as
+    `ElasticLine` has them. Mass and energy are continuous at the flange: what leaves the line with the density around
+    the jet enters the passage, with its total enthalpy, whether the fluid is compressed there or not.
 
     Parameters
     ----------
-    channel : Channel
+    channel : Channel or GasChannel
         Without the line.
-    rigid : Channel
-        With its rigid column, which has the same steady flow.
+    rigid : Channel or GasChannel
+        With its rigid column, which has the same steady flow but for what compression changes in the line.
     line : ElasticLine
     """
 
     DATA = ("channel", "rigid", "line", "floor")
-    inner_names: ClassVar[tuple[str, ...]] = ("inlet velocity", "velocities in the line", "pressures in the line")
 
-    def __init__(self, channel: Channel, rigid: Channel, line: ElasticLine):
+    def __init__(self, channel: Channel | GasChannel, rigid: Channel | GasChannel, line: ElasticLine):
         self.channel, self.rigid, self.line = channel, rigid, line
         self.floor, self.density = channel.floor, channel.density
 
     @property
     def inner(self) -> int:
-        return 1 + self.line.size
+        return self.channel.inner + self.line.size
+
+    @property
+    def compressed(self) -> bool:
+        """True where the fluid in the passage is compressed."""
+        return self.channel.compressed
 
     @property
     def terms(self):
@@ -226,29 +257,122 @@ class LineChannel(AroundChannel):
         line = self.line
         stretch, faster = values["pipe_length"] / line.line.length, values["wave_speed"] / line.wave_speed
         pipes = [pipe for pipe in zip(line.counts, line.speeds, line.line.parts) if pipe[0]]
-        return min(RESOLVED * n * faster * speed / (stretch * part.length) for n, speed, part in pipes)
+        own = min(RESOLVED * n * faster * speed / (stretch * part.length) for n, speed, part in pipes)
+        return min(own, self.channel.resolved(given))
 
-    def split(self, inner):
-        """Velocities (k + 1,), that of the flange last, and pressures (k,) of the line from the law's unknowns."""
-        k = self.line.size // 2
-        velocity = jnp.concatenate([inner[1 : k + 1], inner[:1]])
-        return velocity, inner[k + 1 :]
+    def split(self, inner, parameters):
+        """Unknowns of the passage, velocities (k + 1,), that of the flange last, and pressures (k,) of the line from
+        the law's unknowns; traceable.
+        """
+        own, velocity, pressure = jnp.split(inner, [self.channel.inner, self.channel.inner + self.line.size // 2])
+        return own, jnp.append(velocity, self.channel.flange(own, parameters)[0]), pressure
 
-    def equations(self, motion: FlowMotion, parameters):
-        (velocity, pressure), (rate, pressure_rate) = self.split(motion.inner), self.split(motion.inner_rate)
-        momentum, continuity = self.line.equations(velocity, rate, pressure, pressure_rate, motion.area[-1], parameters)
-        density, inlet = parameters["density"], motion.inner[0]
-        static = density * (-momentum[-1] - 0.5 * inlet**2)
-        own = motion._replace(inner=motion.inner[:1], inner_rate=motion.inner_rate[:1])
-        p, outlet = self.channel.equations(own, parameters | {"inlet": static})
-        return p, jnp.concatenate([outlet, density * momentum[:-1], density * continuity])
+    def far_velocity(self, inner: np.ndarray) -> float:
+        return float(inner[self.channel.inner])
+
+    # -- the definition
+    # ----
+
+    def held(self, area, area_rate, inner, parameters):
+        own, velocity, pressure = self.split(inner, parameters)
+        momentum, stored = self.line.held(velocity, pressure, area[-1], parameters)
+        passage = self.channel.held(area, area_rate, own, parameters) - self.channel.drive_share * momentum[-1]
+        return jnp.concatenate([passage, momentum[:-1], stored])
+
+    def sources(self, area, area_rate, inner, parameters):
+        own, velocity, pressure = self.split(inner, parameters)
+        source, back = self.channel.supply(parameters)
+        momentum, stretch = self.line.sources(velocity, pressure, source, area[-1], parameters)
+        drive = -momentum[-1] - self.channel.flange(own, parameters)[1] - back
+        passage = self.channel.sources(area, area_rate, own, parameters, drive)
+        return jnp.concatenate([passage, momentum[:-1], stretch])
+
+    def scales(self, area, parameters):
+        line = jnp.full(self.line.size, parameters["density"])
+        return jnp.concatenate([self.channel.scales(area, parameters), line])
+
+    def speeds_of(self, area, area_rate, inner, parameters):
+        return self.channel.speeds_of(area, area_rate, inner[: self.channel.inner], parameters)
+
+    def with_velocity(self, inner, velocity):
+        if self.compressed:
+            return inner
+        uniform = np.full(1 + self.line.size // 2, velocity)
+        return np.append(uniform, inner[len(uniform) :])
+
+    def is_soft(self, density):
+        return self.channel.is_soft(density)
+
+    def own_velocities(self, inner):
+        return self.channel.own_velocities(inner[: self.channel.inner])
+
+    def inlet_ratio(self, inner):
+        return self.channel.inlet_ratio(inner)
+
+    def reversed(self) -> LineChannel:
+        return self.changed(channel=self.channel.reversed())
 
     def steady(self, area, parameters):
-        """Steady flow of the rigid column of fluid, with a uniform velocity in the line."""
-        p, velocity = self.rigid.steady(area, parameters)
-        k = self.line.size // 2
-        pressure = self.line.steady_pressure(velocity[0], area[-1], parameters)
-        return p, jnp.concatenate([velocity, jnp.full(k, velocity[0]), pressure])
+        """Steady flow of the rigid column of fluid, with a uniform velocity in the line; with the line's own head at
+        the flange where the fluid is compressed.
+        """
+        p, own = self.rigid.steady(area, parameters)
+        source, _ = self.channel.supply(parameters)
+        if self.compressed:
 
-    def stepping(self, density: float) -> LineFluid:
-        return LineFluid(self.channel, density, self.line)
+            def drive(velocity, kinetic, driven):
+                return self.line.steady_head(velocity, self.channel.supply(driven)[0], area[-1], driven) - kinetic
+
+            p, own = self.channel.steady_from(area, parameters, own, drive, 4)
+        velocity = self.channel.flange(own, parameters)[0]
+        pressure = self.line.steady_pressure(velocity, source, area[-1], parameters)
+        return p, jnp.concatenate([own, jnp.full(self.line.size // 2, velocity), pressure])
+
+    # -- its energy, see `dbvfiv.flow.energy`
+    # ----
+
+    @property
+    def book_names(self) -> tuple[str, ...]:
+        """Those of the passage and of the line."""
+        return (*self.channel.book_names, *LINE_BOOKS)
+
+    @property
+    def energy_names(self) -> tuple[str, ...]:
+        """Those of the passage and of the line."""
+        return (*self.channel.energy_names, "line_kinetic_energy", "line_elastic_energy")
+
+    def first_carried(self, motion, parameters):
+        def at_flange(inner):
+            return self.line.held(*self.split(inner, parameters)[1:], motion.area[-1], parameters)[0][-1]
+
+        own = motion._replace(inner=motion.inner[: self.channel.inner])
+        rate = jax.jvp(at_flange, (motion.inner,), (motion.inner_rate,))[1]
+        source, _ = self.channel.supply(parameters)
+        waves = LineInstant(*self.split(motion.inner, parameters)[1:], source)
+        powers = line_powers(self.line, waves, rate, motion.area[-1], parameters)
+        return jnp.concatenate([self.channel.first_carried(own, parameters), powers, rate[None]])
+
+    def step_books(self, step, parameters):
+        inner, count = self.channel.inner, self.count + self.channel.inner
+
+        def of_passage(at):
+            return at._replace(
+                inner=at.inner[:inner], held=at.held[:count], rate=at.rate[:count], carried=at.carried[:-4]
+            )
+
+        own, carried = self.channel.step_books(
+            step._replace(old=of_passage(step.old), new=of_passage(step.new)), parameters
+        )
+        source, _ = self.channel.supply(parameters)
+        ends = [LineInstant(*self.split(at.inner, parameters)[1:], source) for at in (step.old, step.new)]
+        books, last = line_books(self.line, ends, step, step.new.area[-1], parameters)
+        return jnp.concatenate([own, books]), jnp.concatenate([carried, last])
+
+    def energies(self, area, inner, parameters):
+        own, *waves = self.split(inner, parameters)
+        line = line_energies(self.line, LineInstant(*waves), area[-1], parameters)
+        return jnp.concatenate([self.channel.energies(area, own, parameters), line])
+
+    def readings(self, area, inner, parameters):
+        """Those of a compressed fluid in the passage; see `GasChannel.readings`."""
+        return self.channel.readings(area, inner[: self.channel.inner], parameters)

@@ -34,8 +34,8 @@ import jax.numpy as jnp
 import numpy as np
 
 from .channel import AroundChannel, Channel, outward_head, reversible_head
-from .gas_stepping import GasFluid
-from .law import FlowMotion, FlowParameter, above_floor
+from .energy import GAS_BOOKS, gas_books, gas_energy, gas_powers
+from .law import FlowParameter, above_floor
 
 #: Relative error of the frequency of waves that counts as resolved; the box scheme's is (k h)^2/12.
 _RESOLVED = 0.01
@@ -43,6 +43,8 @@ _RESOLVED = 0.01
 CHOKED = 50.0
 #: Speed of waves in a liquid that boils, over that of sound in the liquid.
 VAPOUR = 1e-3
+#: Absolute pressure, Pa, below which a fluid is a gas: by no more can its pressure fall.
+GAS = 1e6
 #: Steps within which a steady flow must be found, and the relative size of the last one.
 _SETTLING, _SETTLED = 200, 1e-12
 #: What is left, over rho c^2, where such a step is as long as a wave takes through the passage.
@@ -75,6 +77,7 @@ class GasChannel(AroundChannel):
 
     DATA = ("channel", "floor", "vapour")
     STATIC = ("boils",)
+    compressed = True
     inner_names: ClassVar[tuple[str, ...]] = ("inlet velocity", "velocities", "logarithms of the density")
 
     def __init__(self, channel: Channel, sound_speed: float, ratio: float = 1.4, vapour: float | None = None):
@@ -175,7 +178,7 @@ class GasChannel(AroundChannel):
         """
         return sigma.at[0].set(sigma[1])
 
-    def sources(self, area, area_rate, inner, parameters):
+    def balances(self, area, area_rate, inner, parameters, drive=None):
         """Sources (2 m - 1,) that balance the rates of `stored`, m2/s2 and m3/s; traceable."""
         channel = self.channel
         speed, sigma = self.split(inner, parameters)
@@ -183,7 +186,7 @@ class GasChannel(AroundChannel):
         head = (reversible_head if channel.reversible else outward_head)(speed, inner[0])
         if channel.terms:
             head = head + channel.term_heads(channel.stream(area, area_rate, speed, inner), parameters)
-        drive = self.enthalpy(self.compression(parameters["inlet"] - channel.back, parameters), parameters)
+        drive = self.supply(parameters)[0] if drive is None else drive
         total = head + self.enthalpy(sigma, parameters)
         thick = sigma + jnp.zeros_like(sigma).at[0].set(self.drawn(speed[0], parameters))
         flow = open_ * speed * jnp.exp(thick / parameters["sound_speed"])
@@ -208,25 +211,39 @@ class GasChannel(AroundChannel):
         return c * jnp.exp(0.5 * (parameters["heat_capacity_ratio"] - 1.0) * liquid / c)
 
     def scales(self, area, parameters):
-        """Factors (2 m - 1,) that turn the balances into Pa; traceable."""
         density = parameters["density"]
-        momentum = jnp.full(self.count, density)
         mass = jnp.full(self.count - 1, density * parameters["sound_speed"]) / above_floor(area[-1], self.floor)
-        return jnp.concatenate([momentum, mass])
+        return jnp.concatenate([jnp.ones(self.count), jnp.full(self.count, density), mass])
 
-    def equations(self, motion: FlowMotion, parameters):
-        area, rate, acceleration, inner, inner_rate = motion
-        balance = self.sources(area, rate, inner, parameters)
-        if self.unsteady:
-            held = lambda a, r, u: self.stored(a, r, u, parameters)  # noqa: E731
-            _, change = jax.jvp(held, (area, rate, inner), (rate, acceleration, inner_rate))
-            balance = balance + change
-        return self.pressures(inner, parameters), self.scales(area, parameters) * balance
+    def held(self, area, area_rate, inner, parameters):
+        return jnp.concatenate([jnp.zeros(self.count), self.stored(area, area_rate, inner, parameters)])
 
-    def pressures(self, inner, parameters):
-        """Pressures (m,) on the wall, Pa; traceable."""
+    def sources(self, area, area_rate, inner, parameters, drive=None):
+        """As `FlowLaw.sources` has them; `drive` is the enthalpy at the flange, m2/s2, where a line stands in front."""
         _, sigma = self.split(inner, parameters)
-        return self.pressure(sigma, parameters) + self.channel.static
+        pressure = self.pressure(sigma, parameters) + self.channel.static
+        return jnp.concatenate([pressure, self.balances(area, area_rate, inner, parameters, drive)])
+
+    # -- the flange, where a line may stand in front
+    # ----
+
+    def supply(self, parameters):
+        """Enthalpy at the far end of a line, m2/s2, over that around the jet; nothing else stands against the flow;
+        traceable.
+        """
+        found = self.enthalpy(self.compression(parameters["inlet"] - self.channel.back, parameters), parameters)
+        return found, 0.0
+
+    def flange(self, inner, parameters):
+        """Velocity of the flange, m/s, that mass flows with at the density around the jet, and half the square of that
+        of the fluid; traceable.
+        """
+        return inner[0] * jnp.exp(inner[-1] / parameters["sound_speed"]), 0.5 * inner[0] ** 2
+
+    @property
+    def drive_share(self):
+        """Derivative (m + l,) of `sources` by the enthalpy at the flange."""
+        return jnp.zeros(self.count + self.inner).at[2 * self.count - 1].set(-1.0)
 
     # -- the steady flow
     # ----
@@ -242,56 +259,93 @@ class GasChannel(AroundChannel):
 
     def steady(self, area, parameters):
         """Searched for; nothing flows where no pressure drives it."""
-        own, still = self._without_drives(), parameters["inlet"] == self.channel.back
+        still = parameters["inlet"] == self.channel.back
         driven = {**parameters, "inlet": jnp.where(still, self.channel.back + 1.0, parameters["inlet"])}
-        inner = _settled(*jax.lax.stop_gradient((own, area, driven)))
-        for _ in range(2):  # which make derivatives exact up to the third, as in `derivatives.solve_steady`
-            inner = inner + _newton_step(own, area, driven, inner)
-        pressure = self.pressures(inner, parameters)
-        rest = jnp.zeros_like(pressure) + self.channel.static
-        return jnp.where(still, rest, pressure), jnp.where(still, 0.0, inner)
+        inner = _settled(*jax.lax.stop_gradient((self.without_drives(), area, driven)))
+        return self.steady_from(area, parameters, inner)
 
-    def _without_drives(self) -> GasChannel:
+    def steady_from(self, area, parameters, inner, drive=None, more: int = 0):
+        """Pressures (m,) and unknowns (l,) of the steady flow next to given ones, none where no pressure drives it;
+        traceable.
+
+        Newton's steps: as many as `more`, and two more through which derivatives are traced; see
+        `dbvfiv.flow.law.solve_steady`.
+
+        Parameters
+        ----------
+        drive : callable, optional
+            Enthalpy at the flange, m2/s2, of a line in front, from velocity and kinetic energy as `flange` gives them
+            and the parameters.
+        """
+        own, still = self.without_drives(), parameters["inlet"] == self.channel.back
+        driven = {**parameters, "inlet": jnp.where(still, self.channel.back + 1.0, parameters["inlet"])}
+        for _ in range(more):
+            inner = jax.lax.stop_gradient(inner + _newton_step(own, area, driven, inner, drive))
+        for _ in range(2):
+            inner = inner + _newton_step(own, area, driven, inner, drive)
+        _, sigma = self.split(inner, parameters)
+        rest = jnp.zeros_like(area) + self.channel.static
+        pressure = jnp.where(still, rest, self.pressure(sigma, parameters) + self.channel.static)
+        return pressure, jnp.where(still, 0.0, inner)
+
+    def without_drives(self) -> GasChannel:
         """Copy of the law with only those terms that act on steady flow."""
-        leaves, kept = self._flatten()
-        leaves[self.DATA.index("channel")] = self.channel.without_drives()
-        return self._unflatten(kept, leaves)
+        return self.changed(channel=self.channel.without_drives())
+
+    def reversed(self) -> GasChannel:
+        return self.changed(channel=self.channel.reversed())
+
+    def is_soft(self, density):
+        """True for a gas, by its absolute pressure; the water hammer of a liquid hits walls as an incompressible fluid
+        does.
+        """
+        return density * self.sound_speed**2 / self.ratio < GAS
+
+    def speeds_of(self, area, area_rate, inner, parameters):
+        return self.split(inner, parameters)[0]
 
     def own_velocities(self, inner):
         return np.append(inner[1 : self.count], inner[0])
 
-    def steady_velocities(self, area, inlet, density):
-        """Steady velocities (m,), m/s, of a fluid of any density, kg/m3, by similarity.
+    def inlet_ratio(self, inner):
+        return float(np.exp(inner[2 * self.count - 2] / self.sound_speed))
 
-        The fluid is compressed by a pressure as much as the law's own one is.
-        """
-        own = self.own_velocities(self.steady_inner(area, self._driven(inlet)))
-        return own * np.sqrt(self.density / density)
+    # -- its energy, see `dbvfiv.flow.energy`
+    # ----
 
-    def inlet_density(self, area, inlet, density):
-        """Density at the inlet, kg/m3, of a fluid of given density around the jet.
+    book_names = GAS_BOOKS
+    energy_names = ("gas_energy",)
 
-        It is compressed by a pressure as much as the law's own fluid is.
-        """
-        inner = self.steady_inner(area, self._driven(inlet))
-        return density * float(np.exp(inner[-1] / self.sound_speed))
+    def first_carried(self, motion, parameters):
+        return gas_powers(self, motion.area, motion.area_rate, motion.inner, parameters)
 
-    def stepping(self, density: float) -> GasFluid:
-        return GasFluid(self, density)
+    def step_books(self, step, parameters):
+        return gas_books(self, step, parameters)
+
+    def energies(self, area, inner, parameters):
+        return gas_energy(self, area, inner, parameters)[None]
+
+    def readings(self, area, inner, parameters):
+        """Mass flows at outlet and inlet, kg/s of the part, and the largest Mach number; traceable."""
+        speed, sigma = self.split(inner, parameters)
+        sigma = sigma.at[0].add(self.drawn(speed[0], parameters))
+        thick = parameters["density"] * jnp.exp(sigma / parameters["sound_speed"])
+        flow = thick * above_floor(area, self.floor) * speed
+        return flow[0], flow[-1], jnp.max(jnp.abs(speed) / self.local_sound_speed(sigma, parameters))
 
 
-@jax.jit
-def _left(law: GasChannel, area, parameters, inner):
+def _left(law: GasChannel, area, parameters, inner, drive=None):
     """Residual of the equations (l,), Pa, in a passage whose walls are at rest."""
-    return law.scales(area, parameters) * law.sources(area, jnp.zeros_like(area), inner, parameters)
+    drive = None if drive is None else drive(*law.flange(inner, parameters), parameters)
+    balance = law.balances(area, jnp.zeros_like(area), inner, parameters, drive)
+    return law.scales(area, parameters)[law.count :] * balance
 
 
-@jax.jit
-def _newton_step(law: GasChannel, area, parameters, inner):
-    return -jnp.linalg.solve(jax.jacfwd(_left, 3)(law, area, parameters, inner), _left(law, area, parameters, inner))
+def _newton_step(law: GasChannel, area, parameters, inner, drive=None):
+    left = lambda x: _left(law, area, parameters, x, drive)  # noqa: E731
+    return -jnp.linalg.solve(jax.jacfwd(left)(inner), left(inner))
 
 
-@jax.jit
 def _settling_step(law: GasChannel, area, parameters, inner):
     """Change (l,) of the unknowns in an implicit step of time, the longer the less is left."""
     c, still = parameters["sound_speed"], jnp.zeros_like(area)
@@ -300,7 +354,7 @@ def _settling_step(law: GasChannel, area, parameters, inner):
     rate = jnp.linalg.norm(left) / (_USUAL * parameters["density"] * c * c * passing)
     held = jax.jacfwd(law.stored, 2)(area, still, inner, {**parameters, "storage": 1.0})
     slope = jax.jacfwd(_left, 3)(law, area, parameters, inner)
-    return -jnp.linalg.solve(slope + rate * law.scales(area, parameters)[:, None] * held, left)
+    return -jnp.linalg.solve(slope + rate * law.scales(area, parameters)[law.count :, None] * held, left)
 
 
 def _settled(law: GasChannel, area, parameters):

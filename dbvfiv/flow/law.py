@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
+from copy import copy
 from dataclasses import dataclass, fields
 from functools import partial
 from typing import Any, ClassVar, NamedTuple
@@ -126,6 +127,12 @@ class Traceable:
         made.__dict__.update(zip(cls.STATIC, static))
         return made
 
+    def changed(self, **attributes):
+        """Copy with other attributes."""
+        made = copy(self)
+        made.__dict__.update(attributes)
+        return made
+
 
 class FlowLaw(Traceable, ABC):
     """Pressures at the stations of a passage.
@@ -153,8 +160,14 @@ class FlowLaw(Traceable, ABC):
     unsteady : bool
         Whether rates matter; without, the steady law holds at every instant and the inner unknowns follow from the
         passage.
+    compressed : bool
+        Whether the fluid in the passage is compressed; pressures do not contain rates then.
     density : float
         Of the fluid that equilibria are found with, kg/m3; it matters only to those of a viscous fluid.
+    step : (m - 1,) array or 0
+        Distances of the stations, m, where the fluid between them has momentum.
+    book_names, energy_names : tuples of str
+        What time steps keep of the fluid's energy: what became of it, and what it holds; see `step_books`.
     """
 
     inner_names: ClassVar[tuple[str, ...]] = ()
@@ -164,7 +177,11 @@ class FlowLaw(Traceable, ABC):
     static: Any = 0.0
     has_fluid: bool = True
     unsteady: bool = True
+    compressed: bool = False
     density: float = 1.0
+    step: Any = 0.0
+    book_names: tuple[str, ...] = ()
+    energy_names: tuple[str, ...] = ()
 
     @property
     @abstractmethod
@@ -181,12 +198,32 @@ class FlowLaw(Traceable, ABC):
     def parameters(self) -> tuple[FlowParameter, ...]:
         """The numbers that the equations depend on, inlet pressure and density among them."""
 
-    @abstractmethod
+    def sources(self, area, area_rate, inner, parameters: Mapping[str, Any]) -> Any:
+        """Pressures (m,) and the law's own balances (l,) but for rates, over `scales`; traceable."""
+        raise NotImplementedError(f"{type(self).__name__} is not given by sources and what is held.")
+
+    def held(self, area, area_rate, inner, parameters: Mapping[str, Any]) -> Any:
+        """Quantities (m + l,) whose rates pressures and balances contain, over `scales`; traceable."""
+        return jnp.zeros(self.count + self.inner)
+
+    def scales(self, area, parameters: Mapping[str, Any]) -> Any:
+        """Factors (m + l,) that turn `sources` and rates of `held` into Pa; traceable."""
+        return jnp.ones(self.count + self.inner)
+
     def equations(self, motion: FlowMotion, parameters: Mapping[str, Any]) -> tuple[Any, Any]:
         """Pressures (m,), Pa, and residuals (l,) of the law's own equations; traceable by jax.
 
-        A pressure that an equation sets to zero is zero among the pressures; what is left of it is the residual.
+        A pressure that an equation sets to zero is zero among the pressures; what is left of it is the residual. They
+        are `sources` with the rates of `held`, which is what time steps need; a law that has no steps may give them
+        directly.
         """
+        area, rate, acceleration, inner, inner_rate = motion
+        found = self.sources(area, rate, inner, parameters)
+        if self.unsteady:
+            held = lambda a, r, u: self.held(a, r, u, parameters)  # noqa: E731
+            found = found + jax.jvp(held, (area, rate, inner), (rate, acceleration, inner_rate))[1]
+        found = self.scales(area, parameters) * found
+        return found[: self.count], found[self.count :]
 
     def at_rest(self, area, inner, parameters: Mapping[str, Any]) -> tuple[Any, Any]:
         """`equations` of a passage at rest with constant inner unknowns; traceable."""
@@ -200,15 +237,42 @@ class FlowLaw(Traceable, ABC):
         """Pressures (m,) and inner unknowns (l,) of the steady flow; traceable. Not numbers where there is none."""
         return solve_steady(self, area, parameters)
 
-    def stepping(self, density: float):
-        """Evaluators for time steps; see `dbvfiv.flow.stepping.MovingFluid`.
+    # -- steps in time, see `dbvfiv.flow.stepping`
+    # ----
 
-        Raises
-        ------
-        NotImplementedError
-            If the law has none.
+    def reversed(self) -> FlowLaw:
+        """The law with a flow that may run backwards, as time steps need it."""
+        return self
+
+    def with_velocity(self, inner: np.ndarray, velocity: float) -> np.ndarray:
+        """Unknowns (l,) of a steady flow with another inlet velocity, m/s, where that is free."""
+        return inner
+
+    def is_soft(self, density: float) -> bool:
+        """True for a gas, which hits no wall as a liquid does."""
+        return False
+
+    def far_velocity(self, inner: np.ndarray) -> float:
+        """Velocity at the far end of a line, m/s of the inlet's section, by the law's unknowns (l,)."""
+        return float(inner[0])
+
+    def speeds_of(self, area, area_rate, inner, parameters):
+        """Speeds (m,) at the stations, m/s; traceable."""
+        return jnp.zeros(self.count)
+
+    def first_carried(self, motion: FlowMotion, parameters):
+        """What `step_books` carries from step to step, at the start of a motion; traceable."""
+        return jnp.zeros(0)
+
+    def step_books(self, step, parameters):
+        """Energies (books,), J of the part, by `book_names`, of a `dbvfiv.flow.stepping.BookStep`, and what the next
+        one needs; traceable.
         """
-        raise NotImplementedError(f"{type(self).__name__} has no evaluators for time steps.")
+        return jnp.zeros(0), jnp.zeros(0)
+
+    def energies(self, area, inner, parameters):
+        """Energies, J of the part, by `energy_names`; traceable."""
+        return jnp.zeros(0)
 
     def resolved(self, given: Mapping[str, float]) -> float:
         """Frequency up to which waves of the fluid are resolved, Hz, under given parameters; infinite without any."""
@@ -275,12 +339,25 @@ class FlowLaw(Traceable, ABC):
         return float(self.steady_inner(area, {"inlet": inlet, "density": density})[0]) if self.has_fluid else 0.0
 
     def steady_velocities(self, area: np.ndarray, inlet: float, density: float) -> np.ndarray:
-        """Steady velocities (m,) at all stations, m/s; zero without a fluid."""
-        return self.velocities(area, self.inlet_velocity(area, inlet, density))
+        """Steady velocities (m,) at all stations, m/s; zero without a fluid.
+
+        A fluid of another density than the law's own is compressed by a pressure as much as that is.
+        """
+        if not self.compressed:
+            return self.velocities(area, self.inlet_velocity(area, inlet, density))
+        own = self.own_velocities(self.steady_inner(area, self._driven(inlet)))
+        return own * np.sqrt(self.density / density)
 
     def inlet_density(self, area: np.ndarray, inlet: float, density: float) -> float:
-        """Density of the fluid at the inlet in steady flow, kg/m3; `density` is that around the jet."""
-        return density
+        """Density of the fluid at the inlet in steady flow, kg/m3; `density` is that around the jet.
+
+        It is compressed by a pressure as much as the law's own fluid is.
+        """
+        return density * self.inlet_ratio(self.steady_inner(area, self._driven(inlet))) if self.compressed else density
+
+    def inlet_ratio(self, inner: np.ndarray) -> float:
+        """Density at the inlet over that around the jet, by the law's own unknowns (l,)."""
+        return 1.0
 
     def own_velocities(self, inner: np.ndarray) -> np.ndarray | None:
         """Velocities (m,) at all stations, m/s, where they are among the law's own unknowns (l,); None where they

@@ -1,108 +1,160 @@
-"""The flow as a time step sees it: station speeds, their integral from the inlet, pressures, and derivatives.
+"""The fluid in a time step: the law's own definition, with differences in time for rates.
 
-    p_k = P_in - rho [ head_k + d psi_k/dt ],      psi_k = integral_in^k U ds
+With f the `sources` of a law and Q what it `held`, pressures p and equations 0 in a step of length h follow from
 
-psi rather than U is differentiated in time. Its value at the outlet is a momentum: it changes by bounded forces only,
-whereas U falls by orders of magnitude within a step when lips slam, and a scheme for U then throws it to negative
-values, at which the ideal jet runs away. Numpy forms of the definition in `dbvfiv.flow.channel`, for speed: a step asks
-for them several times. Terms of a channel are evaluated by their definition.
+    [p; 0] = f(at a share theta of the step) + r Q'_{n+1} + (1 - r) Q'_n,      Q'_{n+1} = (Q_{n+1} - Q_n)/h
 
-Drawn in through the lips, the fluid starts from rest outside, where the pressure vanishes, and loses the head of its
-jets: `dbvfiv.flow.channel.reversible_head`.
+Q rather than the unknowns is differenced. Of an incompressible fluid it holds psi, the integral of the speed from the
+inlet, whose value at the outlet is a momentum: it changes by bounded forces only, whereas speeds fall by orders of
+magnitude within a step when lips slam, and a scheme for them then throws them to negative values, at which the ideal
+jet runs away. Of a compressed one it holds mass, so that none is lost where a section shrinks to a fraction of itself
+within a step.
 
-The unknown of a step is one number, the inlet velocity: it is eliminated by a scalar root, which is what lets a step
-choose between an outward flow and one drawn in. Elastic lines and compressed fluids keep that contract, `StepFluid`:
-what else they have is found within each evaluation.
+theta and r are those of the wall's scheme, or 1 and 1, the backward difference of first order. A compressed fluid takes
+1 and 3/2, the backward difference of second order: both are L-stable, so that waves that a step does not resolve, and
+gas that leaves through lips that shut, die out within it instead of alternating in sign.
 
-Equation (T.9) of docs/theory.md.
+The law's unknowns are eliminated in each evaluation: the wall sees pressures and their derivatives by areas. Where the
+inlet velocity is the only one, the root taken is that next to the last one in the direction in which it misses the
+outlet's pressure; a flow drawn in loses the head of its jets, see `dbvfiv.flow.channel.reversible_head`.
+
+Equations (T.9), (T.13), (T.23) and (T.24) of docs/theory.md.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
-from typing import Any
+from dataclasses import dataclass, fields
+from functools import partial
 
 import jax
+import jax.numpy as jnp
 import numpy as np
 
-from .law import FlowLaw
-from .term import wall_share
+from ..errors import SolveError
+from .energy import GAS_BOOKS, LINE_BOOKS, BookStep, Instant
+from .law import FlowLaw, FlowMotion
+
+#: Newton steps within which the flow of a step must be found, and the size of the last one, relative and absolute; what
+#: rounding may leave of it, where steps no longer fall.
+_STEPS, _TOLERANCE, _SMALLEST, _ROUNDING = 40, 1e-11, 1e-12, 1e-9
+#: Inlet velocity, m/s, beyond which no root is looked for.
+_RUNAWAY = 1e12
+#: Share of a step at which the equations of a compressed fluid are met, and r, for the difference of second order.
+SECOND_ORDER = 1.0, 1.5
 
 
 @dataclass(frozen=True)
-class Step:
-    """Start of the fluid in a step.
+class FluidState:
+    """The fluid at one instant.
 
     Attributes
     ----------
-    theta : float
-        Point in the step at which the fluid's equations are met: the share of the new state there.
-    speed : float
-        Inlet velocity at the start, m/s.
-    psi_weight : float
-    psi_known : (m,) array
-        The rate of psi is psi_weight psi + psi_known, with the new psi.
-    inlet : float
-        Inlet pressure where the equations are met, Pa.
-    line : `dbvfiv.flow.line_stepping.LineStep` or LineInstant, optional
-        Waves in an elastic upstream pipe; `inlet` is then the pressure at its far end.
-    gas : `dbvfiv.flow.gas_stepping.GasStep` or GasInstant, optional
-        State of a compressible fluid.
+    inner : (l,) array
+        The law's unknowns; the inlet velocity alone where it has none.
+    held, rate : (m + l,) arrays
+        What the law's balances hold, and the scheme's value of its rate.
+    area, area_rate, speed : (m,) arrays
+        m2, m2/s and m/s at the stations.
+    turning : (m - 1,) array
+        Rate of the momentum between stations in the last step, m2/s2.
+    carried, books : arrays
+        What the next step's energies need, and energies since the start, J of the part; see `FlowLaw.step_books`.
     """
 
-    theta: float
-    speed: float
-    psi_weight: float
-    psi_known: np.ndarray
-    inlet: float
-    line: Any = None
-    gas: Any = None
+    inner: np.ndarray
+    held: np.ndarray
+    rate: np.ndarray
+    area: np.ndarray
+    area_rate: np.ndarray
+    speed: np.ndarray
+    turning: np.ndarray
+    carried: np.ndarray
+    books: np.ndarray
+
+    @property
+    def velocity(self) -> float:
+        """Inlet velocity, m/s."""
+        return float(self.inner[0])
+
+    @property
+    def instant(self) -> Instant:
+        """The state as energies see it."""
+        return Instant(self.area, self.area_rate, self.inner, self.held, self.rate, self.carried)
+
+    @property
+    def packed(self) -> np.ndarray:
+        """All numbers in one array, their counts first, and zeros to the length that `packed_size` says."""
+        parts = [np.asarray(getattr(self, f.name), float) for f in fields(self)]
+        found = np.concatenate([[len(part) for part in parts], *parts])
+        return np.append(found, np.zeros(packed_size(len(self.area), len(self.inner)) - len(found)))
+
+    @classmethod
+    def unpacked(cls, numbers: np.ndarray) -> FluidState:
+        """Undo `packed`.
+
+        Raises
+        ------
+        SolveError
+            If the numbers are those of another version.
+        """
+        numbers = np.asarray(numbers, float)
+        count = len(fields(cls)) if len(numbers) else 0
+        cuts = count + np.cumsum([0, *np.asarray(numbers[:count], int)])
+        if not 0 < cuts[-1] <= len(numbers):
+            raise SolveError("The state of the fluid was kept by another version and cannot be gone on from.")
+        return cls(*(numbers[a:b] for a, b in zip(cuts[:-1], cuts[1:])))
+
+
+def packed_size(stations: int, unknowns: int) -> int:
+    """Length of `FluidState.packed` that holds any law of so many stations and unknowns."""
+    kept = len(GAS_BOOKS) + len(LINE_BOOKS) + 7
+    return len(fields(FluidState)) + 6 * stations + 3 * unknowns + kept
 
 
 @dataclass
-class Load:
+class Flow:
     """Fluid of a step and its force on the wall.
 
     Attributes
     ----------
-    force : (n,) array
-        G p, where the equations are met; the wall's part to find.
-    outlet : float
-        Pressure at the outlet, Pa, to vanish; zero where U is no unknown.
+    inlet : float
+        Inlet pressure where the equations are met, Pa.
     pressure : (m,) array
         Pa, where the equations are met.
-    area, speed, psi : (m,) arrays
-        At the end of the step: m2 of the part, m/s, m2/s.
-    psi_rate : (m,) array
-        Where the equations are met, m2/s2.
-    inlet : float
-        Inlet pressure there, Pa.
-    mid_speed : float
-        Inlet velocity there, m/s.
-    line : LineState, optional
-        Waves in an elastic line at the end of the step.
-    flange_slope : float
-        Derivative of the pressure at the flange by the inlet velocity, both where the equations are met, Pa s/m.
-    gas : GasFlow, optional
-        A fluid that is compressed, at the end of the step.
+    area, area_rate, speed : (m,) arrays
+        At the end of the step: m2 of the part, m2/s, m/s.
+    inner, held : (l,) and (m + l,) arrays
+        The law's unknowns and what its balances hold, there.
+    step : FluidStep, optional
+        That found it; without one the state is that of the flow, all rates zero.
+    passage : pair of (m,) arrays, optional
+        Areas and their rates where the equations are met.
+    force : (n,) array
+        G p, the wall's part to find.
     """
 
-    force: np.ndarray | None
-    outlet: float
+    inlet: float
     pressure: np.ndarray
     area: np.ndarray
+    area_rate: np.ndarray
     speed: np.ndarray
-    psi: np.ndarray
-    psi_rate: np.ndarray
-    inlet: float
-    mid_speed: float
-    line: Any = None
-    flange_slope: float = 0.0
-    gas: Any = None
+    inner: np.ndarray
+    held: np.ndarray
+    step: FluidStep | None = None
+    passage: tuple | None = None
+    force: np.ndarray | None = None
+
+    def slopes(self, velocity: float) -> np.ndarray:
+        """Derivatives (m, m) of the pressures by the new areas, whose rates follow them by `velocity`, 1/s."""
+        return self.step.slopes(self, velocity)
+
+    def state(self) -> FluidState:
+        """The fluid's state at the end."""
+        return self.step.state(self)
 
 
-class StepFluid:
-    """Evaluators of a flow law for time steps.
+class MovingFluid:
+    """A law's flow through a passage whose areas move.
 
     Parameters
     ----------
@@ -112,447 +164,366 @@ class StepFluid:
     Attributes
     ----------
     moves : bool
-        Whether the fluid has inertia, so that psi is part of the state.
-    eliminated : bool
-        Whether pressures follow from the wall's motion alone, so that a step has no unknown of the fluid; it is the
-        inlet velocity otherwise.
-    quiet_inward : bool
-        Whether steps with inward flow need no numerical damping.
+        Whether the fluid has inertia.
     """
 
-    moves = eliminated = True
-    quiet_inward = False
+    moves = True
 
     def __init__(self, law: FlowLaw, density: float):
         self.law, self.density = law, float(density)
+        self.traced = jax.device_put(law.reversed())
 
-    def load(self, mid: tuple, new: tuple, step: Step, speed: float | None = None) -> Load:
-        """Fluid of a step but for its force.
+    @property
+    def compressed(self) -> bool:
+        """True where steps take the difference of `SECOND_ORDER`."""
+        return self.law.compressed
 
-        Parameters
-        ----------
-        mid, new : pairs of (m,) arrays
-            Areas and their rates where the equations are met and at the end of the step.
-        step : Step
-        speed : float, optional
-            Inlet velocity at the end, m/s; by default the one at which the outlet pressure vanishes.
+    @property
+    def quiet_inward(self) -> bool:
+        """True for a gas, which is soft: steps with inward flow need no numerical damping."""
+        return self.law.is_soft(self.density)
+
+    def parameters(self, inlet: float) -> dict[str, float]:
+        """Parameters of the law under an inlet pressure, Pa."""
+        return self.law.values({"inlet": inlet, "density": self.density})
+
+    def momenta(self, speed: np.ndarray) -> np.ndarray:
+        """Momentum per density and area of the fluid between stations (m - 1,), m2/s."""
+        return 0.5 * self.law.step * (speed[1:] + speed[:-1])
+
+    def step(self, old: FluidState, passage: tuple, h: float, theta: float, rate: float, inlet: float) -> FluidStep:
+        """A step of length h, s, from a state in a passage of areas and rates, with the inlet pressure, Pa, at its
+        share theta, and the weight of new rates there.
         """
-        raise NotImplementedError
+        return FluidStep(self, old, h, theta, rate, inlet)
 
-    def load_slopes(self, mid: tuple, new: tuple, load: Load, theta: float, velocity: float, psi_weight: float):
-        """Derivatives of its pressures by the new areas (m, m) and, if it is an unknown, the new inlet velocity (m,).
+    def instant(self, state: FluidState, inlet: float) -> FluidInstant:
+        """A step of no length at a state."""
+        return FluidInstant(self, state, inlet)
 
-        Parameters
-        ----------
-        theta, psi_weight : float
-            See `Step`.
-        velocity : float
-            Derivative of the area rates with respect to the areas at the end of the step, 1/s.
+    def steady_inner(self, area: np.ndarray, inlet: float) -> np.ndarray:
+        """Unknowns (l,) of a steady flow; those of a fluid at rest without pressure where there is none."""
+        found = self.law.steady_inner(area, self.parameters(inlet))
+        return found if np.isfinite(found).all() else np.zeros(self.law.inner)
+
+    def speeds(self, area, area_rate, inner) -> np.ndarray:
+        """Speeds (m,) at the stations, m/s."""
+        return np.array(_speeds(self.traced, self.parameters(0.0), area, area_rate, inner))
+
+    def operators(self, area, area_rate, inner, inlet: float):
+        """`sources` (m + l,) and derivatives of `held` by areas, rates (m + l, m) and unknowns (m + l, l), all in Pa
+        but for rates.
         """
-        raise NotImplementedError
+        found = _operators(self.traced, self.parameters(inlet), area, area_rate, inner)
+        return tuple(np.asarray(part) for part in found)
 
-    def speeds(self, area: np.ndarray, rate: np.ndarray, state) -> np.ndarray:
-        """Speeds (m,) of the fluid in a state, m/s, in its passage; zeros where they are none of the unknowns."""
-        return np.zeros(self.law.count)
+    def moving(self, passage: tuple, acceleration, inner, inlet: float) -> FluidState:
+        """State with unknowns (l,) in a passage of areas and rates (m,) that accelerates so (m,), m2/s2, with the rates
+        that the equations ask for.
+        """
+        inner, m = np.asarray(inner, float), self.law.count
+        sources, by_area, by_rate, by_inner = self.operators(*passage, inner, inlet)
+        known = sources + by_area @ passage[1] + by_rate @ acceleration
+        inner_rate = np.linalg.lstsq(by_inner[m:], -known[m:], rcond=None)[0]
+        rate = known - sources + by_inner @ inner_rate
+        if self.compressed:  # some equations contain no rates
+            rate = np.append(np.zeros(m), np.where(np.any(by_inner[m:] != 0.0, axis=1), -sources[m:], 0.0))
+        motion = FlowMotion(*passage, np.asarray(acceleration, float), inner, inner_rate)
+        found = _first(self.traced, self.parameters(inlet), motion)
+        held, scales, speed, faster, carried = (np.asarray(part) for part in found)
+        own = inner, held, rate / scales, *passage, speed
+        return FluidState(*own, self.momenta(faster), carried, np.zeros(len(self.law.book_names)))
 
-    def momenta(self, psi: np.ndarray, speed: np.ndarray) -> np.ndarray:
-        """Momentum per density and area of the fluid between stations (m - 1,), m2/s, by psi and the speeds."""
-        return -np.diff(psi)
+    def energies(self, area, inner) -> dict[str, float]:
+        """Energies of the fluid by name, J of the part."""
+        if not self.law.energy_names:
+            return {}
+        found = _energies(self.traced, self.parameters(0.0), area, inner)
+        return dict(zip(self.law.energy_names, map(float, found), strict=True))
 
-    def waves(self, inlet_area: float):
-        """Equations of an elastic line for the part's area of the inlet, m2; None without one."""
-        return None
-
-    def begin_step(self, passage: tuple, state, h: float, inlet: float) -> None:
-        """A step of h, s, starts from a state with areas and their rates."""
-
-    def at_an_instant(self) -> StepFluid:
-        """Fluid that the accelerations of an instant are found with."""
-        return self
+    def readings(self, area, inner) -> tuple[float, float, float]:
+        """Mass flows at outlet and inlet, kg/s of the part, and the largest Mach number, of a compressed fluid."""
+        return tuple(float(x) for x in _readings(self.traced, self.parameters(0.0), area, inner))
 
 
-class SteadyFluid(StepFluid):
+class FluidStep:
+    """A step of a fluid; see `MovingFluid.step`."""
+
+    def __init__(self, fluid: MovingFluid, old: FluidState, h: float, theta: float, rate: float, inlet: float):
+        self.fluid, self.old, self.h, self.theta, self.rate, self.inlet = fluid, old, h, theta, rate, inlet
+        known = (1.0 - rate) * old.rate - (rate / h) * old.held
+        self.parameters, *scheme = jax.device_put((fluid.parameters(inlet), old.inner, theta, rate / h, known))
+        self._scheme = tuple(scheme)
+        self._start = old.inner
+
+    def at(self, mid: tuple, new: tuple) -> Flow:
+        """Flow in a passage of areas and rates (m,) where the equations are met and at the end; not numbers where there
+        is none.
+        """
+        law, given = self.fluid.traced, (self.parameters, mid, new, *self._scheme)
+        inner, pressure, held, speed = map(np.array, _advanced(law, *given, self._start))
+        if not np.isfinite(inner[0]):
+            inner, pressure, held, speed = map(np.array, _advanced(law, *given, self.old.inner))
+        if np.isfinite(inner[0]):
+            self._start = inner
+        return Flow(self.inlet, pressure, *new, speed, inner, held, self, mid)
+
+    def slopes(self, flow: Flow, velocity: float) -> np.ndarray:
+        """See `Flow.slopes`."""
+        given = self.parameters, flow.passage, (flow.area, flow.area_rate), *self._scheme
+        return np.array(_slopes(self.fluid.traced, *given, flow.inner, velocity))
+
+    def state(self, flow: Flow) -> FluidState:
+        """State that the step ends with."""
+        old, rate = self.old, (flow.held - self.old.held) / self.h
+        turning = self.fluid.momenta(flow.speed - old.speed) / self.h
+        new = flow.inner, flow.held, rate, flow.area, flow.area_rate, flow.speed, turning
+        if not self.fluid.law.book_names:
+            return FluidState(*new, old.carried, old.books)
+        end = Instant(flow.area, flow.area_rate, flow.inner, flow.held, rate, old.carried)
+        step = BookStep(old.instant, end, self.h, self.theta, self.rate)
+        books, carried = _books(self.fluid.traced, self.parameters, step)
+        return FluidState(*new, np.asarray(carried), old.books + np.asarray(books))
+
+
+class FluidInstant:
+    """A fluid at one instant, its state known."""
+
+    def __init__(self, fluid: MovingFluid, state: FluidState, inlet: float):
+        self.fluid, self._state, self.inlet, self.parameters = fluid, state, inlet, fluid.parameters(inlet)
+
+    def at(self, mid: tuple, new: tuple) -> Flow:
+        """The flow in the passage (areas, rates) of the state."""
+        state, given = self._state, (self.parameters, mid, new, self._state.inner, 1.0, 0.0, self._state.rate)
+        pressure = np.array(_pressures(self.fluid.traced, *given, state.inner))
+        return Flow(self.inlet, pressure, *new, state.speed, state.inner, state.held, self, mid)
+
+    def state(self, flow: Flow) -> FluidState:
+        """The state."""
+        return self._state
+
+
+class SteadyFluid(MovingFluid):
     """The steady law at every instant."""
 
     moves = False
 
-    def load(self, mid, new, step, speed=None):
-        law, inlet, area = self.law, step.inlet, new[0]
-        speed = law.inlet_velocity(area, inlet, self.density) if inlet > law.back else 0.0
-        zero = np.zeros(law.count)
-        pressure = law.steady_pressure(mid[0], inlet)
-        return Load(None, 0.0, pressure, area, law.velocities(area, speed), zero, zero, inlet, speed)
+    def __init__(self, law: FlowLaw, density: float):
+        self.law, self.density = law, float(density)
 
-    def load_slopes(self, mid, new, load, theta, velocity, psi_weight):
-        return theta * self.law.steady_operator(mid[0], load.inlet)[1], None
+    compressed = False
+
+    def step(self, old, passage, h, theta, rate, inlet) -> SteadyFlow:
+        return SteadyFlow(self, theta, inlet)
+
+    def instant(self, state, inlet) -> SteadyFlow:
+        return SteadyFlow(self, 1.0, inlet)
+
+    def momenta(self, speed):
+        return np.zeros(self.law.count - 1)
 
 
-class FrozenFluid(StepFluid):
+class SteadyFlow:
+    """Steady flow under an inlet pressure, Pa, in the passage at the share theta of a step."""
+
+    def __init__(self, fluid: SteadyFluid, theta: float, inlet: float):
+        self.fluid, self.theta, self.inlet = fluid, theta, inlet
+
+    def at(self, mid: tuple, new: tuple) -> Flow:
+        """The flow; see `FluidStep.at`."""
+        law, area = self.fluid.law, new[0]
+        velocity = law.inlet_velocity(area, self.inlet, self.fluid.density) if self.inlet > law.back else 0.0
+        pressure = law.steady_pressure(mid[0], self.inlet)
+        none, speed = np.zeros(law.count + law.inner), law.velocities(area, velocity)
+        return Flow(self.inlet, pressure, *new, speed, np.array([velocity]), none, self, mid)
+
+    def slopes(self, flow: Flow, velocity: float) -> np.ndarray:
+        """See `Flow.slopes`."""
+        return self.theta * self.fluid.law.steady_operator(flow.passage[0], self.inlet)[1]
+
+    def state(self, flow: Flow) -> FluidState:
+        """State without any rates."""
+        turning, none = np.zeros(len(flow.area) - 1), np.zeros(0)
+        own = flow.inner, flow.held, flow.held, flow.area, flow.area_rate, flow.speed
+        return FluidState(*own, turning, none, none)
+
+
+class FrozenFluid(MovingFluid):
     """The thesis's coupling (App. A), for comparison: the fluid first, in the passage of the last state, then the wall
     under its pressures.
 
     The inlet velocity takes a backward difference in the areas of the last state; the pressures act on the wall as it
     moves, but are not changed by it.
-
-    Parameters
-    ----------
-    fluid : StepFluid
-        That is advanced.
     """
 
     moves = False
 
-    def __init__(self, fluid: StepFluid):
-        super().__init__(fluid.law, fluid.density)
-        self._fluid, self._kept = fluid, None
-
-    def begin_step(self, passage, state, h, inlet):
-        self._kept = self._fluid.load(passage, passage, Step(1.0, state.speed, 1.0 / h, -state.psi / h, inlet))
-
-    def load(self, mid, new, step, speed=None):
-        if self._kept is None:
-            return SteadyFluid(self.law, self.density).load(mid, new, step)
-        return replace(self._kept, outlet=0.0, inlet=step.inlet)
-
-    def load_slopes(self, mid, new, load, theta, velocity, psi_weight):
-        return np.zeros((self.law.count, self.law.count)), None
-
-    def at_an_instant(self):
-        self._kept = None
-        return self._fluid
+    def step(self, old, passage, h, theta, rate, inlet) -> FrozenStep:
+        return FrozenStep(FluidStep(self, old, h, 1.0, 1.0, inlet), passage)
 
 
-@dataclass(frozen=True)
-class FlowState:
-    """Flow at one instant.
+class FrozenStep:
+    """A step in the passage that it begins in."""
 
-    Attributes
-    ----------
-    speed : (m,) array
-        Velocities at the stations, m/s, from outlet to inlet.
-    psi : (m,) array
-        m2/s.
-    lost : (m,) array or 0
-        Heads that terms of the law take, m2/s2.
-    """
+    def __init__(self, step: FluidStep, passage: tuple):
+        self._step, self._flow = step, step.at(passage, passage)
 
-    speed: np.ndarray
-    psi: np.ndarray
-    lost: np.ndarray | float = 0.0
+    def at(self, mid: tuple, new: tuple) -> Flow:
+        """The flow, whatever the passage."""
+        found = self._flow
+        return Flow(found.inlet, found.pressure, *new, found.speed, found.inner, found.held, self, mid)
 
+    def slopes(self, flow: Flow, velocity: float) -> np.ndarray:
+        """None."""
+        return np.zeros((len(flow.area), len(flow.area)))
 
-class MovingFluid(StepFluid):
-    """Flow through a channel whose areas move; it may run backwards, as a whole or in a part of the valve.
-
-    Parameters
-    ----------
-    channel : Channel
-    density : float, kg/m3
-    """
-
-    eliminated = False
-
-    def __init__(self, channel: FlowLaw, density: float):
-        super().__init__(channel, density)
-        self.channel = channel
-        count = channel.count
-        self._upstream = np.zeros((count, count))
-        for k in range(count):
-            self._upstream[k, k:-1] += 0.5 * channel.step[k:]
-            self._upstream[k, k + 1 :] += 0.5 * channel.step[k:]
-        self._bow = np.zeros((count, count))
-        if channel.bowed:
-            self._bow = np.asarray(jax.vmap(lambda speed: wall_share(channel.step, speed), 1, 1)(np.eye(count)))
-        self._momentum = self._upstream + self._bow
-        self._parameters = channel.values({"inlet": 0.0, "density": self.density})
-
-    def _open(self, area: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Open area with first and second derivative; see `dbvfiv.flow.law.above_floor`."""
-        floor = self.channel.floor
-        x = area / floor - 1.0
-        rise = np.exp(-np.abs(x))
-        softplus = np.maximum(x, 0.0) + np.log1p(rise)
-        slope = np.where(x >= 0, 1.0, rise) / (1.0 + rise)
-        return floor * (1.0 + softplus), slope, slope * (1.0 - slope) / floor
-
-    def open_area(self, area: np.ndarray) -> np.ndarray:
-        """Areas (m,) that the fluid sees: they stay above the channel's floor."""
-        return self._open(area)[0]
-
-    def _terms(self, area, rate, velocity: float) -> tuple[np.ndarray, np.ndarray]:
-        """Heads and momenta (m,) that the terms add."""
-        head, momentum = _term_values(self.channel, self._parameters, area, rate, float(velocity))
-        return np.asarray(head), np.asarray(momentum)
-
-    def _term_slopes(self, area, rate, velocity: float):
-        """Their derivatives by areas (m, m), rates (m, m) and inlet velocity (m,): three of each."""
-        parts = _term_slopes(self.channel, self._parameters, area, rate, float(velocity))
-        return tuple(tuple(np.asarray(part) for part in one) for one in parts)
-
-    def state(self, area: np.ndarray, rate: np.ndarray, velocity: float) -> FlowState:
-        """Flow for areas and their rates (m,) and the inlet velocity."""
-        open_, slope, _ = self._open(area)
-        discharge = open_[-1] * velocity
-        if self.channel.storage:
-            discharge = discharge - self.channel.storage * (self._upstream @ (slope * rate))
-        speed = discharge / open_
-        psi = self.integrate(speed)
-        if not self.channel.terms:
-            return FlowState(speed, psi)
-        lost, momentum = self._terms(area, rate, velocity)
-        return FlowState(speed, psi + momentum, lost)
-
-    def load(self, mid, new, step, speed=None):
-        if speed is None:
-            speed = self._velocity(mid, new, step)
-        mid_speed = step.speed + step.theta * (speed - step.speed)
-        flow = self.state(*new, speed)
-        psi_rate = step.psi_weight * flow.psi + step.psi_known
-        flange, slope, line = self.flange(step, mid_speed)
-        p = self.pressure(self.state(*mid, mid_speed), psi_rate, flange)
-        outlet, p[0] = float(p[0]), 0.0
-        return Load(None, outlet, p, new[0], flow.speed, flow.psi, psi_rate, step.inlet, mid_speed, line, slope)
-
-    def _velocity(self, mid: tuple, new: tuple, step: Step) -> float:
-        """Inlet velocity at the end of a step, m/s, at which the outlet pressure vanishes."""
-        known = step.speed, step.theta, step.psi_weight, float(step.psi_known[0])
-        return self.velocity(mid, new, step.inlet, *known)
-
-    def flange(self, step: Step, velocity: float) -> tuple[float, float, Any]:
-        """Static pressure at the flange, Pa, its derivative by the inlet velocity, where the equations are met, and an
-        elastic line at the end of the step.
-        """
-        return step.inlet, 0.0, None
-
-    def load_slopes(self, mid, new, load, theta, velocity, psi_weight):
-        speeds = load.mid_speed, load.speed[-1]
-        by_area, by_speed = self.pressure_slopes(mid, new, *speeds, theta, velocity, psi_weight)
-        return by_area, by_speed + theta * load.flange_slope
-
-    def speeds(self, area, rate, state):
-        return self.state(area, rate, state.speed).speed
-
-    def velocity(
-        self, mid: tuple, new: tuple, inlet: float, old: float, theta: float, psi_weight: float, psi_known: float
-    ) -> float:
-        """New inlet velocity at which the outlet pressure vanishes; not a number if there is none.
-
-        Outwards and without terms the pressure is quadratic in the velocity; the root is taken at which more velocity
-        means less pressure. Where a speed would be inward there, and with terms, the root is the one next to the old
-        velocity, in the direction in which that misses it.
-
-        Parameters
-        ----------
-        mid, new : pairs of (m,) arrays
-            Areas and their rates where the equations are met and at the end of the step.
-        old : float
-            Inlet velocity at the start of the step.
-        theta : float
-            Where in the step the equations are met.
-        psi_weight, psi_known : float
-            There, d psi/dt = psi_weight psi + psi_known at the outlet, psi at the end of the step.
-        """
-        if self.channel.terms:
-            return self._searched(mid, new, inlet, old, theta, psi_weight, psi_known)
-        s0, s1 = self._affine(*mid)
-        p0, p1 = (self._upstream[0] @ part for part in self._affine(*new))
-        start = (1.0 - theta) * old
-        a = 0.5 * (s1[0] * s1[0] - 1.0)
-        b = s0[0] * s1[0] + psi_weight * p1 / theta
-        c = 0.5 * s0[0] * s0[0] + psi_weight * (p0 - p1 * start / theta) + psi_known - self._driving(inlet)
-        square = b * b - 4.0 * a * c
-        if square >= 0.0:
-            root = np.sqrt(square)
-            mean = -2.0 * c / (b + root) if b >= 0.0 else (root - b) / (2.0 * a)
-            outward = float((mean - start) / theta)
-            if np.min(s0 + (start + theta * outward) * s1) >= 0.0:
-                return outward
-        return self._searched(mid, new, inlet, old, theta, psi_weight, psi_known)
-
-    def _searched(self, mid, new, inlet, old, theta, psi_weight, psi_known, supply=None) -> float:
-        """New inlet velocity at which the outlet pressure vanishes, next to the old one in the direction in which that
-        misses it; arguments as `velocity` has them.
-
-        With a `supply`, which is anything with the method `at` of `dbvfiv.flow.line_stepping.LineStep`, the pressure at
-        the flange follows from the velocity there, and `inlet` comes on top.
-        """
-        still, unit = self._affine(*mid)
-        start = (1.0 - theta) * old  # the velocity where the equations are met is start + theta times the new one
-        p0, p1 = (float(part) for part in self.integrate(np.stack(self._affine(*new), axis=1))[0])
-        rise = psi_weight * p1 / theta
-        known = psi_weight * (p0 - p1 * start / theta) + psi_known - self._driving(inlet)
-
-        def missing(u: float) -> tuple[float, float]:
-            speed = still + u * unit
-            value = float(self.head(speed)[0]) + rise * u + known
-            slope = float(self.head_slope(speed, unit)[0]) + rise
-            if self.channel.terms:
-                end = (u - start) / theta
-                value += self._terms(*mid, u)[0][0] + psi_weight * self._terms(*new, end)[1][0]
-                slope += self._term_slopes(*mid, u)[0][2][0]
-                slope += psi_weight * self._term_slopes(*new, end)[1][2][0] / theta
-            if supply is not None:
-                head, rise_of_head = supply.at(u)
-                value += 0.5 * u * u - head
-                slope += u - rise_of_head
-            return value, slope
-
-        return (_zero(missing, old) - start) / theta
-
-    def _affine(self, area: np.ndarray, rate: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Speeds at rest and per unit of inlet velocity (m,)."""
-        open_, slope, _ = self._open(area)
-        still = np.zeros_like(area)
-        if self.channel.storage:
-            still = -self.channel.storage * (self._upstream @ (slope * rate)) / open_
-        return still, open_[-1] / open_
-
-    def pressure(self, flow: FlowState, psi_rate: np.ndarray, inlet: float) -> np.ndarray:
-        """Pressures (m,), Pa; the first, at the outlet, is to vanish."""
-        channel = self.channel
-        return inlet - channel.back - self.density * (self._whole_head(flow) + psi_rate) + channel.static
-
-    def _driving(self, inlet: float) -> float:
-        """Driving pressure over density, m2/s2."""
-        return (inlet - self.channel.back) / self.density
-
-    def _whole_head(self, flow: FlowState) -> np.ndarray:
-        head = self.head(flow.speed)
-        return head + flow.lost if self.channel.terms else head
-
-    def head(self, speed: np.ndarray) -> np.ndarray:
-        """Velocity head between the inlet and each station (m,), m2/s2, of speeds (m,): pressure over density."""
-        if speed.min() >= 0.0:
-            return 0.5 * (speed * speed - speed[-1] ** 2)
-        out, back = np.maximum(speed, 0.0), np.minimum(speed, 0.0)
-        head = 0.5 * (out * out - out[-1] ** 2)
-        head[:-1] -= 0.5 * _upstream(np.maximum(np.diff(back * back), 0.0))
-        head[0] -= 0.5 * back[0] ** 2  # what stands for the outlet is the still water outside
-        return head
-
-    def head_slope(self, speed: np.ndarray, change: np.ndarray) -> np.ndarray:
-        """Its derivative along changes (m,) or (m, l) of the speeds."""
-        out = np.maximum(speed, 0.0)
-        slope = (out * change.T).T
-        slope -= slope[-1]
-        if speed.min() >= 0.0:
-            return slope
-        back = np.minimum(speed, 0.0)
-        gains = ((np.diff(back * back) > 0.0) * np.diff(back * change.T)).T
-        slope[:-1] -= _upstream(gains)
-        slope[0] -= back[0] * change[0]
-        return slope
-
-    def slopes(self, area: np.ndarray, rate: np.ndarray, velocity: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Derivatives of the speeds with respect to areas (m, m), area rates (m, m) and inlet velocity (m,)."""
-        open_, slope, bend = self._open(area)
-        speed = self.state(area, rate, velocity).speed
-        by_area = -np.diag(speed * slope / open_)
-        by_area[:, -1] += slope[-1] * velocity / open_
-        by_rate = np.zeros_like(by_area)
-        if self.channel.storage:
-            share = self.channel.storage * self._upstream / open_[:, None]
-            by_area -= share * (bend * rate)
-            by_rate -= share * slope
-        return by_area, by_rate, open_[-1] / open_
-
-    def psi_slopes(self, area, rate, velocity: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Derivatives of psi with respect to areas (m, m), area rates (m, m) and inlet velocity (m,)."""
-        found = tuple(self.integrate(slope) for slope in self.slopes(area, rate, velocity))
-        if not self.channel.terms:
-            return found
-        return tuple(own + more for own, more in zip(found, self._term_slopes(area, rate, velocity)[1]))
-
-    def integrate(self, values: np.ndarray) -> np.ndarray:
-        """Integral from the inlet to each station of speeds (m,) or of each column (m, l), as the wall feels it."""
-        return self._momentum @ values
-
-    def momenta(self, psi: np.ndarray, speed: np.ndarray) -> np.ndarray:
-        """Momentum per density and area of the fluid between stations (m - 1,), m2/s, by psi and the speeds; without
-        what a bow of psi, which the wall feels, takes from one section and gives to the next.
-        """
-        return -np.diff(psi - self._bow @ speed)
-
-    def pressure_slopes(
-        self, mid: tuple, new: tuple, speed: float, new_speed: float, theta: float, velocity: float, psi_weight: float
-    ):
-        """Derivatives of the pressures with respect to the new areas (m, m) and the new inlet velocity (m,).
-
-        Parameters
-        ----------
-        mid, new, theta, psi_weight
-            As `velocity` has them.
-        speed, new_speed : float
-            Inlet velocities where the equations are met and at the end of the step.
-        velocity : float
-            Derivative of the area rates with respect to the areas at the end of the step, 1/s.
-        """
-        here = self.state(*mid, speed).speed
-        area, rate, own = self.slopes(*mid, speed)
-        by_area = theta * self.head_slope(here, area + velocity * rate)
-        by_speed = theta * self.head_slope(here, own)
-        if self.channel.terms:
-            area, rate, own = self._term_slopes(*mid, speed)[0]
-            by_area, by_speed = by_area + theta * (area + velocity * rate), by_speed + theta * own
-        area, rate, own = self.slopes(*new, new_speed)
-        by_area += psi_weight * self.integrate(area + velocity * rate)
-        by_speed += psi_weight * self.integrate(own)
-        if self.channel.terms:
-            area, rate, own = self._term_slopes(*new, new_speed)[1]
-            by_area, by_speed = by_area + psi_weight * (area + velocity * rate), by_speed + psi_weight * own
-        return -self.density * by_area, -self.density * by_speed
+    def state(self, flow: Flow) -> FluidState:
+        """See `FluidStep.state`."""
+        return self._step.state(flow)
 
 
-def _upstream(values: np.ndarray) -> np.ndarray:
-    """Sums of values (m, ...) from each station to the inlet."""
-    return np.cumsum(values[::-1], axis=0)[::-1]
+# -- compiled
+# ----
 
 
-def _term_parts(channel, parameters, area, rate, velocity):
-    speed = channel.speeds(area, rate, velocity, parameters["storage"])
-    stream = channel.stream(area, rate, speed, velocity[None])
-    return channel.term_heads(stream, parameters), channel.term_momenta(stream, parameters)
+def _values(law, parameters, mid, new, old, theta, weight, known, inner):
+    """Pressures and residuals (m + l,), Pa, of unknowns (l,) at the end of a step."""
+    here = old + theta * (inner - old)
+    found = law.sources(*mid, here, parameters) + weight * law.held(*new, inner, parameters) + known
+    return law.scales(new[0], parameters) * found
 
 
 @jax.jit
-def _term_values(channel, parameters, area, rate, velocity):
-    return _term_parts(channel, parameters, area, rate, jax.numpy.asarray(velocity))
+def _pressures(law, *given):
+    return _values(law, *given)[: law.count]
 
 
 @jax.jit
-def _term_slopes(channel, parameters, area, rate, velocity):
-    return jax.jacfwd(_term_parts, argnums=(2, 3, 4))(channel, parameters, area, rate, jax.numpy.asarray(velocity))
+def _advanced(law, parameters, mid, new, old, theta, weight, known, start):
+    """Unknowns (l,), pressures (m,), what is held (m + l,) and speeds (m,); not numbers where none are found."""
+    values = partial(_values, law, parameters, mid, new, old, theta, weight, known)
+    residual = lambda inner: values(inner)[law.count :]  # noqa: E731
+    inner = _next_root(residual, start) if law.inner == 1 else _newton(residual, start)
+    held = law.held(*new, inner, parameters)
+    return inner, values(inner)[: law.count], held, law.speeds_of(*new, inner, parameters)
 
 
-#: Inlet velocity, m/s, beyond which no zero is looked for.
-_RUNAWAY = 1e12
+def _newton(residual, start):
+    """Zero (l,) by Newton's method, a step halved as long as the next one by it is longer."""
+
+    def step_at(inner):
+        return -jnp.linalg.solve(jax.jacfwd(residual)(inner), residual(inner))
+
+    def longer(tried):
+        fraction, inner, step, _, after = tried
+        return (fraction > 1e-3) & ~(jnp.linalg.norm(after) <= jnp.linalg.norm(step))
+
+    def halved(tried):
+        fraction, inner, step, _, _ = tried
+        there = inner + 0.5 * fraction * step
+        return 0.5 * fraction, inner, step, there, step_at(there)
+
+    def small(inner, step, share):
+        return jnp.linalg.norm(step) <= share * jnp.linalg.norm(inner) + _SMALLEST
+
+    def advance(carried):
+        inner, step, count, _ = carried
+        there = inner + step
+        tried = jax.lax.while_loop(longer, halved, (jnp.ones(()), inner, step, there, step_at(there)))
+        stays = small(there, step, _ROUNDING) & ~(jnp.linalg.norm(tried[4]) <= 0.5 * jnp.linalg.norm(step))
+        return tried[3], tried[4], count + 1, stays
+
+    def goes_on(carried):
+        inner, step, count, stays = carried
+        return (count < _STEPS) & ~stays & ~small(inner, step, _TOLERANCE)
+
+    inner, step, _, stays = jax.lax.while_loop(goes_on, advance, (start, step_at(start), 0, False))
+    return jnp.where(stays | small(inner, step, _TOLERANCE), inner + step, jnp.nan)
 
 
-def _zero(function, start: float) -> float:
-    """Zero of a function that grows from minus to plus infinity, next to a start; `function` returns value and slope.
-    Not a number if there is none.
+def _next_root(residual, start):
+    """Zero (1,) of a function that falls from plus to minus infinity, next to a start; not a number if there is none.
 
     Newton's method within a bracket, bisection where it leaves it or slackens.
     """
-    value, _ = function(start)
-    if value == 0.0 or not np.isfinite(value):
-        return start if value == 0.0 else np.nan
-    far, reach = start, -np.sign(value) * max(1e-3, 0.1 * abs(start))
-    while function(far)[0] * value > 0.0:
-        far, reach = far + reach, 2.0 * reach
-        if not abs(far) < _RUNAWAY:
-            return np.nan
-    low, high = (far, start) if value > 0.0 else (start, far)
-    u, last = start, high - low
-    for _ in range(200):
-        value, slope = function(u)
-        if value == 0.0:
-            return u
-        low, high = (low, u) if value > 0.0 else (u, high)
-        step = -value / slope if slope else np.inf
-        if not (low <= u + step <= high and abs(step) <= 0.5 * abs(last)):
-            step = 0.5 * (low + high) - u
-        if u + step == u:
-            break
-        u, last = u + step, step
-    return u
+
+    def at(u):
+        value, slope = jax.jvp(lambda x: -residual(x[None])[0], (u,), (jnp.ones_like(u),))
+        return value, slope
+
+    def further(carried):
+        far, reach, _ = carried
+        return far + reach, 2.0 * reach, at(far + reach)[0]
+
+    first = start[0]
+    value = jax.lax.optimization_barrier(at(first)[0])  # computed twice, its sign could differ where it is rounding
+    reach = jnp.where(value > 0.0, -1.0, 1.0) * jnp.maximum(1e-3, 0.1 * jnp.abs(first))
+    away = lambda c: (c[2] * value > 0.0) & (jnp.abs(c[0]) < _RUNAWAY)  # noqa: E731
+    far, _, end = jax.lax.while_loop(away, further, (first + reach, reach, at(first + reach)[0]))
+    low, high = jnp.where(value > 0.0, far, first), jnp.where(value > 0.0, first, far)
+
+    def advance(carried):
+        u, last, low, high, count, _ = carried
+        here, slope = at(u)
+        low, high = jnp.where(here > 0.0, low, u), jnp.where(here > 0.0, u, high)
+        step = jnp.where(slope == 0.0, jnp.inf, -here / jnp.where(slope == 0.0, 1.0, slope))
+        inside = (low <= u + step) & (u + step <= high) & (jnp.abs(step) <= 0.5 * jnp.abs(last))
+        step = jnp.where(here == 0.0, 0.0, jnp.where(inside, step, 0.5 * (low + high) - u))
+        return u + step, step, low, high, count + 1, u + step == u
+
+    begin = first, high - low, low, high, 0, value == 0.0
+    u, *_ = jax.lax.while_loop(lambda c: (c[4] < 200) & ~c[5], advance, begin)
+    found = jnp.isfinite(value) & (end * value <= 0.0)
+    return jnp.where(found, u, jnp.nan)[None]
+
+
+@jax.jit
+def _slopes(law, parameters, mid, new, old, theta, weight, known, inner, velocity):
+    """Total derivatives (m, m) of the pressures by the new areas, whose rates follow them."""
+
+    def shifted(change, x):
+        there = mid[0] + theta * change, mid[1] + theta * velocity * change
+        end = new[0] + change, new[1] + velocity * change
+        return _values(law, parameters, there, end, old, theta, weight, known, x)
+
+    by_area, by_inner = jax.jacfwd(shifted, (0, 1))(jnp.zeros(law.count), inner)
+    m = law.count
+    return by_area[:m] - by_inner[:m] @ jnp.linalg.solve(by_inner[m:], by_area[m:])
+
+
+@jax.jit
+def _operators(law, parameters, area, area_rate, inner):
+    scales = law.scales(area, parameters)
+    held = jax.jacfwd(lambda a, r, x: law.held(a, r, x, parameters), (0, 1, 2))(area, area_rate, inner)
+    return scales * law.sources(area, area_rate, inner, parameters), *(scales[:, None] * part for part in held)
+
+
+@jax.jit
+def _first(law, parameters, motion):
+    """What is held (m + l,), scales, speeds and their rates (m,), and what the first step's energies need."""
+    area, rate, acceleration, inner, inner_rate = motion
+    carried = law.first_carried(motion, parameters)
+    speeds = lambda *at: law.speeds_of(*at, parameters)  # noqa: E731
+    speed, faster = jax.jvp(speeds, (area, rate, inner), (rate, acceleration, inner_rate))
+    held = law.held(area, rate, inner, parameters)
+    return held, law.scales(area, parameters), speed, jnp.zeros_like(speed) if law.compressed else faster, carried
+
+
+@jax.jit
+def _speeds(law, parameters, area, area_rate, inner):
+    return law.speeds_of(area, area_rate, inner, parameters)
+
+
+@jax.jit
+def _books(law, parameters, step):
+    return law.step_books(step, parameters)
+
+
+@jax.jit
+def _energies(law, parameters, area, inner):
+    return law.energies(area, inner, parameters)
+
+
+@jax.jit
+def _readings(law, parameters, area, inner):
+    return law.readings(area, inner, parameters)

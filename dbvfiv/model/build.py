@@ -85,16 +85,19 @@ def build_flow(case: Case, mesh: ValveMesh) -> FlowLaw:
     given = {"back": case.downstream.pressure, "perimeter": mesh.perimeter, "density": case.fluid.density}
     given |= _levels(case, mesh)
     bowed = case.mesh.inertia == "parabolic"
-    rigid = Channel(mesh.z, floor, storage, case.fluid.unsteady, terms, bowed=bowed, **given)
-    if case.is_compressed:
-        channel = Channel(mesh.z, floor, storage, case.fluid.unsteady, terms, reversible=True, **given)
-        return GasChannel(channel, case.fluid.sound_speed, case.fluid.heat_capacity_ratio, case.boiling_pressure)
+
+    def passage(terms) -> Channel | GasChannel:
+        own = {"reversible": True} if case.is_compressed else {"bowed": bowed}
+        found = Channel(mesh.z, floor, storage, case.fluid.unsteady, terms, **own, **given)
+        if not case.is_compressed:
+            return found
+        return GasChannel(found, case.fluid.sound_speed, case.fluid.heat_capacity_ratio, case.boiling_pressure)
+
     if not case.has_waves:
-        return rigid
+        return passage(terms)
     line = next(term for term in terms if isinstance(term, (Line, PiecedLine)))
     pump = next((term for term in terms if isinstance(term, Pump)), None)
     rest = [term for term in terms if term not in (line, pump)]
-    channel = Channel(mesh.z, floor, storage, terms=rest, bowed=bowed, **given)
     pipes = case.upstream.pipes
     waves = ElasticLine(line, [pipe.wave_speed for pipe in pipes], [pipe.elements for pipe in pipes], pump)
-    return LineChannel(channel, rigid, waves)
+    return LineChannel(passage(rest), passage(terms), waves)

@@ -327,7 +327,7 @@ def operating_pressure(model: ValveModel, observer: Observer | None = None) -> f
         if pressure not in known:
             observer.progress(f"looking for the operating point at {pressure:.6g} Pa")
             known[pressure] = path.go_to(pressure).volume_flow
-        return pressure - density * GRAVITY * pump.head_and_slope(known[pressure])[0]
+        return pressure - density * GRAVITY * float(pump.curve(known[pressure]))
 
     unit = density * GRAVITY
     top = unit * float(pump.heads.max())

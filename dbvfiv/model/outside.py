@@ -34,14 +34,16 @@ import scipy.sparse.linalg as spla
 from eigen import CoupledPencil, NotConvergedError, NotPositiveError, SingularShiftError, Workspace, largest_pairs
 
 from ..case.model import Case
+from ..case.part import QUARTER, Part
 from ..errors import CaseError, SolveError
 from ..flow.outside import BODY, ROOM, Impedance, Panels, PotentialFlow, Surroundings
 from ..flow.outside.surfaces import arc, end_face, extruded, pipe, ring_face, stretched, strip
 from ..geometry import ValveMesh
 from ..shell import Shell
 from ..shell.face import OuterFace
+from .symmetry import equilibria_of
 
-#: Motions kept of the added mass.
+#: Motions kept of the added mass of a quarter.
 KEPT = 30
 #: Motions that are looked for together, and how well they are told. What is kept of the added mass is exact on them
 #: whatever they are; an error of 1e-3 moves eigenvalues by less than 1e-8 of themselves.
@@ -120,8 +122,8 @@ class OutsideFluid:
     """
 
     def __init__(self, case: Case, mesh: ValveMesh, shell: Shell):
-        self.face = OuterFace(shell)
-        self.shell = shell
+        self.face, self.part = OuterFace(shell), mesh.part
+        self.shell, self.equilibria = shell, equilibria_of(mesh.part).name
         self._edge, self.flange_radius = mesh.rows[0], case.valve.flange_radius
         self.open_lips = case.outside.lips == "open"
         diameter = case.outside.pipe_diameter
@@ -139,7 +141,7 @@ class OutsideFluid:
         """The fluid between the wall and what stays at rest, in motions of a class."""
         if symmetry not in self._flows:
             closed = BODY if self.radius is None else ROOM
-            self._flows[symmetry] = PotentialFlow(surroundings(self._at_rest, self.radius), symmetry, closed)
+            self._flows[symmetry] = PotentialFlow(surroundings(self._at_rest, self.radius, self.part), symmetry, closed)
         return self._flows[symmetry]
 
     def _check_clearance(self, points: np.ndarray) -> str:
@@ -176,25 +178,36 @@ class OutsideFluid:
     def _inner_edge(self, outer: np.ndarray, directors: np.ndarray) -> np.ndarray:
         """Edge (k, 3) of the opening: that of the inner face, kept apart where lips touch and the side edge folds."""
         edge = outer - 2.0 * self.face.half_wall[self._edge, None] * directors[self._edge]
-        apart = SLIVER * outer[-1, 0]
-        edge[:, 1] = np.clip(edge[:, 1], np.minimum(apart, 0.5 * outer[:, 1]), outer[:, 1])
-        edge[-1, 1] = 0.0
-        steps = np.maximum(np.diff(np.clip(edge[:, 0], 0.0, outer[:, 0])), 0.1 * np.diff(outer[:, 0]))
-        edge[:, 0] = np.minimum(np.concatenate([[0.0], np.cumsum(steps)]), outer[:, 0])
+        centre = self.part.centre(len(edge))
+        sides = [slice(centre, None)] if self.part.is_quarter else [slice(centre, None), slice(centre, None, -1)]
+        for side, sign in zip(sides, (1.0, -1.0)):
+            middle = edge[centre, 0]
+            edge[side] = self._opened(edge[side], outer[side], middle, sign)
         return edge
 
-    def impedance(self, q: np.ndarray, frozen: Panels | None = None, symmetry: str = "SS") -> Impedance:
-        """S (ne, ne), 1/m, in motions of a class: see `PotentialFlow.impedance`."""
+    @staticmethod
+    def _opened(edge: np.ndarray, outer: np.ndarray, middle: float, sign: float) -> np.ndarray:
+        """A side (k, 3) of the edge from its middle outwards, with x growing in the direction of a sign."""
+        edge, own, far = edge.copy(), sign * (edge[:, 0] - middle), sign * (outer[:, 0] - middle)
+        apart = SLIVER * far[-1]
+        edge[:, 1] = np.clip(edge[:, 1], np.minimum(apart, 0.5 * outer[:, 1]), outer[:, 1])
+        edge[-1, 1] = 0.0
+        steps = np.maximum(np.diff(np.clip(own, 0.0, far)), 0.1 * np.diff(far))
+        edge[:, 0] = middle + sign * np.minimum(np.concatenate([[0.0], np.cumsum(steps)]), far)
+        return edge
+
+    def impedance(self, q: np.ndarray, frozen: Panels | None = None, symmetry: str | None = None) -> Impedance:
+        """S (ne, ne), 1/m, in motions of a class, by default that of the equilibria: see `PotentialFlow.impedance`."""
         panels = self.panels(q)
         opening = 2 * (len(self._edge) - 1) if self.open_lips else 0
-        return self._flow(symmetry).impedance(panels, len(self.shell.mesh.quads), opening, frozen)
+        return self._flow(symmetry or self.equilibria).impedance(panels, len(self.shell.mesh.quads), opening, frozen)
 
     def operator(self, q: np.ndarray) -> tuple[sp.csr_matrix, Impedance]:
         """E (ne, n), m2, and S (ne, ne), 1/m, at a state."""
         return self.face.fluxes(self.shell.dofs.expand(q)), self.impedance(q)
 
     def added_mass(
-        self, q: np.ndarray, structure: sp.csr_matrix, symmetry: str = "SS", shell: Shell | None = None
+        self, q: np.ndarray, structure: sp.csr_matrix, symmetry: str | None = None, shell: Shell | None = None
     ) -> AddedMass:
         """Added mass of unit density at a state, of the `KEPT` motions that it slows down most.
 
@@ -204,15 +217,15 @@ class OutsideFluid:
             By the unknowns of the symmetric class.
         structure : (k, k) sparse matrix
             The structure's own tangent, which says what motions are slow.
-        symmetry : {"SS", "SA", "AS", "AA"}
-            Class of the motions, whose signs the images have.
+        symmetry : str, optional
+            Class of the motions, whose signs the images have; that of the equilibria by default.
         shell : Shell, optional
             With the unknowns of that class.
         """
         face = self.face if shell is None else OuterFace(shell)
         fluxes, impedance = face.fluxes(self.shell.dofs.expand(q)), self.impedance(q, symmetry=symmetry)
-        workspace = self._workspaces.setdefault(symmetry, Workspace())
-        return leading_added_mass(fluxes, impedance, structure, KEPT, workspace)
+        workspace = self._workspaces.setdefault(symmetry or self.equilibria, Workspace())
+        return leading_added_mass(fluxes, impedance, structure, KEPT * self.part.quarters, workspace)
 
 
 def leading_added_mass(fluxes, impedance, structure, kept: int, workspace: Workspace | None = None) -> AddedMass:
@@ -253,23 +266,23 @@ def leading_added_mass(fluxes, impedance, structure, kept: int, workspace: Works
     raise SolveError("The wall's stiffness is far from positive definite; no added mass can be told from it.")
 
 
-def surroundings(grid: np.ndarray, radius: float | None) -> Surroundings:
+def surroundings(grid: np.ndarray, radius: float | None, part: Part = QUARTER) -> Surroundings:
     """Boundaries at rest around a valve: extension of its flange, and the pipe around it.
 
     Parameters
     ----------
     grid : (l, k, 3) array, m
-        Outer face at rest from the lip's row to the flange's, columns from x = 0 to y = 0.
+        Outer face at rest from the lip's row to the flange's, columns as those of the part.
     radius : float, optional
         Radius of the pipe around it, m; without one the fluid is unbounded.
     """
     contour, top = grid[-1][:, :2], float(grid[-1][:, 2].mean())
-    bore, step = float(contour[0, 1]), float(grid[-1][:, 2].mean() - grid[-2][:, 2].mean())
+    bore, step = float(np.hypot(*contour[0])), float(grid[-1][:, 2].mean() - grid[-2][:, 2].mean())
     if radius is None:
         length = 2 * TUBE * bore
         tube = extruded(contour, stretched(top, step, length))
         return Surroundings(Panels.joined(tube, end_face(contour, top + length, True)))
-    around = max(4, round(AROUND * (grid.shape[1] - 1)))
+    around = max(4, round(AROUND * (grid.shape[1] - 1) / part.quarters))
     lip = float(grid[0][:, 2].min())
     low, high = lip - 2 * OPEN_DOWN * radius, top + 2 * OPEN_UP * radius
     beside = np.linspace(lip, top, max(2, round((top - lip) / (radius * 0.5 * np.pi / around))) + 1)
@@ -277,10 +290,11 @@ def surroundings(grid: np.ndarray, radius: float | None) -> Surroundings:
     down, up = stretched(0.0, spacing, lip - low), stretched(top, spacing, high - top)
     z = np.concatenate([(lip - down)[::-1], beside[1:], up[1:]])
     tube = extruded(contour, up)
-    circle = arc(radius, np.linspace(0.5 * np.pi, 0.0, len(contour)))
-    coarse = arc(radius, np.linspace(0.5 * np.pi, 0.0, around + 1))
+    circle = arc(radius, np.linspace(part.turn, 0.0, len(contour)))
+    angles = np.linspace(part.turn, 0.0, part.quarters * around + 1)
+    coarse = arc(radius, angles)
     ends = Panels.joined(end_face(coarse, low, True), ring_face(contour, circle, high, False))
-    return Surroundings(Panels.joined(tube, pipe(radius, z, around)), ends)
+    return Surroundings(Panels.joined(tube, pipe(radius, z, angles)), ends)
 
 
 #: Motions that the derivatives are known on.

@@ -2,9 +2,9 @@
 
     M(q) a + h(q, v) + alpha M v + beta w + F + f_c - G(q) p = 0,     p_outlet = 0
 
-F is the internal force of shell and stops and w its rate. F and the flow's psi (see `dbvfiv.flow.stepping`) are kept in
-the state as quantities of first order, so that stiffness damping beta K_s(q) v = beta dF/dt is consistent with the
-tangent without an evaluation of it. f_c is the contact of inner faces, see `dbvfiv.model.supports`.
+F is the internal force of shell and stops and w its rate. F and what the flow's balances hold (`dbvfiv.flow.stepping`)
+are kept in the state as quantities of first order, so that stiffness damping beta K_s(q) v = beta dF/dt is consistent
+with the tangent without an evaluation of it. f_c is the contact of inner faces, see `dbvfiv.model.supports`.
 
 Equation (T.15) of docs/theory.md.
 """
@@ -14,9 +14,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..case.parameters import Mu
-from ..flow.gas_stepping import GasFluid, GasInstant, GasState
-from ..flow.line_stepping import LineInstant, LineState, LineWaves
-from ..flow.stepping import FrozenFluid, Load, SteadyFluid, Step, StepFluid
+from ..flow.stepping import Flow, FrozenFluid, MovingFluid, SteadyFluid
 from ..model import ValveModel
 from ..model.linear import CoupledFactor, DirectFactor
 from ..model.supports import FaceStep
@@ -43,8 +41,8 @@ class ValveMotion:
         Smallest displacement that positions resolve, m.
     wall : WallMemory or None
         What the wall remembers; None where it is elastic.
-    waves : LineWaves or None
-        Of an elastic line.
+    fluid : MovingFluid
+        The flow law in steps.
     contact : FaceContact or None
         Of the inner faces; None where the valve has stops.
     """
@@ -55,11 +53,8 @@ class ValveMotion:
         branches = model.relaxation.branches(self.mu.loss_factor)
         self.wall = WallMemory(model.shell, branches.strengths, branches.times) if branches else None
         density = self.mu.density
-        fluid = model.flow.stepping(density) if model.flow.unsteady else SteadyFluid(model.flow, density)
-        self.fluid = FrozenFluid(fluid) if staggered else fluid
-        self.moving_fluid = self.fluid.moves
-        # the flange is clamped
-        self.waves: LineWaves | None = self.fluid.waves(float(model.rows.areas(model.nodal(model.rest()))[-1]))
+        kind = SteadyFluid if not model.flow.unsteady else FrozenFluid if staggered else MovingFluid
+        self.fluid = kind(model.flow, density)
         self.size = model.size
         self.resolution = float(np.finfo(float).eps * np.abs(model.shell.mesh.nodes).max())
         self.stations = model.stations
@@ -98,7 +93,7 @@ class ValveMotion:
         """M(q) v, (n,)."""
         return self.inertia(q, np.zeros_like(v), v)
 
-    def load(self, q, v, q_new, v_new, step: Step, speed: float | None = None, fluid: StepFluid | None = None) -> Load:
+    def load(self, q, v, q_new, v_new, step) -> Flow:
         """Fluid of a step and its force.
 
         Parameters
@@ -107,16 +102,12 @@ class ValveMotion:
             Positions and velocities where the equations are met.
         q_new, v_new : (n,) arrays
             Those at the end of the step.
-        step : Step
-        speed : float, optional
-            Inlet velocity at the end, m/s; by default the one at which the outlet pressure vanishes.
-        fluid : StepFluid, optional
-            Another one than the motion's.
+        step : FluidStep or anything with its method `at`
         """
         nodal = self.model.nodal(q)
         new = self._passage(nodal if q_new is q else self.model.nodal(q_new), v_new)
         mid = new if q_new is q else self._passage(nodal, v)
-        load = (fluid or self.fluid).load(mid, new, step, speed)
+        load = step.at(mid, new)
         load.force = self.model.pressure_force(nodal, load.pressure)
         return load
 
@@ -126,19 +117,6 @@ class ValveMotion:
         area, rate = np.empty(self.stations), np.empty(self.stations)
         row_motion(rows.rows, self.model.shell.mesh.nodes, nodal, self.model.nodal(v), area, rate)
         return area + rows.offset, rate
-
-    def speeds(self, state) -> np.ndarray:
-        """Speeds (m,) of the fluid in a state, m/s; zeros where it is none of the unknowns."""
-        return self.fluid.speeds(*self._passage(self.model.nodal(state.q), state.v), state)
-
-    def momenta(self, psi: np.ndarray, speed: np.ndarray) -> np.ndarray:
-        """Momentum per density and area of the fluid between stations (m - 1,), m2/s."""
-        return self.fluid.momenta(psi, speed)
-
-    def _position(self, nodal):
-        out = nodal.copy()
-        out[:, :3] += self.model.shell.mesh.nodes
-        return out
 
     def length(self, dq: np.ndarray) -> float:
         """Largest displacement in a change (n,) of the unknowns, m; rotations count by the path of the wall's face."""
@@ -157,7 +135,7 @@ class ValveMotion:
         v_new,
         q,
         v,
-        load: Load,
+        load: Flow,
         weights: Weights,
         q_load=None,
         v_load=None,
@@ -194,10 +172,8 @@ class ValveMotion:
         values = model.follower_stiffness(nodal, weights.load * weights.theta * load.pressure, values)
         forces = weights.load * model.station_forces(nodal).data
         slope = model.rows.jacobian(nodal).data
-        mid = self._passage(nodal, v_load)
-        new = self._passage(model.nodal(q_new), v_new)
-        by_area, by_speed = self.fluid.load_slopes(mid, new, load, weights.theta, weights.velocity, weights.psi)
-        self._refactor(values, forces, slope, by_area, by_speed)
+        by_area = load.slopes(weights.velocity)
+        self._solver(0).refactor(values, forces, slope, by_area)
         self._add_outside(weights.outside)
 
     def _add_outside(self, weight: float) -> None:
@@ -207,20 +183,13 @@ class ValveMotion:
             solve = self._factor.solve_with_inner
             self._correction = self.outside.correction(lambda f, r: solve(f, none if r is None else r), weight)
 
-    def _refactor(self, values, forces, slope, by_area, by_speed):
-        """Factor with the pressures' derivatives by areas (m, m) and, if it is an unknown, the inlet velocity (m,)."""
-        if by_speed is None:
-            self._solver(0).refactor(values, forces, slope, by_area)
-            return
-        row, corner = by_area[0].copy(), by_speed[0]
-        by_area[0], by_speed[0] = 0.0, 0.0
-        self._solver(1).refactor(values, forces, slope, by_area, by_speed, row, corner)
+    def solve(self, force: np.ndarray) -> np.ndarray:
+        """Change of q (n,) that the last factored matrix gives for a force (n,)."""
+        return self._solve(force, np.zeros(self._factor.inner))[0]
 
-    def solve(self, force: np.ndarray, outlet: float) -> tuple[np.ndarray, float]:
-        """Changes of q (n,) and U that the last factored matrix gives for a force (n,) and an outlet pressure."""
+    def _solve(self, force: np.ndarray, rest: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         solve = self._factor.solve_with_inner if self._correction is None else self._correction.solve
-        dq, du = solve(force, np.full(self._factor.inner, outlet))
-        return dq, float(du[0]) if len(du) else 0.0
+        return solve(force, rest)
 
     def contact_step(self, q: np.ndarray, h: float) -> FaceStep:
         """Contact of the faces in a step of length h, s, from positions (n,)."""
@@ -231,11 +200,14 @@ class ValveMotion:
         self._masses = self._masses or MassSolver(self.model)
         return self._masses.solve(q, force, self.outside)
 
-    def begin_step(self, state, h: float, inlet: float) -> None:
-        """Begin a step from a state: the added mass is renewed where it no longer holds, a staggered fluid advanced."""
+    def begin_step(self, state, h: float, theta: float, rate: float, inlet: float):
+        """Step of the fluid from a state, see `dbvfiv.flow.stepping.MovingFluid.step`; the added mass outside is
+        renewed where it no longer holds.
+        """
         if self.outside is not None:
             self.outside.begin_step(state.q, state.v)
-        self.fluid.begin_step(self._passage(self.model.nodal(state.q), state.v), state, h, inlet)
+        passage = self._passage(self.model.nodal(state.q), state.v)
+        return self.fluid.step(state.fluid, passage, h, theta, rate, inlet)
 
     def drop_factors(self) -> None:
         """Forget the factorisation with its analysis, so that later numbers do not depend on matrices seen before."""
@@ -254,21 +226,18 @@ class ValveMotion:
             self._factor = CoupledFactor(pattern, model.station_forces(rest), model.rows.jacobian(rest), inner)
         return self._factor
 
-    def accelerations(
-        self,
-        q,
-        v,
-        speed: float,
-        inlet: float,
-        memory: Memory | None = None,
-        line: LineState | None = None,
-        gas: GasState | None = None,
-    ) -> tuple[np.ndarray, Load]:
-        """Accelerations (n,) that the equations ask for at positions, velocities and inlet velocity, and the fluid with
-        them; `memory` of a wall that has not relaxed, `line` of an elastic one that does not flow steadily, `gas` of a
-        fluid that is compressed and does not.
+    def still_fluid(self) -> np.ndarray:
+        """Unknowns (l,) of the fluid at rest without pressure; the inlet velocity alone where the law has none."""
+        return np.zeros(max(1, self.model.flow.inner))
 
-        The equations are linear in the accelerations and the rate of the inlet velocity: one solve.
+    def accelerations(
+        self, q, v, inlet: float, inner: np.ndarray | None = None, memory: Memory | None = None
+    ) -> tuple[np.ndarray, Flow]:
+        """Accelerations (n,) that the equations ask for at positions, velocities and unknowns of the fluid (l,), by
+        default those at rest, and the fluid with them; `memory` of a wall that has not relaxed.
+
+        The equations are linear in the accelerations and the rates of the fluid's unknowns: one solve. Where the law
+        lets pressures depend on neither, they are known before.
         """
         model, alpha, beta = self.model, self.mu.alpha, self.mu.beta
         nodal = model.nodal(q)
@@ -277,69 +246,34 @@ class ValveMotion:
             self.outside.begin_step(q, v)
         forces = self.internal_force(q, wall) + beta * self.force_rate(q, v) + self.inertia(q, v, alpha * v)
         forces += model.contact_force(q)
-        rows, fluid = model.rows, self.fluid.at_an_instant()
-        coupled = model.mass(q), model.station_forces(nodal).data, rows.jacobian(nodal).data
-        none = np.zeros(self.stations)
-        if fluid.eliminated:
-            gas = self.gas_at(q, v, speed, inlet) if gas is None else gas
-            load = self.load(q, v, q, v, self._instant(speed, none, inlet, gas=gas), fluid=fluid)
-            self._refactor(*coupled, np.zeros((self.stations, self.stations)), None)
+        inner = self.still_fluid() if inner is None else np.asarray(inner, float)
+        coupled = model.mass(q), model.station_forces(nodal).data, model.rows.jacobian(nodal).data
+        passage, m = self._passage(nodal, v), self.stations
+        if not self.model.flow.unsteady:
+            load = self.load(q, v, q, v, self.fluid.instant(None, inlet))
+            self._solver(0).refactor(*coupled, np.zeros((m, m)))
             self._add_outside(1.0)
-            return self.solve(load.force - forces, 0.0)[0], load
-        area, rate = self._passage(nodal, v)
-        by_area, by_rate, by_speed = fluid.psi_slopes(area, rate, speed)
-        bend = rows.second(model.nodal(v), model.nodal(v))
-        known = by_area @ rate + by_rate @ bend
-        line = self.line_at(speed, inlet) if line is None else line
-        instant = self._instant(speed, known, inlet, self._line_moving(line, inlet, 0.0))
-        load = self.load(q, v, q, v, instant, speed, fluid)
-        density = self.mu.density
-        if line is not None:
-            by_speed = by_speed + self.waves.inertance
-        self._refactor(*coupled, -density * by_rate, -density * by_speed)
+            return self.solve(load.force - forces), load
+        sources, by_area, by_rate, by_inner = self.fluid.operators(*passage, inner, inlet)
+        bend = model.rows.second(model.nodal(v), model.nodal(v))
+        known = sources + by_area @ passage[1] + by_rate @ bend
+        apart = (np.zeros((m, m)),) if self.fluid.compressed else _blocks(by_rate, by_inner)
+        self._solver(0 if self.fluid.compressed else len(inner)).refactor(*coupled, *apart)
         self._add_outside(1.0)
-        a, speed_rate = self.solve(load.force - forces, -load.outlet)
-        if line is not None:
-            by_speed = by_speed - self.waves.inertance
-        psi_rate = known + by_rate @ rows.second(self._position(nodal), model.nodal(a)) + by_speed * speed_rate
-        line = self._line_moving(line, inlet, speed_rate)
-        return a, self.load(q, v, q, v, self._instant(speed, psi_rate, inlet, line), speed, fluid)
+        pressure = model.pressure_force(nodal, known[:m])
+        a, _ = self._solve(pressure - forces, -known[m:][: self._factor.inner])
+        acceleration = bend + model.rows.second(self._position(nodal), model.nodal(a))
+        state = self.fluid.moving(passage, acceleration, inner, inlet)
+        return a, self.load(q, v, q, v, self.fluid.instant(state, inlet))
 
-    def gas_at(self, q, v, speed: float, inlet: float, moved=None, flow: np.ndarray | float = 0.0) -> GasState | None:
-        """A compressed fluid, steady at positions q or at rest where there is no speed; on a mode that moves its
-        unknowns by `flow` (l,) and the wall to positions `moved`; None where it is not compressed.
-        """
-        if not isinstance(self.fluid, GasFluid):
-            return None
-        model = self.model
-        steady = self.fluid.steady_inner(model.rows.areas(model.nodal(q)), inlet) if speed else 0.0
-        passage = self._passage(model.nodal(q if moved is None else moved), v)
-        return self.fluid.moving(*passage, np.zeros(model.flow.inner) + steady + flow, inlet)
+    def _position(self, nodal):
+        out = nodal.copy()
+        out[:, :3] += self.model.shell.mesh.nodes
+        return out
 
-    def line_at(self, speed: float, inlet: float) -> LineState | None:
-        """An elastic line with a steady flow, or at rest without pressure where nothing flows; None without one."""
-        if self.waves is None:
-            return None
-        return self.waves.steady(speed, inlet) if speed else self.waves.at_rest()
-
-    def _line_moving(self, line: LineState | None, inlet: float, speed_rate: float) -> LineState | None:
-        return None if line is None else self.waves.moving(line, inlet, speed_rate)
-
-    def instant(self, state, inlet: float) -> Step:
-        """A step of no length at a state."""
-        return self._instant(state.speed, state.psi_rate, inlet, state.line, state.gas)
-
-    def _instant(
-        self,
-        speed: float,
-        psi_rate: np.ndarray,
-        inlet: float,
-        line: LineState | None = None,
-        gas: GasState | None = None,
-    ) -> Step:
-        """A step of no length, with a given rate of psi, waves in an elastic line with their rates, and compression."""
-        waves = None if line is None else LineInstant(self.waves, line)
-        return Step(1.0, speed, 0.0, psi_rate, inlet, waves, gas and GasInstant(self.fluid, gas, inlet))
+    def instant(self, state, inlet: float):
+        """A step of no length of the fluid at a state."""
+        return self.fluid.instant(state.fluid, inlet)
 
     # -- energies
     # ----
@@ -353,6 +287,12 @@ class ValveMotion:
     def outside_energy(self, q: np.ndarray, v: np.ndarray) -> float:
         """Kinetic energy of the fluid outside, J of the part; zero where there is none."""
         return 0.0 if self.outside is None else self.outside.energy(q, v)
+
+
+def _blocks(by_rate: np.ndarray, by_inner: np.ndarray) -> tuple[np.ndarray, ...]:
+    """Derivatives of pressures and equations (m + l, m) and (m + l, l), in the order of `CoupledFactor.refactor`."""
+    m = by_rate.shape[1]
+    return by_rate[:m], by_inner[:m], by_rate[m:], by_inner[m:]
 
 
 def wall_energies(model: ValveModel, q: np.ndarray, v: np.ndarray) -> tuple[float, float]:

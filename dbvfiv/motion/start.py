@@ -51,13 +51,12 @@ def first_state(motion: ValveMotion, case: Case, inlet: float, observer: Observe
     """
     model, transient = motion.model, case.transient
     if transient.start == "rest":
-        return consistent_state(motion, 0.0, model.rest(), model.rest(), 0.0, inlet), None
+        return consistent_state(motion, 0.0, model.rest(), model.rest(), inlet), None
     observer.progress(f"steady state at {inlet:.6g} Pa")
     q = steady_positions(model, inlet, SteadyOptions.of(case))
-    areas = model.rows.areas(model.nodal(q))
-    speed = model.flow.inlet_velocity(areas, inlet, motion.mu.density) if inlet > model.flow.back else 0.0
+    inner = steady_fluid(motion, q, inlet)
     if transient.start == "steady":
-        return consistent_state(motion, 0.0, q, np.zeros(model.size), speed, inlet), None
+        return consistent_state(motion, 0.0, q, np.zeros(model.size), inlet, inner), None
     observer.progress("mode to follow")
     push = Push(
         transient.kick_mode,
@@ -65,7 +64,18 @@ def first_state(motion: ValveMotion, case: Case, inlet: float, observer: Observe
         case.modes.count,
         SearchOptions(case.modes.max_frequency, tolerance=case.modes.tolerance),
     )
-    return kicked(motion, q, speed, inlet, push)
+    return kicked(motion, q, inner, inlet, push)
+
+
+def steady_fluid(motion: ValveMotion, q: np.ndarray, inlet: float, velocity: float | None = None) -> np.ndarray | None:
+    """The fluid's unknowns (l,) of the steady flow at positions (n,) and an inlet pressure, Pa, with another velocity
+    at the inlet, m/s, if one is given; None where nothing flows.
+    """
+    model = motion.model
+    if inlet <= model.flow.back if velocity is None else not velocity:
+        return None
+    inner = motion.fluid.steady_inner(model.rows.areas(model.nodal(q)), inlet)
+    return inner if velocity is None else model.flow.with_velocity(inner, velocity)
 
 
 def steady_positions(model: ValveModel, inlet: float, options: SteadyOptions | None = None) -> np.ndarray:
@@ -104,7 +114,9 @@ class Push:
     search: SearchOptions = field(default_factory=SearchOptions)
 
 
-def kicked(motion: ValveMotion, q: np.ndarray, speed: float, inlet: float, push: Push) -> tuple[MotionState, Kick]:
+def kicked(
+    motion: ValveMotion, q: np.ndarray, inner: np.ndarray | None, inlet: float, push: Push
+) -> tuple[MotionState, Kick]:
     """Steady state pushed along one of its leading modes.
 
     Parameters
@@ -112,8 +124,8 @@ def kicked(motion: ValveMotion, q: np.ndarray, speed: float, inlet: float, push:
     motion : ValveMotion
     q : (n,) array
         The steady state.
-    speed : float
-        Its inlet velocity, m/s.
+    inner : (l,) array or None
+        The fluid's unknowns in it.
     inlet : float
         Its inlet pressure, Pa.
     push : Push
@@ -137,19 +149,19 @@ def kicked(motion: ValveMotion, q: np.ndarray, speed: float, inlet: float, push:
     if abs(lip) < 1e-6 * np.abs(nodal[:, :3]).max():
         raise SolveError(f"Mode {push.mode} does not move the middle of the lip, so no push can be measured there.")
     shape = push.opening / lip * mode.q
-    flow = (push.opening / lip * mode.u).real if motion.moving_fluid and len(mode.u) else np.zeros(1)
+    flow = (push.opening / lip * mode.u).real if motion.fluid.moves and len(mode.u) else 0.0
     eigenvalue = complex(mode.eigenvalue)
-    return on_mode(motion, q, speed, inlet, shape, eigenvalue, flow), Kick(eigenvalue)
+    return on_mode(motion, q, inner, inlet, shape, eigenvalue, flow), Kick(eigenvalue)
 
 
 def on_mode(
     motion: ValveMotion,
     q: np.ndarray,
-    speed: float,
+    inner: np.ndarray | None,
     inlet: float,
     shape: np.ndarray,
     eigenvalue: complex,
-    flow: np.ndarray,
+    flow: np.ndarray | float,
 ) -> MotionState:
     """State that moves on a mode from its first instant; a wall that relaxes remembers having done so all along.
 
@@ -158,20 +170,20 @@ def on_mode(
     motion : ValveMotion
     q : (n,) array
         The steady state.
-    speed, inlet : float
-        Its inlet velocity, m/s, and pressure, Pa.
+    inner : (l,) array or None
+        The fluid's unknowns in it.
+    inlet : float
+        Its inlet pressure, Pa.
     shape : (n,) complex array
         The mode, of the size it has at this instant.
     eigenvalue : complex, 1/s
     flow : (l,) array
-        Change of the fluid's own unknowns with it, the inlet velocity, m/s, before all others.
+        Change of the fluid's own unknowns with it.
     """
     moved = q + shape.real
     memory = None if motion.wall is None else motion.wall.on_mode(q, shape, eigenvalue, moved)
-    line = None if motion.waves is None else motion.waves.steady(speed, inlet).changed(flow)
-    v = (eigenvalue * shape).real
-    gas = motion.gas_at(q, v, speed, inlet, moved, flow)
-    return consistent_state(motion, 0.0, moved, v, speed + flow[0], inlet, memory, line, gas)
+    v, still = (eigenvalue * shape).real, motion.still_fluid() if inner is None else inner
+    return consistent_state(motion, 0.0, moved, v, inlet, still + flow, memory)
 
 
 def _find_mode(pencil: CoupledPencil, mu: Mu, push: Push, resolved: float = np.inf) -> tuple[Spectrum, int]:

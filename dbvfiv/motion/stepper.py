@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..flow.stepping import Load
+from ..flow.stepping import Flow
 from ..model.linear import SingularMatrix
 from .scheme import Scheme
 from .scheme import scheme as member
@@ -70,7 +70,7 @@ class StepResult:
     Attributes
     ----------
     state : MotionState
-    load : Load
+    load : Flow
         Fluid at the end of the step.
     work : float
         Of the pressure on the wall during the step, J of the part.
@@ -87,7 +87,7 @@ class StepResult:
     """
 
     state: MotionState
-    load: Load
+    load: Flow
     work: float
     dissipation: float
     residuals: int
@@ -143,12 +143,11 @@ class Stepper:
         StepFailure
         """
         before = (self.residuals, self.solves, self.factorisations)
-        speeds = self.motion.speeds(state)
-        outward, momenta = _outward(speeds), self.motion.momenta(state.psi, speeds)
+        speeds = state.fluid.speed
+        outward, momenta = _outward(speeds), self.motion.fluid.momenta(speeds)
         scheme = self.scheme if outward else self._inward
         for robust in (self.options.backward or not (outward and self._smooth(state, momenta, h)), True):
             trial = Trial(self.motion, scheme, state, h, self.pressure, robust)
-            self.motion.begin_step(state, h, trial.fluid.inlet)
             try:
                 self._iterate(trial)
             except SingularMatrix as error:
@@ -176,7 +175,7 @@ class Stepper:
         Sections are compared one by one, since one section may gain what another loses. The time before counts too,
         since flow that has just turned round rings.
         """
-        change = -h * np.diff(state.psi_rate)
+        change = h * state.fluid.turning
         return bool(np.abs(change).sum() <= 0.34 * np.abs(momenta).sum()) and _outward(momenta - change)
 
     def _kept_momentum(self, trial: Trial, old: np.ndarray) -> bool:
@@ -184,7 +183,7 @@ class Stepper:
 
         Otherwise the fluid's equations are better met at the end of the step.
         """
-        new = self.motion.momenta(trial.load.psi, trial.load.speed)
+        new = self.motion.fluid.momenta(trial.load.speed)
         return bool(np.clip(old - new, 0.0, old).sum() <= 0.5 * old.sum()) and _outward(trial.load.speed)
 
     def _works(self, trial: Trial) -> tuple[float, float]:
@@ -303,7 +302,7 @@ class Stepper:
 
     def _solve(self, trial: Trial) -> np.ndarray:
         self.solves += 1
-        return self.motion.solve(-trial.residual, -trial.load.outlet)[0]
+        return self.motion.solve(-trial.residual)
 
 
 def _outward(speed: np.ndarray) -> bool:

@@ -22,9 +22,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..flow.gas_stepping import SECOND_ORDER, GasStep
-from ..flow.line_stepping import LineStep
-from ..flow.stepping import Step
+from ..flow.stepping import SECOND_ORDER
 from .scheme import Scheme
 from .state import MotionState
 
@@ -45,8 +43,6 @@ class Weights:
         Factor of the tangent of F.
     velocity : float
         Derivative of the new velocities with respect to the new positions, 1/s.
-    psi : float
-        Derivative of the rate of psi with respect to the new psi, 1/s.
     outside : float
         Factor of the added mass of fluid outside, 1/s2: no damping acts on it.
     """
@@ -56,7 +52,6 @@ class Weights:
     inertia: float
     force: float
     velocity: float
-    psi: float
     outside: float = 0.0
 
 
@@ -79,7 +74,7 @@ class Trial:
         self.motion, self.scheme, self.old, self.h = motion, scheme, old, h
         s, now = scheme, scheme.now
         self.wall = None if motion.wall is None else motion.wall.step(old.memory, h)
-        theta, rate = (1.0, 1.0) if robust else (now, s.rate) if old.gas is None else SECOND_ORDER
+        theta, rate = (1.0, 1.0) if robust else SECOND_ORDER if motion.fluid.compressed else (now, s.rate)
         self.kind = (h, robust, s.gamma)
         self.weights = Weights(
             theta=theta,
@@ -87,21 +82,12 @@ class Trial:
             inertia=(1.0 - s.alpha_m) / (s.beta * h * h) + motion.mu.alpha * now * s.gamma / (s.beta * h),
             force=now + motion.mu.beta * s.rate / h,
             velocity=s.gamma / (s.beta * h),
-            psi=rate / h,
             outside=(1.0 - s.alpha_m) / (s.beta * h * h),
         )
         self.contact = motion.contact_step(old.q, h) if motion.contact is not None else None
         self._impulse_weight = (1.0 - s.alpha_m) / (2.0 * s.beta)
         inlet = pressure(old.time + theta * h)
-        self.fluid = Step(
-            theta,
-            old.speed,
-            rate / h,
-            (1.0 - rate) * old.psi_rate - (rate / h) * old.psi,
-            inlet,
-            None if old.line is None else LineStep(motion.waves, old.line, h, theta, rate, inlet),
-            None if old.gas is None else GasStep(motion.fluid, old.gas, h, rate, inlet),
-        )
+        self.fluid = motion.begin_step(old, h, theta, rate, inlet)
 
         # stiffness damping is by the slow law, and its force is known apart only where there is some
         rayleigh = self.wall is not None and motion.mu.beta
@@ -132,7 +118,7 @@ class Trial:
         self.q_mid = old.q + now * (self.q - old.q)
         self.v_mid = old.v + now * (self.v - old.v)
         self.a_mid = old.a + (1.0 - s.alpha_m) * (self.a - old.a)
-        self.at_load = (self.q, self.v) if self.fluid.theta == 1.0 else (self.q_mid, self.v_mid)
+        self.at_load = (self.q, self.v) if self.weights.theta == 1.0 else (self.q_mid, self.v_mid)
         self.load = motion.load(*self.at_load, self.q, self.v, self.fluid)
         alpha, beta = motion.mu.alpha, motion.mu.beta
         self.damping = beta * (old.force_rate + s.rate * (self.force_rate - old.force_rate))
@@ -162,22 +148,17 @@ class Trial:
 
     def state(self) -> MotionState:
         old, load = self.old, self.load
-        rate = (load.psi - old.psi) / self.h if self.motion.moving_fluid else load.psi_rate
         v, a = self._after_contact()
         return MotionState(
             old.time + self.h,
-            float(load.speed[-1]),
             self.q,
             v,
             a,
             self.force,
             self.force_rate,
             load.force,
-            load.psi,
-            rate,
+            load.state(),
             None if self.wall is None else self.motion.wall.advance(old.memory, self.q, self.h, self.scheme.now),
-            load.line,
-            None if load.gas is None else load.gas.state(),
         )
 
     def _after_contact(self) -> tuple[np.ndarray, np.ndarray]:

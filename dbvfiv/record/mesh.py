@@ -10,7 +10,6 @@ import numpy as np
 
 from ..case.part import PARTS, QUARTER, Part
 from ..flow.elastic_line import LineChannel
-from ..flow.gas import GasChannel
 from .table import TEXT, Column, read_array, write_array
 
 if TYPE_CHECKING:
@@ -76,7 +75,7 @@ class MeshData:
             branch_time=branches.times[time],
             branch_strength=branches.strengths[group, time],
             line_places=model.flow.line.places[0] if isinstance(model.flow, LineChannel) else np.zeros(0),
-            gas_unknowns=np.array([model.flow.inner] if isinstance(model.flow, GasChannel) else [], np.int32),
+            gas_unknowns=np.array([model.flow.inner] if model.flow.compressed else [], np.int32),
             face_nodes=np.zeros(0, np.int32) if model.contact is None else model.contact.plane.nodes.astype(np.int32),
             part_name=(model.mesh.part.name,),
         )

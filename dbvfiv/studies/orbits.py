@@ -17,6 +17,7 @@ from continuation.periodic import PeriodicMotion
 
 from ..case.parameters import PARAMETERS, Mu
 from ..errors import SolveError
+from ..flow.stepping import MovingFluid
 from ..model import ValveModel
 from ..model.state import LipCentre
 from ..model.system import ValveSystem
@@ -151,8 +152,8 @@ class Orbit:
         elif not model.flow.unsteady:
             speeds = np.stack([model.flow.velocities(a, u) for a, u in zip(area, inlet)])
         else:
-            fluid = model.flow.stepping(density)
-            speeds = np.stack([fluid.state(a, r, u).speed for a, r, u in zip(area, opening, inlet)])
+            fluid = MovingFluid(model.flow, density)
+            speeds = np.stack([fluid.speeds(a, r, x) for a, r, x in zip(area, opening, samples[:, n:])])
         open_area = np.array([model.flow.open_area(a) for a in area[:, 0]])
         out = model.mesh.part.copies * density * speeds[:, 0] * open_area
         return out, speeds.min(axis=1)

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from dbvfiv.flow import Channel, FlowMotion, Stream
+from dbvfiv.flow.stepping import MovingFluid
 from dbvfiv.flow.terms.line import Line
 from dbvfiv.flow.terms.tail import Tail
 from eigen import CoupledPencil, leading_modes
@@ -145,8 +146,8 @@ def test_time_steps_work_against_the_pressure_downstream():
     rate = 1e-4 * np.ones(len(z))
     found = []
     for back in (0.0, 7e3):
-        fluid = Channel(z, FLOOR, 1.0, terms=[Tail(0.2, 3.0)], back=back).stepping(DENSITY)
-        velocity = fluid.velocity((area, rate), (area, rate), DRIVE + back, 1.0, 0.5, 200.0, -3.0)
-        flow = fluid.state(area, rate, velocity)
-        found.append((velocity, *fluid.pressure(flow, np.zeros(len(z)), DRIVE + back)))
+        fluid = MovingFluid(Channel(z, FLOOR, 1.0, terms=[Tail(0.2, 3.0)], back=back), DENSITY)
+        state = fluid.moving((area, rate), np.zeros(len(z)), np.array([1.0]), DRIVE + back)
+        flow = fluid.step(state, None, 5e-3, 0.5, 1.0, DRIVE + back).at((area, rate), (area, rate))
+        found.append((*flow.inner, *flow.pressure))
     assert found[1] == pytest.approx(found[0], rel=1e-12)

@@ -19,6 +19,8 @@ WATER = {"outside.fluid": "same"}
 GAS = {"fluid.density": 1.2, "fluid.sound_speed": "340 m/s", "drive.pressure": "2 kPa"}
 FRICTION = {"fluid.viscosity": "1 mPa*s"}
 HALF = {"mesh.part": "half", "mesh.around": 5}
+#: A pump that feeds an elastic line, water outside and friction in the valve.
+PUMPED = WAVES | WATER | FRICTION | {"upstream.pump": "[[0, 4], [0.1, 3], [0.5, 0.1]]"}
 #: Keys of an installation by its name.
 INSTALLATIONS = {
     "line": LINE,
@@ -29,6 +31,9 @@ INSTALLATIONS = {
     "gas": GAS,
     "friction": FRICTION,
     "half": HALF,
+    "pumped": PUMPED,
+    "gas-waves": GAS | WAVES | {"upstream.length": "3 m"},
+    "half-water": HALF | WATER,
 }
 #: Onsets without what takes minutes: their kind, and what a finer mesh moves.
 ONSET = {"onset.coarse_mesh": 0, "onset.normal_form": "false"}

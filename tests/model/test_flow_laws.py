@@ -162,7 +162,7 @@ def test_a_small_push_along_a_mode_follows_it_in_time(make_model, name):
     for steps in (100, 200):
         motion = ValveMotion(model, conditions)
         pushed = speed + float((scale * mode.u[0]).real)
-        state = consistent_state(motion, 0.0, q + shape.real, (value * shape).real, pushed, PRESSURE)
+        state = consistent_state(motion, 0.0, q + shape.real, (value * shape).real, PRESSURE, np.array([pushed]))
         stepper = Stepper(motion, scheme("generalised-alpha"), lambda t: PRESSURE, StepOptions(tolerance=1e-7))
         for _ in range(steps):
             state = stepper.step(state, duration / steps).state

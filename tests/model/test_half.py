@@ -128,6 +128,24 @@ def test_the_spectrum_is_the_union_of_two_classes_of_the_quarter(quarter, half, 
     assert {int(i >= 8) for i in np.argmin(gaps, axis=1)} == {0, 1}
 
 
+@pytest.mark.parametrize("lips, pipe", [("closed", None), ("open", 0.4)])
+def test_water_around_a_half_is_that_around_two_classes_of_the_quarter(lips, pipe):
+    """Impedances of its panels, in both of its classes."""
+    keys = {"outside.fluid": "same", "outside.lips": lips} | ({"outside.pipe_diameter": pipe} if pipe else {})
+    quarter, half = make_valve(keys), make_valve(keys | {"mesh.part": "half"})
+    q = 0.5 * find_open_state()
+    h = half.shell.dofs.restrict(lifted(quarter, half, quarter.nodal(q)))
+    centres = [x.outside.panels(y).centres[: len(x.shell.mesh.quads)] for x, y in ((quarter, q), (half, h))]
+    there = [np.argmin(np.linalg.norm(centres[1] - c * [s, 1, 1], axis=1)) for s in (1, -1) for c in centres[0]]
+    right, left = np.split(np.array(there), 2)
+    for name, (even, odd) in UNION.items():
+        whole = half.outside.impedance(h, symmetry=name).matrix()
+        for sign, own in ((1.0, even), (-1.0, odd)):
+            sides = whole[np.ix_(right, right)] + sign * whole[np.ix_(right, left)]
+            expected = quarter.outside.impedance(q, symmetry=own).matrix()
+            assert np.abs(sides - expected).max() < 1e-8 * np.abs(expected).max(), (name, own)
+
+
 def test_images_of_a_half_are_the_whole_valve(quarter, half):
     whole = [WholeValve.of(MeshData.of(model)) for model in (quarter, half)]
     points, others = (np.round(valve.points, 12) + 0.0 for valve in whole)

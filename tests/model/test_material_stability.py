@@ -7,7 +7,7 @@ import pytest
 
 from dbvfiv.materials import stability_margin
 from dbvfiv.model import ValveModel
-from dbvfiv.model.equilibria import find_equilibria
+from dbvfiv.model.equilibria import LoadPath, SteadyOptions, state_warnings
 from dbvfiv.model.material_stability import material_stability
 from tests.small_valves import make_valve
 
@@ -16,8 +16,8 @@ LOSSES = {"damping.model": "loss factor"}
 
 def _state(changes, pressure=12e3):
     model = make_valve(changes)
-    found = find_equilibria(model, [pressure])
-    return model, found.states[0], found.warnings
+    state = LoadPath(model, SteadyOptions.of(model.case)).go_to(pressure)
+    return model, state, tuple(state_warnings(model, [state]))
 
 
 def test_published_constants_are_told_with_place_share_and_remedy():

@@ -12,7 +12,7 @@ import scipy.linalg as la
 from dbvfiv.case.parameters import Mu
 from dbvfiv.errors import SolveError
 from dbvfiv.model import ValveModel, linearise
-from dbvfiv.model.equilibria import find_equilibria
+from dbvfiv.model.equilibria import find_equilibrium
 from dbvfiv.model.outside import leading_added_mass
 from dbvfiv.studies.case import thesis_case
 from eigen import SearchOptions, leading_modes
@@ -24,7 +24,7 @@ MESH = {"mesh.around": 8, "mesh.along": 14}
 def valve(fluid="same", pressure=10e3, **outside) -> tuple[ValveModel, np.ndarray]:
     keys = {f"outside.{name}": value for name, value in outside.items()} | {"outside.fluid": fluid}
     model = ValveModel(thesis_case(MESH | keys))
-    return model, find_equilibria(ValveModel(thesis_case(MESH)), [pressure]).states[0].q
+    return model, find_equilibrium(ValveModel(thesis_case(MESH)), pressure).q
 
 
 @cache

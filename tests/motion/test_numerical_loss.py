@@ -24,7 +24,7 @@ def pair(contact: bool, beta: float = 0.0) -> BouncingMotion:
 def books(motion, rules, h, steps):
     """Energy gained beyond what the books of the steps say, and what numerical damping took, step by step."""
     steppers = [Stepper(motion, scheme(*rule), lambda t: 0.0, TIGHT) for rule in rules]
-    state, left, taken = consistent_state(motion, 0.0, np.array([1.0, 0.2]), np.array([0.0, -2.0]), 0.0, 0.0), [], []
+    state, left, taken = consistent_state(motion, 0.0, np.array([1.0, 0.2]), np.array([0.0, -2.0]), 0.0), [], []
     for i in range(steps):
         old, result = state, steppers[i % len(rules)].step(state, h)
         state = result.state

@@ -69,7 +69,7 @@ def test_accelerations_carry_the_fluid():
     model = make_valve(WATER | {"drive.kind": "uniform", "drive.pressure": 1.0})
     motion = ValveMotion(model)
     rest = model.rest()
-    a, load = motion.accelerations(rest, rest, 0.0, 1.0)
+    a, load = motion.accelerations(rest, rest, 1.0)
     structure = model.shell.dofs.matrix(model.structure(rest)[1])
     w = model.outside.added_mass(rest, structure).columns
     left = model.shell.dofs.matrix(model.mass(rest)) @ a + 1000.0 * (w @ (w.T @ a)) - load.force

@@ -74,7 +74,7 @@ def test_free_decay(series, beta, rule):
     exact = expm(end * first_order(bar, series, beta)) @ np.concatenate([[1.0], np.zeros(1 + len(series.times))])
     errors = []
     for count in (40, 80, 160):
-        first = consistent_state(bar, 0.0, np.full(2, size), np.zeros(2), 0.0, 0.0)
+        first = consistent_state(bar, 0.0, np.full(2, size), np.zeros(2), 0.0)
         last = steps_of(bar, first, lambda t: 0.0, count, end / count, scheme(*rule))[-1].state
         speed = np.sqrt(bar.stiffness / bar.mass)
         errors.append(np.hypot(last.q[0] / size - exact[0], (last.v[0] / size - exact[1]) / speed))
@@ -96,7 +96,7 @@ def test_forced_response(series):
     size = np.hypot(exact[0], exact[1] / speed)
     errors = []
     for n in (80, 160, 320):
-        first = consistent_state(bar, 0.0, np.zeros(2), np.zeros(2), 0.0, 0.0)
+        first = consistent_state(bar, 0.0, np.zeros(2), np.zeros(2), 0.0)
         last = steps_of(bar, first, lambda t: push * np.sin(omega * t), n, end / n)[-1].state
         errors.append(np.hypot(last.q[0] - exact[0], (last.v[0] - exact[1]) / speed) / size)
     print(errors, observed_order(errors))
@@ -111,7 +111,7 @@ def test_a_motion_on_a_mode_stays_on_it(series):
     mode = values[np.argmax(values.imag)]
     q, h, shape = np.zeros(2), 2 * np.pi / abs(mode.imag) / 200, np.full(2, size, complex)
     memory = bar.wall.on_mode(q, shape, mode, q + shape.real)
-    state = consistent_state(bar, 0.0, q + shape.real, (mode * shape).real, 0.0, 0.0, memory)
+    state = consistent_state(bar, 0.0, q + shape.real, (mode * shape).real, 0.0, None, memory)
     exact = np.exp(mode * h * np.arange(1, steps + 1)).real
     found = np.array([r.state.q[0] for r in steps_of(bar, state, lambda t: 0.0, steps, h)]) / size
     assert np.abs(found - exact).max() < 2e-3
@@ -120,7 +120,7 @@ def test_a_motion_on_a_mode_stays_on_it(series):
 
 def test_long_after_a_step_the_slow_law_holds():
     bar, push = Bar(THREE), 4e-3
-    first = consistent_state(bar, 0.0, np.zeros(2), np.zeros(2), 0.0, push)
+    first = consistent_state(bar, 0.0, np.zeros(2), np.zeros(2), push)
     last = steps_of(bar, first, lambda t: push, 2000, 2.5e-4)[-1].state
     assert last.q[0] == pytest.approx(push / bar.stiffness, rel=1e-4)
     memory = last.memory
@@ -129,7 +129,7 @@ def test_long_after_a_step_the_slow_law_holds():
 
 def test_trials_and_rejected_steps_leave_the_memory_alone():
     bar = Bar(THREE)
-    first = consistent_state(bar, 0.0, np.full(2, 1e-7), np.zeros(2), 0.0, 0.0)
+    first = consistent_state(bar, 0.0, np.full(2, 1e-7), np.zeros(2), 0.0)
     state = steps_of(bar, first, lambda t: 0.0, 5, 1e-4)[-1].state
     kept = {name: np.array(getattr(state.memory, name)) for name in ("branches", "stretch", "work", "loss", "strain")}
     stepper = Stepper(bar, scheme("generalised-alpha"), lambda t: 0.0, OPTIONS)
@@ -145,7 +145,7 @@ def test_trials_and_rejected_steps_leave_the_memory_alone():
 def test_linear_branches_store_and_lose_what_springs_and_dashpots_do():
     bar, end = Bar(THREE), 5e-3
     matrix = first_order(bar, THREE)
-    first = consistent_state(bar, 0.0, np.full(2, 1e-7), np.zeros(2), 0.0, 0.0)
+    first = consistent_state(bar, 0.0, np.full(2, 1e-7), np.zeros(2), 0.0)
     count = 2000
     last = steps_of(bar, first, lambda t: 0.0, count, end / count)[-1].state
     propagate = expm(end / count * matrix)
@@ -211,4 +211,4 @@ def mixed_walls():
 def test_an_elastic_wall_has_no_memory():
     bar = Bar(replace(ONE, strengths=(0.0,)))
     assert bar.wall is None
-    assert consistent_state(bar, 0.0, np.zeros(2), np.zeros(2), 0.0, 0.0).memory is None
+    assert consistent_state(bar, 0.0, np.zeros(2), np.zeros(2), 0.0).memory is None

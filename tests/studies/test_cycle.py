@@ -44,7 +44,7 @@ def lip_after(point, steps: int) -> float:
     orbit, model = point.orbit, point.orbit.model
     motion, n = ValveMotion(model, Mu(density=orbit.mu["density"], alpha=0.0, beta=3e-3)), model.size
     x, v = orbit.motion.at([0.0])[0], orbit.motion.rate([0.0])[0]
-    state = consistent_state(motion, 0.0, x[:n], v[:n], x[n], orbit.mu["inlet"])
+    state = consistent_state(motion, 0.0, x[:n], v[:n], orbit.mu["inlet"], np.array([x[n]]))
     stepper = Stepper(motion, scheme("generalised-alpha"), lambda t: orbit.mu["inlet"])
     for _ in range(steps):
         state = stepper.step(state, orbit.motion.period / steps).state

@@ -9,7 +9,7 @@ import scipy.sparse as sp
 from scipy.sparse.linalg import splu
 
 from dbvfiv.contact import ContactLaw, Rebound, mean_pressure
-from tests.verification.moving import Motion
+from tests.verification.moving import Drive, Motion
 
 
 @dataclass(frozen=True)
@@ -97,14 +97,14 @@ class BouncingMotion(Motion):
             matrix = matrix + sp.diags(contact[1] * contact[0].stiffness(q_new))
         self._factor = splu(sp.csc_matrix(matrix))
 
-    def solve(self, force, outlet):
-        return self._factor.solve(force), 0.0
+    def solve(self, force):
+        return self._factor.solve(force)
 
-    def accelerations(self, q, v, speed, inlet, memory=None):
+    def accelerations(self, q, v, inlet, inner=None, memory=None):
         force = self.push - self.stiffness @ (q + self.mu.beta * v)
         if self.contact is not None:
             force = force - self.contact.force(q)
-        return self._mass_factor.solve(force), self.load(q, v, q, v, type("Still", (), {"inlet": 0.0}))
+        return self._mass_factor.solve(force), self.load(q, v, q, v, Drive())
 
     def energy(self, q, v) -> float:
         """Kinetic, elastic and contact energy less the work of the load."""

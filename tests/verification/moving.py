@@ -7,7 +7,7 @@ from types import SimpleNamespace
 import numpy as np
 import scipy.sparse as sp
 
-from dbvfiv.flow.stepping import Load, StepFluid
+from dbvfiv.flow.stepping import Flow, FluidState
 from dbvfiv.model.linear import CoupledFactor
 from dbvfiv.model.relaxing import WallRelaxation
 from dbvfiv.motion.kernels import strain_energy
@@ -17,10 +17,25 @@ from dbvfiv.shell.pressure import pressure_force, pressure_stiffness
 NONE = np.zeros(1)
 
 
+class Drive:
+    """A pressure in place of a fluid, and its step."""
+
+    compressed = quiet_inward = False
+
+    def __init__(self, inlet: float = 0.0):
+        self.inlet = inlet
+
+    def momenta(self, speed):
+        return NONE
+
+    def state(self, flow) -> FluidState:
+        return FluidState(*9 * (NONE,))
+
+
 class Motion:
     """What the stepper asks of any motion without a fluid; the load is a force that the positions fix."""
 
-    fluid, moving_fluid = StepFluid, False
+    fluid = Drive()
     outside = None
     wall = None
     contact = None
@@ -29,8 +44,8 @@ class Motion:
     def __init__(self, size: int, alpha: float = 0.0, beta: float = 0.0):
         self.size, self.mu = size, SimpleNamespace(alpha=alpha, beta=beta, density=0.0)
 
-    def begin_step(self, state, h, inlet):
-        pass
+    def begin_step(self, state, h, theta, rate, inlet):
+        return Drive(inlet)
 
     def drop_factors(self):
         pass
@@ -38,8 +53,8 @@ class Motion:
     def momentum(self, q, v):
         return self.inertia(q, np.zeros_like(v), v)
 
-    def load(self, q, v, q_new, v_new, step, speed=None) -> Load:
-        return Load(self.pressure_force(q, step.inlet), 0.0, *5 * (NONE,), step.inlet, 0.0)
+    def load(self, q, v, q_new, v_new, step) -> Flow:
+        return Flow(step.inlet, *6 * (NONE,), step=step, force=self.pressure_force(q, step.inlet))
 
     def pressure_force(self, q, pressure):
         return np.zeros(self.size)
@@ -50,12 +65,6 @@ class Motion:
             if not np.any(v)
             else (self.internal_force(q + 1e-6 * v) - self.internal_force(q - 1e-6 * v)) / 2e-6
         )
-
-    def speeds(self, state):
-        return NONE
-
-    def momenta(self, psi, speed):
-        return NONE
 
     def turn(self, dq):
         return 0.0
@@ -82,11 +91,11 @@ class PointMotion(Motion):
         viscous = now * (weights.velocity * self._damping(q) + self._slope(q) * v)
         self._matrix = weights.inertia + viscous + weights.force * self._stiffness(q_new)
 
-    def solve(self, force, outlet):
-        return force / self._matrix, 0.0
+    def solve(self, force):
+        return force / self._matrix
 
-    def accelerations(self, q, v, speed, inlet, memory=None):
-        load = self.load(q, v, q, v, SimpleNamespace(inlet=inlet))
+    def accelerations(self, q, v, inlet, inner=None, memory=None):
+        load = self.load(q, v, q, v, Drive(inlet))
         return -self._force(q) - self.mu.beta * self._stiffness(q) * v - self._damping(q) * v, load
 
 
@@ -138,11 +147,11 @@ class ShellMotion(Motion):
         )
         self._refactor(values)
 
-    def solve(self, force, outlet):
-        return self._factor.solve(force), 0.0
+    def solve(self, force):
+        return self._factor.solve(force)
 
-    def accelerations(self, q, v, speed, inlet, memory=None):
-        load = self.load(q, v, q, v, SimpleNamespace(inlet=inlet))
+    def accelerations(self, q, v, inlet, inner=None, memory=None):
+        load = self.load(q, v, q, v, Drive(inlet))
         self._refactor(self.shell.mass(q))
         force = self.internal_force(q, None if memory is None else self.wall.held(memory))
         return self._factor.solve(load.force - force - self.inertia(q, v, 0 * v)), load

@@ -42,7 +42,7 @@ def run(point, steps: int, size: float = 1.0, periods: int = PERIODS) -> np.ndar
     motion, n = ValveMotion(model, Mu(density=orbit.mu["density"], alpha=0.0, beta=3e-3)), model.size
     mean = orbit.motion.coefficients[0]
     x, v = mean + size * (orbit.motion.at([0.0])[0] - mean), size * orbit.motion.rate([0.0])[0]
-    state = consistent_state(motion, 0.0, x[:n], v[:n], x[n], orbit.mu["inlet"])
+    state = consistent_state(motion, 0.0, x[:n], v[:n], orbit.mu["inlet"], np.array([x[n]]))
     options = StepOptions(tolerance=1e-6)
     stepper = Stepper(motion, scheme("generalised-alpha"), lambda t: orbit.mu["inlet"], options)
     lip, number = [], model.shell.dofs.index[model.mesh.rows[0, 0], 1]

@@ -22,7 +22,7 @@ TIGHT = StepOptions(tolerance=1e-9, floor=1e-13, largest_turn=np.inf)
 def follow(motion, q, v, h, steps, nd=0.0):
     """States and results of a number of steps."""
     stepper = Stepper(motion, scheme("generalised-alpha", nd), lambda t: 0.0, TIGHT)
-    state, found = consistent_state(motion, 0.0, q, v, 0.0, 0.0), []
+    state, found = consistent_state(motion, 0.0, q, v, 0.0), []
     for _ in range(steps):
         found.append(stepper.step(state, h))
         state = found[-1].state

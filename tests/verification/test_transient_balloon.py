@@ -47,7 +47,7 @@ def blow_up(shell, load: float, steps: int):
     """Largest mean stretch and period (in units of the reference) of the shell in a step of 1/steps of the period."""
     pressure = load * H * RUBBER.c10
     motion = ShellMotion(shell)
-    state = consistent_state(motion, 0.0, np.zeros(shell.size), np.zeros(shell.size), 0.0, pressure)
+    state = consistent_state(motion, 0.0, np.zeros(shell.size), np.zeros(shell.size), pressure)
     stepper = Stepper(motion, scheme("generalised-alpha"), lambda t: pressure, StepOptions(tolerance=1e-6))
     step = REFERENCE[load][1] * UNIT / steps
     times, radii = [0.0], [1.0]

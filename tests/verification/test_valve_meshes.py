@@ -14,7 +14,7 @@ from scipy.sparse.linalg import eigsh
 
 from dbvfiv.case.parameters import Mu
 from dbvfiv.model import ValveModel, linearise
-from dbvfiv.model.equilibria import find_equilibria
+from dbvfiv.model.equilibria import LoadPath, SteadyOptions
 from dbvfiv.studies.case import thesis_case
 from eigen import SearchOptions, leading_modes
 from tests.verification.test_modal_valve import frequencies
@@ -33,7 +33,8 @@ def measured(around: int, along: int, keys=USUAL, pressures=FLOWS) -> tuple[floa
     (quasi-steady, alpha 0, beta 3 ms).
     """
     model = ValveModel(thesis_case(keys | {"mesh.around": around, "mesh.along": along}))
-    states = find_equilibria(model, pressures).states
+    path = LoadPath(model, SteadyOptions.of(model.case))
+    states = [path.go_to(pressure) for pressure in pressures]
     small = linearise(model, states[0].q, states[0].pressure)
     options = SearchOptions(limit_point=-1 / 0.003)
 
@@ -151,7 +152,7 @@ def in_vacuo(around: int, along: int, mass: str) -> np.ndarray:
     """Five lowest frequencies, Hz, of the layered valve as it stands at 6 kPa, without fluid and damping."""
     keys = {"mesh.around": around, "mesh.along": along, "shell.mass": mass}
     model = ValveModel(thesis_case(keys))
-    q = find_equilibria(model, FLOWS[:1]).states[0].q
+    q = LoadPath(model, SteadyOptions.of(model.case)).go_to(FLOWS[0]).q
     stiffness, inertia = (model.shell.dofs.matrix(v).tocsc() for v in (model.structure(q)[1], model.mass(q)))
     values = eigsh(stiffness, 5, inertia, sigma=-1000.0, return_eigenvectors=False)
     return np.sqrt(np.sort(values)) / (2 * np.pi)

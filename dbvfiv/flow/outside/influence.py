@@ -20,13 +20,16 @@ from .panels import Panels
 EXACT, FOUR = 2.5**2, 8.0**2
 #: Reflections about x = 0, y = 0 and both.
 REFLECTIONS = np.array([[1.0, 1.0, 1.0], [-1.0, 1.0, 1.0], [1.0, -1.0, 1.0], [-1.0, -1.0, 1.0]])
-#: Sign of the potential behind x = 0 and behind y = 0 for each class of motions.
-CLASSES = {"SS": (1.0, 1.0), "SA": (1.0, -1.0), "AS": (-1.0, 1.0), "AA": (-1.0, -1.0)}
+#: Sign of the potential behind a plane of symmetry.
+_SIGNS = {"S": 1.0, "A": -1.0}
 
 
 def image_signs(name: str) -> np.ndarray:
-    """Signs (4,) of the images for a class of motions: symmetric or antisymmetric about x = 0, then about y = 0."""
-    a, b = CLASSES[name]
+    """Signs (4,) of the images for a class of motions of a quarter, symmetric or antisymmetric about x = 0, then about
+    y = 0; of a half about y = 0 alone, with no images about x = 0.
+    """
+    *across, b = (_SIGNS[letter] for letter in name)
+    a = across[0] if across else 0.0
     return np.array([1.0, a, b, a * b])
 
 
@@ -152,6 +155,8 @@ def _influence(targets, sources, points, rule, signs, shift, potential, velocity
         phi[:] = 0.0
         u[:] = 0.0
         for k in range(4):
+            if signs[k] == 0.0:
+                continue
             # the target mirrored in place of the source
             m0, m1, m2 = REFLECTIONS[k]
             x = (m0 * places[i, 0], m1 * places[i, 1], m2 * places[i, 2])

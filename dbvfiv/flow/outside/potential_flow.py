@@ -115,8 +115,9 @@ class PotentialFlow:
     Parameters
     ----------
     surroundings : Surroundings
-    symmetry : {"SS", "SA", "AS", "AA"}
-        Motions symmetric (S) or antisymmetric (A) about x = 0, then about y = 0; all panels lie in x > 0, y > 0.
+    symmetry : {"SS", "SA", "AS", "AA", "S", "A"}
+        Motions symmetric (S) or antisymmetric (A) about x = 0, then about y = 0; all panels lie in x > 0, y > 0. Of a
+        half, whose panels lie in y > 0, about y = 0 alone.
     closed : float, optional
         `BODY` or `ROOM`, where moving and other panels with their images make up one closed boundary.
     """
@@ -161,7 +162,8 @@ class PotentialFlow:
         blocks = self._blocks(moving, held, self.signs)
         (potential, velocity), across, back, alone = blocks
         if self.closed is not None:
-            own, fixed_own = self._own(moving, blocks if self.symmetry == "SS" else self._symmetric(moving, held))
+            symmetric = "A" not in self.symmetry
+            own, fixed_own = self._own(moving, blocks if symmetric else self._symmetric(moving, held))
             velocity[np.diag_indices(len(moving))] += own
         rows = np.concatenate([velocity[:shut], potential[shut:]])
         terms = [(potential[:wet], None)]
@@ -190,7 +192,7 @@ class PotentialFlow:
 
         The condition on the flux through the whole surface rests on these.
         """
-        signs = image_signs("SS")
+        signs = image_signs("S" * len(self.symmetry))
         blocks = self._blocks(moving, held, signs)
         if self._fixed is None:
             return blocks

@@ -1,10 +1,13 @@
-"""Rigid and open surfaces beside the outer face of a tube: all in the quarter x > 0, y > 0."""
+"""Rigid and open surfaces beside the outer face of a tube: all in the quarter x > 0, y > 0, or in the half y > 0.
+
+Contours run clockwise seen from above to the plane y = 0: from x = 0 those of a quarter, from y = 0 those of a half.
+"""
 
 from __future__ import annotations
 
 import numpy as np
 
-from .panels import Panels
+from .panels import SAME, Panels
 
 
 def extruded(contour: np.ndarray, z: np.ndarray) -> Panels:
@@ -13,7 +16,6 @@ def extruded(contour: np.ndarray, z: np.ndarray) -> Panels:
     Parameters
     ----------
     contour : (k, 2) array, m
-        From x = 0 to y = 0.
     z : (l,) array, m
         Ascending.
     """
@@ -37,9 +39,9 @@ def ring_face(inner: np.ndarray, outer: np.ndarray, z: float, up: bool, rings: i
     return Panels.of(_between(grid, turned=not up))
 
 
-def pipe(radius: float, z: np.ndarray, around: int) -> Panels:
-    """A round pipe about the axis with the fluid inside; z (l,) ascending."""
-    circle = arc(radius, np.linspace(0.5 * np.pi, 0.0, around + 1))
+def pipe(radius: float, z: np.ndarray, angles: np.ndarray) -> Panels:
+    """A round pipe about the axis with the fluid inside; z (l,) ascending, angles (k,) falling to 0."""
+    circle = arc(radius, angles)
     normals = _layers(circle / radius, z, level=0.0)
     return Panels.of(_between(_layers(circle, z)), -_between(normals))
 
@@ -50,7 +52,7 @@ def arc(radius: float, angles: np.ndarray) -> np.ndarray:
 
 
 def strip(outer: np.ndarray, inner: np.ndarray, rings: int = 2) -> Panels:
-    """Panels between two edges (k, 3) from x = 0 to y = 0, the fluid below them (towards smaller z)."""
+    """Panels between two edges (k, 3), the fluid below them (towards smaller z)."""
     shares = np.linspace(0.0, 1.0, rings + 1)
     grid = np.stack([(1.0 - s) * inner + s * outer for s in shares])
     return Panels.of(_between(grid, turned=True))
@@ -72,10 +74,11 @@ def _layers(contour, z, level=None):
 
 
 def _contour_normals(contour):
-    """Outward unit normals (k, 2) at the points of a contour from x = 0 to y = 0; its ends lie on symmetry planes."""
+    """Outward unit normals (k, 2) at the points of a contour; its ends lie on symmetry planes."""
+    mirror = [1, -1] if abs(contour[0, 1]) <= SAME * np.abs(contour).max() else [-1, 1]
     way = np.diff(contour, axis=0)
     side = np.stack([-way[:, 1], way[:, 0]], axis=1) / np.linalg.norm(way, axis=1, keepdims=True)
-    side = np.concatenate([side[:1] * [-1, 1], side, side[-1:] * [1, -1]])
+    side = np.concatenate([side[:1] * mirror, side, side[-1:] * [1, -1]])
     found = side[:-1] + side[1:]
     return found / np.linalg.norm(found, axis=1, keepdims=True)
 

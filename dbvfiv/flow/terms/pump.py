@@ -64,13 +64,6 @@ class Pump(FlowTerm):
         a, b, c, d = jnp.asarray(self.series)[:, place]
         return ((a * from_row + b) * from_row + c) * from_row + d
 
-    def head_and_slope(self, flow: float) -> tuple[float, float]:
-        """Head, m, and its slope, s/m2, of a flow, m3/s, in plain numbers."""
-        place = int(np.searchsorted(self.flow, flow, side="right"))
-        x = flow - self.flow[max(place - 1, 0)]
-        a, b, c, d = self.series[:, place]
-        return ((a * x + b) * x + c) * x + d, (3 * a * x + 2 * b) * x + c
-
     def holds(self, flow: float) -> bool:
         """True where a flow rate, m3/s, is within the pump's table."""
         return bool(self.flow[0] <= flow <= self.flow[-1])

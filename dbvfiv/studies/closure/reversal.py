@@ -18,7 +18,7 @@ from ...model.supports import FaceContact
 from ...motion.control import ControlOptions, FixedSteps
 from ...motion.equations import ValveMotion
 from ...motion.scheme import scheme
-from ...motion.start import steady_positions
+from ...motion.start import steady_fluid, steady_positions
 from ...motion.state import consistent_state
 from ...motion.stepper import StepFailure, StepOptions, Stepper
 from ...observer import Observer
@@ -188,13 +188,12 @@ def _set_out(model: ContactValve, motion: ClosingMotion, turn: Turn) -> tuple[Fi
     """The steps to take, the open state that they begin with, and its load."""
     transient = model.case.transient
     q = steady_positions(model, turn.pressure)
-    area = model.rows.areas(model.nodal(q))
-    speed = model.flow.inlet_velocity(area, turn.pressure, motion.mu.density)
-    state = consistent_state(motion, 0.0, q, np.zeros(model.size), speed, turn.pressure)
+    inner = steady_fluid(motion, q, turn.pressure)
+    state = consistent_state(motion, 0.0, q, np.zeros(model.size), turn.pressure, inner)
     rule = scheme("generalised-alpha", max(DAMPING, transient.numerical_damping))
     control = FixedSteps(Stepper(motion, rule, turn, StepOptions(backward=True)), ControlOptions(transient.step))
     still = motion.instant(state, turn.pressure)
-    return control, state, motion.load(state.q, state.v, state.q, state.v, still, state.speed)
+    return control, state, motion.load(state.q, state.v, state.q, state.v, still)
 
 
 def _sample(model: ContactValve, motion: ClosingMotion, state, load) -> dict[str, float]:
@@ -202,7 +201,7 @@ def _sample(model: ContactValve, motion: ClosingMotion, state, load) -> dict[str
     if not (np.isfinite(state.q).all() and np.isfinite(load.pressure).all()):
         raise SolveError(f"The state at {state.time:.6g} s is not finite.")
     passage = model.inner_face.passage(nodal)
-    open_area = motion.fluid.open_area(load.area)
+    open_area = model.flow.open_area(load.area)
     lip, part = LipCentre(model.mesh, model.shell), model.mesh.part
     return {
         "time": float(state.time),

@@ -168,17 +168,18 @@ def _last_period(model: ValveModel, case: Case, place: Mu, result) -> PeriodicMo
     motion = ValveMotion(model, place)
     dofs = model.shell.dofs
     speed = float(state.station_velocity[-1])
-    now = consistent_state(motion, 0.0, dofs.restrict(state.nodal), dofs.restrict(state.nodal_rate), speed, inlet)
+    q, v = dofs.restrict(state.nodal), dofs.restrict(state.nodal_rate)
+    now = consistent_state(motion, 0.0, q, v, inlet, np.array([speed]))
     stepper = Stepper(motion, scheme("generalised-alpha"), lambda _: inlet)
     samples = []
     for _ in range(STEPS):
-        samples.append(np.append(now.q, now.speed))
+        samples.append(np.append(now.q, now.fluid.velocity))
         try:
             now = stepper.step(now, period / STEPS).state
         except StepFailure as failure:
             raise SolveError(f"The run in {str(case.cycle.start_file)!r} does not go on: {failure}") from failure
     # what is not periodic yet is spread over the period
-    drift = np.append(now.q, now.speed) - samples[0]
+    drift = np.append(now.q, now.fluid.velocity) - samples[0]
     rows = np.array(samples) - np.linspace(0.0, 1.0, STEPS, endpoint=False)[:, None] * drift
     h = Harmonics(min(HARMONICS, case.cycle.max_harmonics))
     return PeriodicMotion(h, h.real(np.fft.rfft(rows, axis=0)[: h.count + 1] / STEPS), 2 * np.pi / period)

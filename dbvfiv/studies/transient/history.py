@@ -11,8 +11,7 @@ from typing import Any
 import numpy as np
 
 from ...errors import CaseError
-from ...flow.gas_stepping import BOOKS, GasState, packed_size
-from ...flow.line_stepping import LineState
+from ...flow.stepping import FluidState, packed_size
 from ...model import ValveModel
 from ...model.state import LipCentre
 from ...motion.control import RunOptions
@@ -66,15 +65,16 @@ class Instant:
     def flows(self) -> tuple[float, float, float]:
         """Mass flow out at the lip and in at the flange, kg/s of the part, and the largest Mach number."""
         speed, density = self.load.speed, self.motion.mu.density
-        if self.state.gas is not None:
-            return self.motion.fluid.readings(self.load.area, self.state.gas.inner)
+        if self.motion.fluid.compressed:
+            return self.motion.fluid.readings(self.load.area, self.state.fluid.inner)
         out = density * speed[0] * float(self.model.flow.open_area(self.load.area[0]))
         return out, density * speed[-1] * self.reader.inlet_area, 0.0
 
     @cached_property
-    def line(self) -> tuple[float, ...]:
-        """Energies of an elastic line: kinetic, elastic, supplied, lost, given off."""
-        return *self.motion.waves.energies(self.state.line), *self.state.line.books
+    def fluid(self) -> dict[str, float]:
+        """Energies that the fluid holds, and what became of it since the start, by the names of the law."""
+        held = self.motion.fluid.energies(self.load.area, self.state.fluid.inner)
+        return held | dict(zip(self.model.flow.book_names, self.state.fluid.books))
 
     @cached_property
     def touch(self) -> Any:
@@ -171,38 +171,35 @@ RELAXING = _where(
         _whole("branch_loss", "Energy that they have dissipated since the start", lambda s: s.state.memory.loss),
     ),
 )
+
+
+def _of_fluid(name: str, words: str) -> Column:
+    return _whole(name, words, lambda s: float(s.fluid[name]))
+
+
 #: Energy of an elastic line, of the whole valve, there where the case has one.
 LINE = _where(
     _with_line,
     (
-        _whole("line_kinetic_energy", "Kinetic energy of the fluid in the line", lambda s: s.line[0]),
-        _whole("line_elastic_energy", "Energy of its compression and of the pipe's wall", lambda s: s.line[1]),
-        _whole("line_supply", "Energy taken in at the far end of the line since the start", lambda s: s.line[2]),
-        _whole("line_dissipation", "Energy lost to friction and losses in it since the start", lambda s: s.line[3]),
-        _whole("line_work", "Energy that left it at the flange since the start", lambda s: s.line[4]),
+        _of_fluid("line_kinetic_energy", "Kinetic energy of the fluid in the line"),
+        _of_fluid("line_elastic_energy", "Energy of its compression and of the pipe's wall"),
+        _of_fluid("line_supply", "Energy taken in at the far end of the line since the start"),
+        _of_fluid("line_dissipation", "Energy lost to friction and losses in it since the start"),
+        _of_fluid("line_work", "Energy that left it at the flange since the start"),
+        _of_fluid("line_step_loss", "Energy that differences in time took from it since the start; below zero: gave"),
     ),
 )
-
-
-def _book(name: str, words: str) -> Column:
-    return _whole(f"gas_{name}", words, lambda s: float(s.state.gas.books[BOOKS.index(name)]))
-
-
 #: Of a fluid that is compressed, of the whole valve, there where the case has one.
 GAS = _where(
     _with_gas,
     (
-        _whole(
-            "gas_energy",
-            "Kinetic energy and energy of compression of the fluid in the valve",
-            lambda s: s.motion.fluid.energy(s.load.area, s.state.gas.inner),
-        ),
-        _book("supply", "Energy that it took in at the flange since the start, by enthalpy and velocity head"),
-        _book("outflow", "Energy that left it at the lips since the start, likewise"),
-        _book("work", "Work that it did on the wall since the start"),
-        _book("loss", "Energy that it lost in the valve since the start: by friction, jets inside, and shocks"),
-        _book("step_loss", "Energy that differences in time took from it since the start; below zero: gave"),
-        _book("mesh_loss", "Energy that the cells between rows took from it since the start; below zero: gave"),
+        _of_fluid("gas_energy", "Kinetic energy and energy of compression of the fluid in the valve"),
+        _of_fluid("gas_supply", "Energy that it took in at the flange since the start, by enthalpy and velocity head"),
+        _of_fluid("gas_outflow", "Energy that left it at the lips since the start, likewise"),
+        _of_fluid("gas_work", "Work that it did on the wall since the start"),
+        _of_fluid("gas_loss", "Energy that it lost in the valve since the start: by friction, jets inside, and shocks"),
+        _of_fluid("gas_step_loss", "Energy that differences in time took from it since the start; below zero: gave"),
+        _of_fluid("gas_mesh_loss", "Energy that the cells between rows took from it since the start; below zero: gave"),
         Column("mach", "", "Largest Mach number in the valve", read=lambda s: s.flows[2]),
     ),
 )
@@ -234,15 +231,12 @@ def _of_state(name: str, units: str, words: str, shape: Any = ()) -> Column:
 
 MOTION = (
     _of_state("time", "s", "Time"),
-    _of_state("speed", "m/s", "Inlet velocity"),
     _of_state("q", "m, rad", "Free unknowns", by_unknown),
     _of_state("v", "m/s, rad/s", "Their velocities", by_unknown),
     _of_state("a", "m/s^2, rad/s^2", "Their accelerations", by_unknown),
     _of_state("force", "N, N m", "Internal force of the computed part", by_unknown),
     _of_state("force_rate", "N/s, N m/s", "The scheme's value of its rate", by_unknown),
     _of_state("load", "N, N m", "Force of the fluid where the equations were last met", by_unknown),
-    _of_state("psi", "m^2/s", "Integral of the flow's speed from the inlet, at each row", by_row),
-    _of_state("psi_rate", "m^2/s^2", "The scheme's value of its rate", by_row),
 )
 
 
@@ -266,20 +260,21 @@ MEMORY = (
     _of_memory("branch_loss", "loss", "J", "What of it they have dissipated"),
     _of_memory("branch_energy", "stored", "J", "Energy that they hold"),
 )
-#: Waves in an elastic line, and a fluid that is compressed, as their states pack them.
-_LINE = Column(
-    "line",
-    "m/s, m/s^2, J",
-    "Velocities, scaled pressures, their rates and energy budget",
-    read=lambda p: p.state.line.packed,
-    shape=lambda mesh: (4 * len(mesh.line_places) + 1,) if len(mesh.line_places) else None,
-)
-_GAS = Column(
-    "gas",
+
+
+def _fluid_size(mesh: MeshData) -> int:
+    """Numbers of the fluid's state."""
+    unknowns = mesh.gas_unknowns[0] if len(mesh.gas_unknowns) else max(1, 2 * len(mesh.line_places) - 1)
+    return packed_size(len(mesh.z), int(unknowns))
+
+
+#: The fluid, as `dbvfiv.flow.stepping.FluidState` packs it.
+_FLUID = Column(
+    "fluid",
     "m/s, m^2/s, m^3, m^2, J",
-    "Unknowns, what balances hold and its rates, areas and energy budget",
-    read=lambda p: p.state.gas.packed,
-    shape=lambda mesh: (packed_size(int(mesh.gas_unknowns[0])),) if len(mesh.gas_unknowns) else None,
+    "Unknowns of the fluid, what balances hold and its rates, areas, speeds and energy budget",
+    read=lambda p: p.state.fluid.packed,
+    shape=lambda mesh: (_fluid_size(mesh),),
 )
 _CONTACT = "Energy of the computed part that touching faces took and did not give back"
 #: How far a run has come, books of energy of the computed part, step control and the mode of a kick.
@@ -306,7 +301,7 @@ PROGRESS = (
 def tables_of(mesh: MeshData) -> tuple[TableSpec, ...]:
     """Tables of a transient run on a mesh."""
     history = (*SCALARS, *PROFILES, *RELAXING, *LINE, *GAS, *FACES)
-    restart = (*PROGRESS, *MOTION, *MEMORY, _LINE, _GAS)
+    restart = (*PROGRESS, *MOTION, *MEMORY, _FLUID)
     return (
         TableSpec.on(mesh, HISTORY, history, chunk=512),
         TableSpec.on(mesh, STATES, STATE_COLUMNS),
@@ -364,12 +359,10 @@ class Progress:
             found = record.value(RESTART, name, at)
             return float(found) if np.ndim(found) == 0 else np.array(found, float)
 
-        state = MotionState(**{c.name: value(c.name) for c in MOTION})
+        motion = {c.name: value(c.name) for c in MOTION}
+        state = MotionState(**motion, fluid=FluidState.unpacked(value("fluid") if "fluid" in held else np.zeros(0)))
         if wall is not None:
             state = replace(state, memory=wall.at(state.q, *(value(c.name) for c in MEMORY)))
-        for name, kind in (("line", LineState), ("gas", GasState)):
-            if name in held:
-                state = replace(state, **{name: kind.unpacked(value(name))})
         known = {f.name: value(f.name) for f in fields(cls) if f.name in held}
         known |= {name: int(known[name]) for name in ("steps", "saved")}
         known |= {"control": tuple(known["control"].tolist()), "eigenvalue": complex(*known["eigenvalue"])}
@@ -393,7 +386,7 @@ class Reader:
     def first(self, progress: Progress, inlet: float) -> dict[str, Any]:
         """Row of the start."""
         motion, state = self.motion, progress.state
-        load = motion.load(state.q, state.v, state.q, state.v, motion.instant(state, inlet), state.speed)
+        load = motion.load(state.q, state.v, state.q, state.v, motion.instant(state, inlet))
         return self.row(progress, load, 0.0, 0)
 
     def row(self, progress: Progress, load: Any, step: float, evaluations: int) -> dict[str, Any]:

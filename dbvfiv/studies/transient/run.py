@@ -16,7 +16,7 @@ from ...model.equilibria import model_warnings
 from ...model.material_stability import material_stability
 from ...motion.control import Drive, RunOptions, step_control
 from ...motion.equations import ValveMotion
-from ...motion.start import first_state
+from ...motion.start import first_state, steady_fluid
 from ...motion.state import MotionState, consistent_state
 from ...motion.stepper import StepFailure, Stepper
 from ...record.files import kind_of
@@ -199,9 +199,10 @@ def stored_state(motion: ValveMotion, case: Case, inlet: float) -> MotionState:
     q = model.shell.dofs.restrict(record.value(STATES, "nodal", index))
     if not moving:
         speed = float(record.value(STATES, "station_velocity", index)[-1])
-        return consistent_state(motion, 0.0, q, np.zeros(model.size), speed, inlet)
+        return consistent_state(motion, 0.0, q, np.zeros(model.size), inlet, steady_fluid(motion, q, inlet, speed))
     v = model.shell.dofs.restrict(record.value(STATES, "nodal_rate", index))
-    return consistent_state(motion, 0.0, q, v, float(record.value(STATES, "inlet_velocity", index)), inlet)
+    speed = float(record.value(STATES, "inlet_velocity", index))
+    return consistent_state(motion, 0.0, q, v, inlet, steady_fluid(motion, q, inlet, speed))
 
 
 def _read(path: Path) -> tuple[Record, bool]:
@@ -424,9 +425,9 @@ class Runner:
     def _beyond_pump(self, state: MotionState) -> str:
         """Sentence where the flow has left the pump's table; empty otherwise."""
         pump = self.model.pump
-        if pump is None or not self.motion.moving_fluid:
+        if pump is None or not self.motion.fluid.moves:
             return ""
-        velocity = state.speed if state.line is None else float(state.line.velocity[0])
+        velocity = self.model.flow.far_velocity(state.fluid.inner)
         mesh = self.model.mesh
         flow = mesh.part.copies * float(mesh.rest_area[-1] - mesh.wall_deduction[-1]) * velocity
         if pump.holds(flow):

@@ -83,7 +83,7 @@ def wave_in_a_pipe(around: int, radius: float, mode: int, length: float) -> floa
     contour = arc(1.0, np.linspace(0.5 * np.pi, 0.0, around + 1))
     rings = max(2, round((radius - 1.0) / z[1]))
     rigid, opening = (ring_face(contour, radius * contour, z[i], i == 0, rings) for i in (0, -1))
-    around_it = Surroundings(Panels.joined(pipe(radius, z, around), rigid), opening)
+    around_it = Surroundings(Panels.joined(pipe(radius, z, np.linspace(0.5 * np.pi, 0.0, around + 1)), rigid), opening)
     tube = extruded(contour, z)
     x, y, height = tube.centres.T
     k = 2.0 * np.pi / length
@@ -154,7 +154,10 @@ def test_an_open_end_lets_a_column_go():
     for n in (4, 8):
         contour = arc(1.0, np.linspace(0.5 * np.pi, 0.0, n + 1))
         piston = end_face(contour, 0.0, True)
-        flow = PotentialFlow(Surroundings(pipe(1.0, z, n), end_face(contour, length, False)), closed=ROOM)
+        flow = PotentialFlow(
+            Surroundings(pipe(1.0, z, np.linspace(0.5 * np.pi, 0.0, n + 1)), end_face(contour, length, False)),
+            closed=ROOM,
+        )
         pressure = flow.impedance(piston) @ piston.areas
         errors.append(float(piston.areas @ pressure / piston.areas.sum()) / length - 1.0)
     assert max(map(abs, errors)) < 0.0025, errors  # without closing the balance: 0.15

@@ -85,7 +85,7 @@ def test_a_small_motion_of_pressed_lips_follows_its_mode(valve):
     value, shape = values[chosen], vectors[:n, chosen]
     shape = 1e-9 * shape / np.abs(shape).max()
     motion = ValveMotion(model)
-    state = consistent_state(motion, 0.0, q + shape.real, (value * shape).real, 0.0, 500.0)
+    state = consistent_state(motion, 0.0, q + shape.real, (value * shape).real, 500.0)
     options = StepOptions(tolerance=1e-9, floor=1e-15)
     errors = []
     for steps in (40, 80):

@@ -1,0 +1,168 @@
+"""Laws that are made of others: a compressed fluid behind an elastic line, with a pump, losses and a pipe behind."""
+
+from __future__ import annotations
+
+import jax
+import numpy as np
+import pytest
+import scipy.linalg as la
+
+from dbvfiv.flow import Channel, FlowMotion
+from dbvfiv.flow.elastic_line import ElasticLine, LineChannel
+from dbvfiv.flow.gas import GasChannel
+from dbvfiv.flow.stepping import MovingFluid
+from dbvfiv.flow.terms.gap_friction import GapFriction
+from dbvfiv.flow.terms.line import Line
+from dbvfiv.flow.terms.pump import Pump
+from dbvfiv.flow.terms.tail import Tail
+from tests.flow.test_channel import FLOOR, difference, passage
+
+jax.config.update("jax_enable_x64", True)
+DENSITY, SOUND, SUPPLY = 1.2, 343.0, 6e3
+LOSSY = {"diameter": 0.2, "friction": 0.02, "loss": 1.5}
+#: No floor to speak of, and an opening that is next to none.
+TINY, SHUT = 1e-16, 1e-14
+
+
+def behind(z, line: Line, speed=300.0, sound=SOUND, floor=FLOOR, more=(), pump=None, elements=3, perimeter=None):
+    """A gas behind an elastic line."""
+    keys = {"reversible": True, "density": DENSITY, "perimeter": perimeter}
+    drives = [] if pump is None else [pump]
+
+    def gas(terms):
+        return GasChannel(Channel(z, floor, 1.0, terms=terms, **keys), sound)
+
+    return LineChannel(gas(more), gas([line, *drives, *more]), ElasticLine(line, speed, elements, pump))
+
+
+def given(inlet=SUPPLY) -> dict[str, float]:
+    return {"inlet": inlet, "density": DENSITY}
+
+
+def test_an_organ_pipe_of_two_halves():
+    """One pipe, of which the passage is a part and the line the rest: c/(4 L) (2 n + 1) with its outlet shut."""
+    near, far, step, errors = 0.56, 0.8, 1e-6, []
+    exact = 0.5 * np.pi * SOUND / (near + far) * (2 * np.arange(3) + 1)
+    for cells in (7, 14):
+        z = np.concatenate([[0.0], step + np.linspace(0.0, near, cells + 1)])
+        area = np.concatenate([[SHUT], np.full(cells + 1, 5e-3)])
+        law = behind(z, Line(far), SOUND, floor=TINY)
+        found = law.linearise_still(area, given(0.0), inner=np.zeros(law.inner))
+        values = la.eigvals(-found.S0, found.S1)
+        values = values[np.isfinite(values) & (np.abs(values) < 1e7)]
+        assert np.abs(values.real).max() < 1e-4 * np.abs(values).max()  # nothing is lost at rest
+        errors.append(np.sort(values.imag[values.imag > 1.0])[:3] / exact - 1)
+    assert np.log2(errors[0] / errors[1]) == pytest.approx(2.0, abs=0.3)
+    # the box scheme's share: that of the passage in the pipe
+    assert 0.0 < errors[1][0] < (exact[0] / SOUND * near / 14) ** 2 / 12
+
+
+def test_a_stiff_gas_is_the_incompressible_law():
+    """Answers of the pressures to the areas at a frequency differ by 1/c^2."""
+    z, area = passage()
+    line, s = Line(7.0, reservoir=False, **LOSSY), 20.0 + 250.0j
+    plain = LineChannel(Channel(z, FLOOR, 1.0), Channel(z, FLOOR, 1.0, terms=[line]), ElasticLine(line, 300.0, 3))
+
+    def answer(law):
+        p = law.linearise_still(area, given())
+        inner = la.solve(p.S0 + s * p.S1, p.R0 + s * p.R1 + s * s * p.R2)
+        return p.A0 + s * p.A1 + s * s * p.A2 - (p.B0 + s * p.B1) @ inner
+
+    expected, gaps = answer(plain), []
+    for sound in (1e4, 1e5):
+        law = behind(z, line, sound=sound)
+        gaps.append(np.abs(answer(law) - expected).max() / np.abs(expected).max())
+        assert law.steady_pressure(area, SUPPLY) == pytest.approx(plain.steady_pressure(area, SUPPLY), rel=1e3 / sound)
+    assert gaps[0] / gaps[1] == pytest.approx(100.0, rel=0.1) and gaps[1] < 1e-5
+
+
+def test_steady_flow():
+    """It meets the equations; behind a line that loses nothing it is that behind its rigid column."""
+    z, area = passage()
+    pump = Pump([0.0, 1.0, 3.0], [600.0, 500.0, 100.0], DENSITY, SUPPLY)
+    for line, drive in ((Line(7.0, **LOSSY), pump), (Line(7.0, 0.2), None)):
+        law = behind(z, line, more=[Tail(0.2, 3.0, 0.5)], pump=drive)
+        inner = law.steady_inner(area, given())
+        pressure, rest = law.evaluate(FlowMotion.still(area, inner), given())
+        if drive is None:
+            assert np.abs(rest).max() < 1e-9 * SUPPLY
+            assert pressure == pytest.approx(law.rigid.steady_pressure(area, SUPPLY), rel=1e-10, abs=1e-7)
+        else:  # but for what the pump gives at another flow than that of its operating point
+            own = np.delete(rest, law.channel.inner)
+            assert np.abs(own).max() < 1e-9 * SUPPLY
+        assert pressure == pytest.approx(law.steady_pressure(area, SUPPLY), rel=1e-10, abs=1e-7)
+        slope = law.steady_operator(area, SUPPLY)[1]
+        way = area * np.linspace(-1.0, 1.0, len(z))
+        expected = difference(lambda x: law.steady_pressure(x, SUPPLY), area, way, 1e-5)
+        assert np.abs(slope @ way - expected).max() < 1e-6 * np.abs(expected).max()
+
+
+def everything(z):
+    """A gas that rubs, behind an elastic line with a pump and before a pipe."""
+    pump = Pump([0.0, 1.0, 3.0], [600.0, 500.0, 100.0], DENSITY, SUPPLY)
+    more = [GapFriction(1.8e-5), Tail(0.2, 3.0, 0.5)]
+    return behind(z, Line(7.0, **LOSSY), more=more, pump=pump, perimeter=np.linspace(0.1, 0.2, len(z)))
+
+
+def test_jacobians_of_everything_together():
+    z, area = passage()
+    law, rng = everything(z), np.random.default_rng(4)
+    inner = law.steady_inner(area, given()) * rng.uniform(0.9, 1.1, law.inner)
+    motion = FlowMotion(area, 0.02 * rng.standard_normal(len(z)), rng.standard_normal(len(z)), inner, 10.0 * inner)
+    way = FlowMotion(*(np.abs(part).max() * rng.standard_normal(part.shape) for part in motion))
+    way = way._replace(area=0.1 * area * way.area / np.abs(way.area).max())
+    found, d = law.linearise(motion, given()), 1e-5
+    ends = [law.evaluate(FlowMotion(*(a + s * d * b for a, b in zip(motion, way))), given()) for s in (1, -1)]
+    for names, (ahead, back) in zip((("A0", "A1", "A2", "B0", "B1"), ("R0", "R1", "R2", "S0", "S1")), zip(*ends)):
+        slope = sum(getattr(found, name) @ b for name, b in zip(names, way))
+        assert np.abs(slope - (ahead - back) / (2 * d)).max() < 1e-6 * np.abs(slope).max()
+
+
+def test_steps_of_everything_together():
+    """Slopes against differences; books that close to rounding with any step, and steps that take the less the shorter
+    they are; a steady flow stays.
+    """
+    z, area = passage()
+    law, period = everything(z), 0.2
+    fluid, shape = MovingFluid(law, DENSITY), np.linspace(0.3, 0.0, len(z))
+
+    def at(t):
+        x = 2 * np.pi * t / period
+        return area * (1 + 0.5 * shape * (1 - np.cos(x))), area * np.pi / period * shape * np.sin(x)
+
+    start = fluid.steady_inner(area, SUPPLY)
+    taken = []
+    for count in (50, 100):
+        state, h = fluid.moving(at(0.0), np.zeros(len(z)), start, SUPPLY), 0.5 * period / count
+        before = fluid.energies(area, start)
+        for i in range(count):
+            new = at((i + 1) * h)
+            step = fluid.step(state, None, h, 1.0, 1.5, SUPPLY)
+            flow = step.at(new, new)
+            state = flow.state()
+        after, books = fluid.energies(*new[:1], state.inner), dict(zip(law.book_names, state.books))
+        gained = {name: after[name] - before[name] for name in before}
+        gas = [value for name, value in books.items() if name.startswith("gas_")]
+        line = [value for name, value in books.items() if name.startswith("line_")]
+        assert abs(gained["gas_energy"] - gas[0] + sum(gas[1:])) < 1e-11 * gas[0]
+        assert (
+            abs(gained["line_kinetic_energy"] + gained["line_elastic_energy"] - line[0] + sum(line[1:]))
+            < 1e-11 * line[0]
+        )
+        taken.append(books["line_step_loss"])
+    assert taken[0] > 2.5 * taken[1] > 0.0
+    way = area * np.linspace(1.0, -1.0, len(z))
+    expected = difference(lambda x: step.at((x, new[1]), (x, new[1])).pressure, new[0], way, 1e-5)
+    assert np.abs(flow.slopes(0.0) @ way - expected).max() < 1e-6 * np.abs(expected).max()
+
+
+def test_what_the_line_hands_over_the_gas_takes_in():
+    """Energy at the flange, before and behind it, of a flow that changes."""
+    z, area = passage()
+    law = behind(z, Line(7.0, **LOSSY))
+    fluid, still = MovingFluid(law, DENSITY), (area, np.zeros(len(z)))
+    state = fluid.moving(still, 0 * area, fluid.steady_inner(area, 0.8 * SUPPLY), SUPPLY)
+    for _ in range(100):
+        state = fluid.step(state, None, 2e-4, 1.0, 1.5, SUPPLY).at(still, still).state()
+    books = dict(zip(law.book_names, state.books))
+    assert books["line_work"] == pytest.approx(books["gas_supply"], rel=1e-12)

@@ -1,0 +1,86 @@
+"""Fluids together: a gas behind an elastic line; pump, waves, water outside and friction; water around a half.
+
+A small kick grows as the eigenvalue says, and energies of the run close.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import dbvfiv
+from dbvfiv.flow.energy import GAS_BOOKS, LINE_BOOKS
+from dbvfiv.motion.control import RunOptions
+from dbvfiv.motion.start import steady_positions
+from dbvfiv.motion.stepper import StepOptions
+from dbvfiv.studies.case import thesis_case
+from dbvfiv.studies.transient.run import Runner
+from tests.verification.test_transient_modes import errors, ringing
+
+COARSE = {"mesh.around": 6, "mesh.along": 8, "fluid.continuity": "storage", "damping.alpha": 0.0, "damping.beta": 3e-3}
+WAVES = {"upstream.length": 6.0, "upstream.diameter": 0.3, "upstream.loss": 0.5, "upstream.elements": 3}
+KINDS = {
+    "gas and waves": WAVES
+    | {"upstream.wave_speed": 300.0, "fluid.density": 1.2, "fluid.sound_speed": 340.0, "drive.pressure": 2e3},
+    "pump, waves, water outside, friction": WAVES
+    | {
+        "upstream.wave_speed": 300.0,
+        "upstream.pump": [[0.0, 4.0], [0.1, 3.0], [0.5, 0.1]],
+        "fluid.density": 1000.0,
+        "fluid.viscosity": 1e-3,
+        "outside.fluid": "same",
+        "drive.pressure": 6e3,
+    },
+    "half in water": {
+        "mesh.part": "half",
+        "mesh.around": 5,
+        "fluid.density": 1000.0,
+        "outside.fluid": "same",
+        "drive.pressure": 6e3,
+        "transient.kick_mode": 2,  # the first moves the lips sideways
+    },
+}
+PUSH = 1e-8
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_kick_grows_as_the_eigenvalue_and_energies_close(kind):
+    kick = {"transient.start": "kick", "transient.kick_opening": PUSH}
+    valve = dbvfiv.load(thesis_case(), COARSE | KINDS[kind] | kick)
+    model, pressure = valve.model, valve.case.drive.pressure
+    lip = model.shell.dofs.index[model.mesh.centre_line[0], 1]
+    modes = [mode for mode in valve.modes(count=8).modes if mode.frequency > 0]
+    q, found = steady_positions(model, pressure), []
+    mode = modes[valve.case.transient.kick_mode - 1]
+    full = complex(mode.growth_rate, 2 * np.pi * mode.frequency)
+    for count in (50, 100):
+        step = 1 / mode.frequency / count
+        model.case = valve.case.replace({"transient.step": step, "transient.duration": 1.25 * count * step})
+        run = Runner(model, replace(RunOptions.of(model.case), step=StepOptions(tolerance=1e-8, floor=1e-13))).start()
+        assert not run.failures
+        history = run.history
+        found.append(ringing((history["lip_displacement"] - q[lip]) / PUSH, step))
+        check_energies(history)
+    limit = found[1] + (found[1] - found[0]) / 3
+    print(f"\n{kind}: eigenvalue {full:.5f}, in time {found}, limit {limit:.5f}")
+    growth, frequency = errors(limit, full)
+    assert growth < 0.01 and frequency < 0.005
+
+
+def check_energies(history):
+    """What each part of the fluid gained is what it took in less what it gave, to rounding; the line hands the flange's
+    power over; and the wall's balance is that of its parts.
+    """
+    if "line_supply" in history:
+        held = history["line_kinetic_energy"] + history["line_elastic_energy"]
+        supply, *gone = (history[name] for name in LINE_BOOKS)
+        assert np.abs(held - held[0] - supply + sum(gone)).max() < 1e-9 * max(held.max(), np.abs(supply).max())
+    if "gas_supply" in history:
+        supply, *gone = (history[name] for name in GAS_BOOKS)
+        gained = history["gas_energy"] - history["gas_energy"][0]
+        assert np.abs(gained - supply + sum(gone)).max() < 1e-9 * supply.max()
+        assert history["line_work"][-1] == pytest.approx(supply[-1], rel=1e-8)
+    # a kick of this size moves less energy than rounding leaves of what the strained wall holds
+    assert np.abs(history["balance"]).max() < 1e-10 * history["strain_energy"].max()
