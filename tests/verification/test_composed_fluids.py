@@ -11,7 +11,9 @@ import numpy as np
 import pytest
 
 import dbvfiv
+from dbvfiv.case.quantity import GRAVITY
 from dbvfiv.flow.energy import GAS_BOOKS, LINE_BOOKS
+from dbvfiv.model.equilibria import find_equilibrium
 from dbvfiv.motion.control import RunOptions
 from dbvfiv.motion.start import steady_positions
 from dbvfiv.motion.stepper import StepOptions
@@ -27,7 +29,6 @@ KINDS = {
     "pump, waves, water outside, friction": WAVES
     | {
         "upstream.wave_speed": 300.0,
-        "upstream.pump": [[0.0, 4.0], [0.1, 3.0], [0.5, 0.1]],
         "fluid.density": 1000.0,
         "fluid.viscosity": 1e-3,
         "outside.fluid": "same",
@@ -49,6 +50,8 @@ PUSH = 1e-8
 def test_a_kick_grows_as_the_eigenvalue_and_energies_close(kind):
     kick = {"transient.start": "kick", "transient.kick_opening": PUSH}
     valve = dbvfiv.load(thesis_case(), COARSE | KINDS[kind] | kick)
+    if kind.startswith("pump"):
+        valve = valve.replace({"upstream.pump": falling_curve(valve)})
     model, pressure = valve.model, valve.case.drive.pressure
     lip = model.shell.dofs.index[model.mesh.centre_line[0], 1]
     modes = [mode for mode in valve.modes(count=8).modes if mode.frequency > 0]
@@ -67,6 +70,13 @@ def test_a_kick_grows_as_the_eigenvalue_and_energies_close(kind):
     print(f"\n{kind}: eigenvalue {full:.5f}, in time {found}, limit {limit:.5f}")
     growth, frequency = errors(limit, full)
     assert growth < 0.01 and frequency < 0.005
+
+
+def falling_curve(valve) -> list[list[float]]:
+    """Pump curve through the steady state at drive.pressure."""
+    state = find_equilibrium(valve.model, valve.case.drive.pressure)
+    flow, head = state.volume_flow, valve.case.drive.pressure / (valve.case.fluid.density * GRAVITY)
+    return [[0.0, 1.5 * head], [flow, head], [2.0 * flow, 0.3 * head]]
 
 
 def check_energies(history):
