@@ -94,6 +94,24 @@ SCRIPTS = {
 }
 
 
+WRONG = """
+    import dbvfiv
+
+    valve = dbvfiv.load("cases/dbv12.toml", {"mesh.around": 4})
+    valve.steady("12 kPa").mass_flux
+    valve.onset(3)
+"""
+
+
+@pytest.mark.slow
+def test_a_type_checker_finds_what_is_wrong_with_a_script(tmp_path):
+    api = pytest.importorskip("mypy.api", reason="the package mypy is not installed")
+    (tmp_path / "wrong.py").write_text(textwrap.dedent(WRONG))
+    options = ["--cache-dir", str(tmp_path), "--ignore-missing-imports", "--follow-imports=silent"]
+    said, _, _ = api.run([*options, str(tmp_path / "wrong.py")])
+    assert "mass_flux" in said and '"onset" of "Valve"' in said and "Found 2 errors" in said, said
+
+
 @pytest.mark.slow
 def test_a_type_checker_finds_nothing_wrong_with_three_scripts(tmp_path):
     api = pytest.importorskip("mypy.api", reason="the package mypy is not installed")
