@@ -357,8 +357,9 @@ class _Studies:
                         jobs[pool.submit(_fill, run.kind, self._asked(run), self._path(run))] = run.name
                 for job in as_completed(jobs):
                     self.bar.done(jobs[job])
-            except BaseException:
-                pool.shutdown(wait=False, cancel_futures=True)
+            except BaseException:  # what runs on would be waited for
+                for worker in list(pool._processes.values()):
+                    worker.terminate()
                 raise
 
 

@@ -6,7 +6,10 @@ import base64
 import html
 import io
 import json
+import os
 import re
+import signal
+import time
 
 import numpy as np
 import pytest
@@ -19,6 +22,7 @@ from dbvfiv.report import gather, write_page, write_pdf
 from dbvfiv.report.answers import UNKNOWN, answers
 from dbvfiv.report.gather import heads_of
 from dbvfiv.studies.case import load_case
+from tests.child import start
 from tests.small_valves import THESIS_SET
 
 #: A state that flutters, on a coarse mesh.
@@ -182,3 +186,28 @@ def test_bad_arguments(command_line, one_sentence, arguments, words):
     keys = [word for key in KEYS for word in ("--set", key)]
     outcome = command_line("report", *keys, *arguments)
     assert outcome.status == 2 and one_sentence(outcome.err) and words in outcome.err
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("whole_group", [True, False], ids=["Ctrl-C", "its own process alone"])
+def test_a_report_of_several_processes_ends_when_it_is_told_to_and_goes_on(tmp_path, whole_group):
+    left_out = [word for name in LEFT_OUT for word in ("--without", name)]
+    command = [
+        "report",
+        *(word for key in KEYS for word in ("--set", key)),
+        "--workers",
+        2,
+        "-o",
+        tmp_path / "page.html",
+    ]
+    with start(*command, *left_out, start_new_session=True) as child:
+        until = time.monotonic() + 300
+        while len(list(tmp_path.rglob("*.h5"))) < 3 and time.monotonic() < until:
+            time.sleep(0.2)
+        (os.killpg if whole_group else os.kill)(child.pid, signal.SIGINT if whole_group else signal.SIGTERM)
+        child.communicate(timeout=60)
+        assert child.returncode not in (0, None)
+    with start(*command, *left_out) as child:
+        _, said = child.communicate(timeout=600)
+        assert child.returncode == 0, said
+    assert "Does it chatter" in text_of(tmp_path / "page.html")
