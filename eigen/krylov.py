@@ -8,6 +8,11 @@ vector a step however many relaxation times there are.
 Relaxation: thousands of real eigenvalues lie left of each -1/tau_j, nearer to a real shift than what oscillates. In the
 plane of theta = 1/(lambda - sigma) they stay on the real axis, inside the circle near which the oscillating ones lie;
 so these are counted by |Im theta|, and those right of the relaxation spectrum are taken in as they come.
+
+Why not a library: measured at 6816 structural unknowns with four relaxation times, seconds of processor for ten leading
+pairs, this takes 1.1; SLEPc's Krylov-Schur method on whole vectors 1.3 by imaginary part, and by magnitude none found
+in 14; SLEPc's NLEIGS, which takes only real targets in real arithmetic, none found in 8. Its Krylov-Schur method works
+on all parts of a vector; it can be put in this one's place by one argument, as tests/eigen/test_solver.py does.
 """
 
 from __future__ import annotations
