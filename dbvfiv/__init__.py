@@ -8,27 +8,8 @@ Importing the package sets JAX to double precision (see ``dbvfiv.runtime``).
 """
 
 from importlib import import_module
-from typing import TYPE_CHECKING
 
 from . import runtime
-
-if TYPE_CHECKING:  # names are loaded when they are first asked for; type checkers do not see that
-    from .api import Valve, load
-    from .errors import CaseError, SolveError
-    from .observer import Observer
-    from .resuming import resume
-    from .studies.closure.study import ClosureResult
-    from .studies.cycle.study import CycleResult
-    from .studies.levels.study import LevelsResult
-    from .studies.map.study import MapResult
-    from .studies.modes.study import ModesResult
-    from .studies.onset.study import OnsetResult
-    from .studies.sensitivity.study import SensitivityResult
-    from .studies.session import load_result
-    from .studies.state import State
-    from .studies.steady.study import SteadyResult
-    from .studies.sweep.study import SweepResult
-    from .studies.transient.study import TransientResult
 
 runtime.prepare()
 

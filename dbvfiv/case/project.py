@@ -20,7 +20,7 @@ def _known_units(text: str) -> str:
 
 
 class Project(Section):
-    """What a sheet or a report is for; free text, and the units in which results are read."""
+    """Purpose of a sheet or a report; free text, and the units in which results are read."""
 
     project: Text = key("", "Project or site, for the first page of a report.")
     customer: Text = key("", "Who it is for.")
@@ -39,7 +39,7 @@ class Project(Section):
 
 
 class Report(Section):
-    """What a report covers."""
+    """Extent of a report."""
 
     heads: tuple[LoadPressure, ...] = key(
         (),

@@ -333,12 +333,12 @@ class LineChannel(AroundChannel):
 
     @property
     def book_names(self) -> tuple[str, ...]:
-        """Those of the passage and of the line."""
+        """Names for the passage and for the line."""
         return (*self.channel.book_names, *LINE_BOOKS)
 
     @property
     def energy_names(self) -> tuple[str, ...]:
-        """Those of the passage and of the line."""
+        """Names for the passage and for the line."""
         return (*self.channel.energy_names, "line_kinetic_energy", "line_elastic_energy")
 
     def first_carried(self, motion, parameters):
@@ -374,5 +374,5 @@ class LineChannel(AroundChannel):
         return jnp.concatenate([self.channel.energies(area, own, parameters), line])
 
     def readings(self, area, inner, parameters):
-        """Those of a compressed fluid in the passage; see `GasChannel.readings`."""
+        """Readings of a compressed fluid in the passage; see `GasChannel.readings`."""
         return self.channel.readings(area, inner[: self.channel.inner], parameters)

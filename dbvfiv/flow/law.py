@@ -261,7 +261,7 @@ class FlowLaw(Traceable, ABC):
         return jnp.zeros(self.count)
 
     def first_carried(self, motion: FlowMotion, parameters):
-        """What `step_books` carries from step to step, at the start of a motion; traceable."""
+        """State of `step_books` at the start of a motion, carried from step to step; traceable."""
         return jnp.zeros(0)
 
     def step_books(self, step, parameters):

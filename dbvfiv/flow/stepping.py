@@ -500,7 +500,7 @@ def _operators(law, parameters, area, area_rate, inner):
 
 @jax.jit
 def _first(law, parameters, motion):
-    """What is held (m + l,), scales, speeds and their rates (m,), and what the first step's energies need."""
+    """Quantities held (m + l,), scales, speeds and their rates (m,), and what the first step's energies need."""
     area, rate, acceleration, inner, inner_rate = motion
     carried = law.first_carried(motion, parameters)
     speeds = lambda *at: law.speeds_of(*at, parameters)  # noqa: E731

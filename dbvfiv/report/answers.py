@@ -155,7 +155,7 @@ def _factor(verdicts: dict) -> str:
 
 
 def _sure(found: Gathered, verdicts: dict) -> tuple[str, ...]:
-    """How sure the verdict is: second mesh, range of the loss factors, strain levels."""
+    """Uncertainty of the verdict: second mesh, range of the loss factors, strain levels."""
     said, worst = [], found.worst
     own = verdicts[worst]
     other = found.get("mesh-modes")

@@ -139,7 +139,7 @@ def is_on_own_mesh(name: str) -> bool:
 
 
 def _nearness(verdict) -> float:
-    """How near a state is to chatter: negative least damping ratio."""
+    """Nearness of a state to chatter: negative least damping ratio."""
     return -verdict.damping_ratio if np.isfinite(verdict.damping_ratio) else -np.inf
 
 

@@ -356,7 +356,7 @@ class MeasuredSection:
 
     @property
     def root_mean_square(self) -> float:
-        """Of the distances, m."""
+        """Root mean square of the distances, m."""
         return float(np.sqrt(np.mean(self.distance**2)))
 
     @property

@@ -28,7 +28,7 @@ KEPT = 8
 
 
 class SampleKey(NamedTuple):
-    """What tells apart the samples of one run besides the value of their line's parameter."""
+    """Key of a sample of one run, besides the value of its line's parameter."""
 
     continuity: float = 0.0
     symmetry: str = ""

@@ -194,7 +194,7 @@ class SweepResult(StudyResult):
 
     @cached_property
     def _over(self) -> dict[str, Any]:
-        """What a sweep that is over says of itself; of one that goes on or was killed nothing."""
+        """Closing note of a sweep that is over; empty for one that goes on or was killed."""
         return self._latest("over")
 
     def _rows(self, name: str) -> list[dict[str, Any]]:

@@ -311,7 +311,7 @@ def tables_of(mesh: MeshData) -> tuple[TableSpec, ...]:
 
 @dataclass
 class Progress:
-    """How far a run has come: a restart point.
+    """Restart point: progress of a run.
 
     Attributes
     ----------
