@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import asdict, dataclass, fields
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -14,15 +14,121 @@ from ..stability.dimensions import Variant
 from ..stability.samples import WATCHED, Sample
 from ..stability.verdict import Verdict
 
-if TYPE_CHECKING:
-    from .search import OnsetPoint
-
 Interval = tuple[float, float]
 
 #: Relative distance from an onset within which values of a scan say nothing of the state.
 BESIDE = 1e-7
 #: Stretches narrower than this part of their place are what is left of the search for an onset.
 _SLIVER = 1e-6
+
+
+@dataclass(frozen=True)
+class Side:
+    """Stability at a parameter value a little beside an onset, by the full model.
+
+    Attributes
+    ----------
+    value : float
+    growth_rate, frequency : float, 1/s, Hz
+        Of the crossing mode.
+    leading_growth_rate : float, 1/s
+        Of the leading mode.
+    unstable_count, unstable_count_independent : int
+        Unstable eigenvalues by the spectrum and by the argument principle.
+    """
+
+    value: float
+    growth_rate: float
+    frequency: float
+    leading_growth_rate: float
+    unstable_count: int
+    unstable_count_independent: int
+
+    @classmethod
+    def of(cls, sample: Sample, near: complex) -> Side:
+        """From a sample, with the mode next to an eigenvalue."""
+        values = sample.eigenvalues
+        mode = complex(values[int(np.argmin(np.abs(values - near)))])
+        counts = sample.unstable, sample.counted
+        return cls(sample.value, mode.real, mode.imag / (2 * np.pi), float(values[0].real), *counts)
+
+    @property
+    def eigenvalue(self) -> complex:
+        """Eigenvalue of the crossing mode, 1/s."""
+        return complex(self.growth_rate, 2 * np.pi * self.frequency)
+
+
+@dataclass(frozen=True)
+class OnsetPoint:
+    """One crossing of the imaginary axis.
+
+    Attributes
+    ----------
+    parameter : str
+    value : float
+    frequency : float, Hz
+        0 for a real eigenvalue (divergence).
+    growth_rate : float, 1/s
+        Left over at the value: how well it is located.
+    gains : bool
+        True if the mode becomes unstable as the parameter grows.
+    edge : bool
+        True if no other mode is unstable there, so that the state itself changes between stable and unstable.
+    below, above : Side
+        Direct eigenvalues on both sides.
+    confirmed : bool
+        Both sides agree with the crossing, and both counts agree on each side.
+    bracket : (2,) tuple of float
+        Neighbouring values of the scan that it lies between.
+    ahead : int
+        Modes that grow faster there.
+    criticality : str or None
+        "super", "sub" or "degenerate"; None for a real eigenvalue or where it was not asked for.
+    first_lyapunov_coefficient : float or None
+        Scaled for eigenvectors of unit norm in (q, v, U), 1/s; only its sign carries over to other scalings.
+    crossing_speed : float or None
+        Derivative of the growth rate with respect to the parameter.
+    uncertainty : float or None
+        By Richardson's rule from a second mesh, in units of the parameter.
+    coarse_value : float or None
+        The onset on the second mesh.
+    note : str
+    """
+
+    parameter: str
+    value: float
+    frequency: float
+    growth_rate: float
+    gains: bool
+    edge: bool
+    below: Side
+    above: Side
+    confirmed: bool
+    bracket: tuple[float, float]
+    ahead: int = 0
+    criticality: str | None = None
+    first_lyapunov_coefficient: float | None = None
+    crossing_speed: float | None = None
+    uncertainty: float | None = None
+    coarse_value: float | None = None
+    note: str = ""
+
+    @property
+    def key(self) -> tuple[float, float, int]:
+        """Key that identifies the crossing among those of the same scan."""
+        return (*self.bracket, self.ahead)
+
+    def summary(self) -> dict[str, Any]:
+        """Plain SI numbers for JSON; its kind is "Hopf" or "divergence"."""
+        own = asdict(self) | {"bracket": list(self.bracket), "note": self.note or None}
+        return own | {"kind": "Hopf" if self.frequency > 0 else "divergence"}
+
+    @classmethod
+    def read(cls, summary: Mapping[str, Any]) -> OnsetPoint:
+        """The point that `summary` gave."""
+        given = {field.name: summary[field.name] for field in fields(cls)}
+        sides = {name: Side(**summary[name]) for name in ("below", "above")}
+        return cls(**given | sides | {"bracket": tuple(summary["bracket"]), "note": summary["note"] or ""})
 
 
 @dataclass(frozen=True)

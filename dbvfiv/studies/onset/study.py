@@ -24,8 +24,8 @@ from ..stability.verdict import DIVERGES, FLUTTERS, NOT_VALID, STABLE, UNDECIDED
 from ..stability.walk import StabilityWalk
 from ..study import Study
 from . import figures
-from .line import FoundOnsets, Interval, common_stretches, disagreements, joined_stretches, merge_points
-from .search import FINE, OnsetOptions, OnsetPoint, run_onset
+from .line import FoundOnsets, Interval, OnsetPoint, common_stretches, disagreements, joined_stretches, merge_points
+from .search import FINE, OnsetOptions, run_onset
 
 CRITICALITY = {"super": "supercritical", "sub": "subcritical"}
 #: Kinds of notes: on a point, and on a variant that was searched to its end.
