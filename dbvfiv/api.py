@@ -11,7 +11,7 @@ from .case.axis import is_single, read_pressures, write_axis
 from .case.model import Changes, change_case
 from .drawing import views
 from .drawing.style import draw_figures, write_figures
-from .errors import SolveError
+from .errors import SolveError, as_path
 from .fit.damping import DampingReport, describe_damping
 from .model import ValveModel
 from .observer import Observer, Progress, is_watched
@@ -348,6 +348,8 @@ class Valve:
         ------
         CaseError, SolveError
         """
+        if workers is not None:
+            self.case.replace({"map.workers": workers})  # refuses what is no number of processes
         session = self._ask({"map.x": write_axis(x), "map.y": write_axis(y)}, changes)
         return session.perform("map", output, observer or bar(), workers=workers)
 
@@ -402,6 +404,6 @@ def load(case: str | Path | Case | None = None, changes: Changes | None = None) 
     CaseError
         One sentence: which key, what was given, what is allowed.
     """
-    name = "dbv12" if case is None else "case" if isinstance(case, Case) else Path(case).stem
+    name = "dbv12" if case is None else "case" if isinstance(case, Case) else as_path(case, "A case file").stem
     made = case if isinstance(case, Case) else load_case(case)
     return Valve(made if changes is None else change_case(made, changes), name)

@@ -7,6 +7,9 @@ there is no room for the answer (exit status 1).
 
 from __future__ import annotations
 
+from pathlib import Path
+from typing import Any
+
 
 class CaseError(ValueError):
     """A case, an override or a command-line value that cannot be used.
@@ -49,3 +52,17 @@ class DiskFull(RuntimeError):
 
     No ``SolveError``: it ends a study, which would go on to the next value after one that was not solved.
     """
+
+
+def as_path(given: Any, what: str) -> Path:
+    """Path of a file or folder.
+
+    Raises
+    ------
+    CaseError
+        For anything that is no name; `what` begins the sentence.
+    """
+    try:
+        return Path(given)
+    except TypeError:
+        raise CaseError(f"{what} is given as {given!r}; it must be the name of a file or folder.") from None

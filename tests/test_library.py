@@ -56,6 +56,34 @@ def test_tables_come_with_units_and_ranges_as_arrays():
             valve.onset(given)
 
 
+@pytest.mark.parametrize(
+    "ask",
+    [
+        lambda valve: valve.steady(object()),
+        lambda valve: valve.steady("6 kPa", output=5),
+        lambda valve: valve.closure(object()),
+        lambda valve: valve.levels(object()),
+        lambda valve: valve.modes([1, 2]),
+        lambda valve: valve.modes("6 kPa", count="x"),
+        lambda valve: valve.modes(density="x"),
+        lambda valve: valve.modes(foam=1),
+        lambda valve: valve.onset(3),
+        lambda valve: valve.sensitivity(5),
+        lambda valve: valve.map("pressure=1000,2000", workers="two"),
+        lambda valve: valve.transient([1]),
+        lambda valve: valve.plot(5),
+        lambda valve: valve.replace(5),
+        lambda valve: dbvfiv.load(5),
+        lambda valve: dbvfiv.load_result(5),
+        lambda valve: dbvfiv.resume(5),
+    ],
+)
+def test_wrong_types_are_answered_by_a_sentence(ask):
+    with pytest.raises(dbvfiv.CaseError) as refused:
+        ask(dbvfiv.load(thesis_case(), {"mesh.around": 4, "mesh.along": 6}))
+    assert str(refused.value).endswith(".") and "given" in str(refused.value)
+
+
 def test_texts_of_a_branch_and_its_points_are_short():
     options = ContinuationOptions(eigenvalues=2, limits={"B": (0.0, 4.0)})
     branch = continue_branch(brusselator(), [1.0, 0.5], {"A": 1.0, "B": 0.5}, "B", options)

@@ -185,4 +185,4 @@ def read_pressures(given: Iterable[Any], name: str, density: float | None = None
 
 def is_single(pressure: Any) -> bool:
     """True for one pressure, False for several."""
-    return isinstance(pressure, (int, float, str)) or getattr(pressure, "ndim", None) == 0
+    return isinstance(pressure, str) or not isinstance(pressure, Iterable) or getattr(pressure, "ndim", None) == 0

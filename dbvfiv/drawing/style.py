@@ -19,7 +19,7 @@ from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
 from ..case.model import Case
 from ..case.parameters import PARAMETERS
-from ..errors import CaseError
+from ..errors import CaseError, as_path
 
 #: Colours of things that recur.
 COMPUTED, PUBLISHED, REST, ACCENT = "#1f4e79", "#c0392b", "#8c8c8c", "#d98200"
@@ -202,7 +202,7 @@ def write_figures(figures: Mapping[str, Figure], folder: str | Path = ".", forma
     """
     if format not in FORMATS:
         raise CaseError(f"Figures are written as {' or '.join(FORMATS)}, not as {format!r}.")
-    folder = Path(folder)
+    folder = as_path(folder, "A folder for figures")
     written = []
     try:
         folder.mkdir(parents=True, exist_ok=True)

@@ -15,7 +15,7 @@ from types import FrameType, TracebackType
 
 import h5py
 
-from ..errors import CaseError
+from ..errors import CaseError, as_path
 from .table import LAYOUT
 
 _HELD = (signal.SIGINT, signal.SIGTERM)
@@ -199,7 +199,7 @@ def reading(path: str | Path) -> Iterator[h5py.File]:
     CaseError
         If there is no such file, it is no result of this program, comes from a newer version, or is damaged.
     """
-    path = Path(path)
+    path = as_path(path, "A result file")
     if path.is_dir():
         raise CaseError(f"{str(path)!r} is a folder and not a result file.")
     if not path.exists():
@@ -305,7 +305,7 @@ def check_writable(path: str | Path) -> None:
     CaseError
         If it may not.
     """
-    path = Path(path)
+    path = as_path(path, "A result file")
     if not path.is_dir():
         check_free(path)  # first: a file that is being written is a result, however it reads at this instant
     refuse_foreign(path)

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from ..case.model import Case
-from ..errors import CaseError
+from ..errors import CaseError, as_path
 from ..observer import Observer
 from .files import DeferredSignals, reading
 from .header import Header, read_header
@@ -127,7 +127,7 @@ class GrowingRecord(Record, Observer):
         known: Record | None = None,
     ):
         self.header, self.mesh, self.watcher = header, mesh, watcher or Observer()
-        self.path = None if output is None else Path(output)
+        self.path = None if output is None else as_path(output, "A result file")
         self.tables = {table.name: table for table in tables}
         self._rows = {name: {c.name: [] for c in table.columns} for name, table in self.tables.items()}
         self._log: list[dict[str, Any]] = []

@@ -162,7 +162,7 @@ class State(SteadyState):
 
 def sensitivity_keys(of: str | Sequence[str], mode: int | None) -> dict[str, Any]:
     """Keys of the case from what a sensitivity is asked for."""
-    names = [of] if isinstance(of, str) else list(of)
+    names = [of] if isinstance(of, str) or not isinstance(of, Iterable) else list(of)
     return {"sensitivity.of": names or None, "sensitivity.mode": mode}
 
 
