@@ -45,6 +45,9 @@ class KrylovPairs:
         Applications of the shift-and-invert operator.
     exhausted : bool
         True if every eigenvalue of the pencil was found.
+    beside : float
+        Radius of a second disc of an elastic wall, around shift + i beside, in which every eigenvalue was found as
+        well: it reaches higher frequencies than the first where real eigenvalues crowd at a limit point.
     """
 
     eigenvalues: np.ndarray
@@ -53,6 +56,7 @@ class KrylovPairs:
     reach: float
     applications: int
     exhausted: bool
+    beside: float = 0.0
 
 
 def _apply(matrix, x):
@@ -228,7 +232,7 @@ def krylov_pairs(
     band: float = np.inf,
     limit_point: float | None = None,
     transposed: bool = False,
-    enough: Callable[[np.ndarray, float], bool] | None = None,
+    enough: Callable[[np.ndarray, float, float], bool] | None = None,
     most: int = 300,
 ) -> KrylovPairs:
     """Eigenpairs near the shift of a factored pencil.
@@ -246,10 +250,11 @@ def krylov_pairs(
         Angular frequency, rad/s, up to which those right of the relaxation spectrum are waited for.
     limit_point : float, optional
         Real limit point of eigenvalues: the search ends where all that is left to converge lies as far from the shift.
+        If `enough` wants more, it goes on for as many steps again with those of large |Im 1/(lambda - shift)|.
     transposed : bool
         Left vectors (conjugated) instead of right ones, from the same factor.
     enough : callable, optional
-        enough(eigenvalues, reach) is asked now and then about those that have converged; True ends the search.
+        enough(eigenvalues, reach, beside) is asked now and then about those that have converged; True ends the search.
     most : int
         Steps at most, one solve each.
 
@@ -260,25 +265,30 @@ def krylov_pairs(
     """
     pencil, shift = shifted.pencil, shifted.shift
     whole = pencil.order + pencil.b  # lambda U is among the unknowns
-    most = min(max(most, 2 * wanted + FIRST), whole)
+    most = min(max(most, 3 * wanted + FIRST), whole)
     limit = 0.0 if limit_point is None else 1.0 / abs(END * limit_point - shift)
     krylov = _Arnoldi(_Operator(shifted, transposed), most)
     edge = edge_of(pencil.relaxation)
-    beside = pencil.relaxation is not None and not isinstance(shift, complex)
+    real, limit_met = not isinstance(shift, complex), False
     while True:
         aim = min(most, max(FIRST, krylov.steps + max(EVERY, krylov.steps // EVERY)))
         while krylov.steps < aim:
             krylov.advance()
         theta, error, turn = krylov.ritz()
-        if beside:
+        beside, ended = 0.0, False
+        if real and pencil.relaxation is not None:
             chosen, reach, ready = _oscillating(shift, theta, error, edge, band)
-            ended = False
         else:
-            chosen, reach, ended = _nearest(theta, error, limit)
+            chosen, reach, at_limit = _nearest(theta, error, limit)
+            if real and limit:
+                above, beside, _ = _oscillating(shift, theta, error, np.inf, band)
+                chosen = np.union1d(chosen, above)
             ready = chosen.size > 0
-            ended = ended or (enough is None and chosen.size >= wanted)
+            if at_limit and enough is not None:
+                most, limit_met = (most if limit_met else min(most, 2 * krylov.steps)), True
+            ended = enough is None and (at_limit or chosen.size >= wanted)
         ended = ended or krylov.steps >= most
-        if ended or (ready and enough is not None and enough(shift + 1.0 / theta[chosen], reach)):
+        if ended or (ready and enough is not None and enough(shift + 1.0 / theta[chosen], reach, beside)):
             break
     q, u = krylov.vectors(turn[:, chosen])
     return KrylovPairs(
@@ -288,6 +298,7 @@ def krylov_pairs(
         reach=reach,
         applications=krylov.steps,
         exhausted=krylov.steps == whole and chosen.size >= np.sum(_is_finite(theta)),
+        beside=beside,
     )
 
 

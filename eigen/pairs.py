@@ -469,7 +469,7 @@ def attach_left(pencil, batch, solve, found) -> None:
     k = batch.values.size
     batch.left_q = np.zeros((pencil.n, k), complex)
     batch.left_u = np.zeros((pencil.b, k), complex)
-    pairs = solve(lambda values, _reach: _all_there(batch, values))
+    pairs = solve(lambda values, *_: _all_there(batch, values))
     found.applications += pairs.applications
     free = np.ones(pairs.eigenvalues.size, bool)
     workspace = Workspace()

@@ -26,11 +26,11 @@ def number_in_band(found, options) -> int:
     return int(np.sum(found.values.imag <= band_sought(options)))
 
 
-def would_do(values, oval: Oval, found, aim, options) -> bool:
-    """True where eigenvalues that have converged in an oval are all that is asked for."""
+def would_do(values, ovals: list[Oval], found, aim, options) -> bool:
+    """True where eigenvalues that have converged in some discs are all that is asked for."""
     apart = values[apart_from_limit(values, options) & (values.imag >= -1e-11 * np.abs(values))]
     trial = Found(apart, *(np.zeros(0),) * 4, lowest=found.lowest, slope=found.slope)
-    trial.ovals[oval.shift] = oval
+    trial.ovals |= {oval.shift: oval for oval in ovals}
     return is_covered(trial, aim, options)
 
 
@@ -107,7 +107,7 @@ def plan_shifts(pencil, count, options, workspace):
         return options, first
     beside = 1.5 * abs(options.limit_point)
     if beside < first:
-        return options, max(beside, holding_shift(options, 0.25 * options.limit_point))
+        return options, beside
     return replace(options, limit_point=None), first
 
 
@@ -268,8 +268,8 @@ def _at_shift(pencil, shift, wanted, aim, options, workspace, found, solver) -> 
     relaxing = pencil.relaxation is not None
     asked = {"limit_point": options.limit_point}
 
-    def enough(values, reach):
-        return would_do(values, _oval(shift, reach, relaxing), found, aim, options)
+    def enough(values, reach, beside):
+        return would_do(values, _ovals(shift, reach, beside, relaxing), found, aim, options)
 
     def search(shifted):
         asked_for = enough if relaxing or not options.shifts else None
@@ -292,15 +292,17 @@ def _at_shift(pencil, shift, wanted, aim, options, workspace, found, solver) -> 
         attach_left(pencil, batch, transposed, found)
     merge(found, batch)
     reach = min([pairs.reach * (1 + 1e-9)] + [(1 - 1e-6) * _reach_to(d, shift, relaxing) for d in dropped])
-    if reach > 0:
-        found.ovals[shift] = _oval(shift, reach, relaxing)
+    beside = min([pairs.beside * (1 + 1e-9)] + [(1 - 1e-6) * _reach_to(d, shift, True) for d in dropped])
+    found.ovals |= {oval.shift: oval for oval in _ovals(shift, reach, beside, relaxing)}
     found.everything = found.everything or (pairs.exhausted and not dropped.size)
 
 
-def _oval(shift, reach, relaxing) -> Oval:
-    """Disc in which all eigenvalues are known after a search at a shift."""
-    beside = relaxing and not isinstance(shift, complex)
-    return Oval(complex(shift, reach) if beside else shift, reach)
+def _ovals(shift, reach, beside, relaxing) -> list[Oval]:
+    """Discs in which all eigenvalues are known after a search at a shift."""
+    if relaxing and not isinstance(shift, complex):
+        reach, beside = 0.0, reach
+    discs = Oval(shift, reach), Oval(complex(shift.real, beside), beside)
+    return [disc for disc in discs if disc.reach > 0]
 
 
 def _reach_to(place, shift, relaxing) -> float:
