@@ -184,5 +184,7 @@ def read_pressures(given: Iterable[Any], name: str, density: float | None = None
 
 
 def is_single(pressure: Any) -> bool:
-    """True for one pressure, False for several."""
+    """True for one pressure, whatever it is; False for several, and where none is given."""
+    if pressure is None:
+        return False
     return isinstance(pressure, str) or not isinstance(pressure, Iterable) or getattr(pressure, "ndim", None) == 0
