@@ -80,7 +80,7 @@ def falling_curve(valve) -> list[list[float]]:
 
 
 def check_energies(history):
-    """What each part of the fluid gained is what it took in less what it gave, to rounding; the line hands the flange's
+    """Gain of each part of the fluid: what it took in less what it gave, to rounding; the line hands the flange's
     power over; and the wall's balance is that of its parts.
     """
     if "line_supply" in history:
