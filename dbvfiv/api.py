@@ -325,7 +325,7 @@ class Valve:
         x: Range | None = None,
         y: Range | None = None,
         *,
-        workers: int | None = None,
+        workers: int | str | None = None,
         output: Output = None,
         observer: Observer | None = None,
         **changes: Any,
@@ -336,9 +336,9 @@ class Valve:
         ----------
         x, y : str or mapping, optional
             Ranges as for `sweep`; map.x and map.y of the case by default.
-        workers : int, optional
-            Processes that share the columns; map.workers of the case by default. Under ``mpiexec`` with mpi4py all its
-            processes.
+        workers : int or str, optional
+            Processes that share the columns, or the address of a Dask scheduler; map.workers of the case by default.
+            Under ``mpiexec`` with mpi4py all its processes.
         output : path, optional
             Result file, written column by column; `dbvfiv.resume` continues it.
         observer, changes

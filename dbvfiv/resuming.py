@@ -9,6 +9,7 @@ from .errors import CaseError
 from .observer import Observer
 from .record.files import kind_of
 from .studies.session import resume_result
+from .studies.workers import read_workers
 
 #: What a resumed study may be given anew, the study that takes it, and what it is called in a sentence.
 _OWN = {
@@ -21,7 +22,7 @@ def resume(
     path: str | Path,
     *,
     duration: float | str | None = None,
-    workers: int | None = None,
+    workers: int | str | None = None,
     observer: Observer | None = None,
 ) -> Any:
     """Continue an interrupted or killed study in its file.
@@ -32,8 +33,8 @@ def resume(
         Result file; its case says what is still to do.
     duration : number (s) or text with a unit, optional
         Of a transient run: a later end.
-    workers : int, optional
-        Of a map: processes that share the columns.
+    workers : int or str, optional
+        Of a map: processes that share the columns, or the address of a Dask scheduler.
     observer : Observer, optional
 
     Returns
@@ -57,4 +58,4 @@ def resume(
         if value is not None and kind != owner:
             raise CaseError(f"{words}; {str(path)!r} is of kind {kind!r}.")
     changes = {} if duration is None else {"transient.duration": duration}
-    return resume_result(path, observer, changes, **({} if workers is None else {"workers": workers}))
+    return resume_result(path, observer, changes, **({} if workers is None else {"workers": read_workers(workers)}))

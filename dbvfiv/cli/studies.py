@@ -111,8 +111,8 @@ def resume(
         Path | None, typer.Option("--animate", metavar="FILE.gif", help="Write an animation of the last cycle.")
     ] = None,
     workers: Annotated[
-        int | None,
-        typer.Option("--workers", "-w", metavar="N", min=1, help="Of a map: processes that share the columns."),
+        str | None,
+        typer.Option("--workers", "-w", "--on", metavar="N|ADDRESS", help="Of a map: who shares the columns."),
     ] = None,
     as_json: AsJson = False,
 ) -> None:

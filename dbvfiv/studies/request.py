@@ -12,6 +12,7 @@ import typer
 from ..case.parameters import PARAMETERS
 from ..case.quantity import number_or_text
 from ..errors import CaseError
+from .workers import WORKERS_HELP
 
 #: Suffixes of sheets, tables that are no result files.
 SHEETS = (".csv", ".xlsx")
@@ -110,6 +111,7 @@ ClassesOption = Annotated[
         help="SS, the class of the model, or all: also sway in y (SA), sideways in x (AS) and twist (AA).",
     ),
 ]
+WorkersOption = Annotated[str | None, typer.Option("--workers", "-w", "--on", metavar="N|ADDRESS", help=WORKERS_HELP)]
 
 
 @dataclass(frozen=True)

@@ -12,7 +12,8 @@ from ...case.model import Case
 from ...case.parameters import listed
 from ...case.quantity import number_or_text
 from ...case.section import BrokenRule, Section, key
-from ..request import ClassesOption, Request, refuse_moved, with_unit
+from ..request import ClassesOption, Request, WorkersOption, refuse_moved, with_unit
+from ..workers import WORKERS_HELP, WorkersKey
 
 ORDER = 30
 
@@ -30,7 +31,7 @@ class Keys(Section):
         2, "How often columns are put in between neighbours with different numbers of onsets.", ge=0, le=6
     )
     checks: StrictInt = key(4, "Cells compared with the full pencil, spread over the map.", ge=0, le=1000)
-    workers: StrictInt = key(1, "Processes that share the columns.", ge=1, le=1024)
+    workers: WorkersKey = key(1, WORKERS_HELP)
     cycles: StrictBool = key(
         False,
         "Follow limit cycles from the onsets of each column of the grid, as the section cycle says: their amplitude in "
@@ -76,9 +77,7 @@ def command(
         str | None, typer.Option("--density", metavar="RHO", help="Fluid density where no axis moves it.")
     ] = None,
     both: Annotated[bool, typer.Option("--both", help="Both flow models side by side.")] = False,
-    workers: Annotated[
-        int | None, typer.Option("--workers", "-w", metavar="N", min=1, help="Processes that share the columns.")
-    ] = None,
+    workers: WorkersOption = None,
     symmetry: ClassesOption = None,
     cycles: Annotated[
         bool, typer.Option("--cycles", help="Amplitude of the limit cycle in each cell that has one.")
@@ -96,8 +95,8 @@ def command(
     With --cycles branches of limit cycles are followed from the onsets of each column, as the section cycle of the case
     says; that takes seconds a cell.
 
-    With -o every finished column is kept at once: `dbvfiv resume` goes on after Ctrl-C or a crash. Under mpiexec with
-    mpi4py the columns are shared among its processes.
+    With -o every finished column is kept at once: `dbvfiv resume` goes on after Ctrl-C or a crash. Columns are shared
+    among processes of this machine (--workers 4), of mpiexec, or of a Dask cluster (--workers tcp://host:8786).
 
     dbvfiv map cases/dbv12.toml --x "pressure=0.5 kPa:20 kPa:64" --y density=1:1000:64:log --workers 2 -o map.h5 --plots
     figures

@@ -13,7 +13,6 @@ from dbvfiv.model.equilibria import find_equilibria
 from dbvfiv.observer import Observer
 from dbvfiv.record.header import Header
 from dbvfiv.record.record import GrowingRecord
-from dbvfiv.studies.map import pool as map_pool
 from dbvfiv.studies.map.figures import stability_map
 from dbvfiv.studies.map.study import MapResult, keep_column, tables_of
 from dbvfiv.studies.modes.search import run_modes
@@ -147,14 +146,6 @@ def test_a_killed_worker_costs_only_the_columns_in_flight(case, whole):
     found, expected = (dict(part.summary()) for part in (result, whole))
     lost = set(found.pop("warnings")) - set(expected.pop("warnings"))
     assert found == expected and lost == set(said) - set(whole.warnings)
-
-
-def test_without_mpiexec_there_is_one_process(monkeypatch):
-    for name in ("OMPI_COMM_WORLD_SIZE", "PMI_SIZE", "MPI_LOCALNRANKS"):
-        monkeypatch.delenv(name, raising=False)
-    assert map_pool.mpi_size() == 1
-    monkeypatch.setenv("PMI_SIZE", "4")
-    assert map_pool.mpi_size() == 4
 
 
 def test_cells_that_the_count_does_not_confirm_are_uncertain(case, monkeypatch):

@@ -1,0 +1,143 @@
+"""Tasks shared among processes of this machine, of ``mpiexec`` and of a Dask cluster: the same results from all, with a
+worker killed half way.
+"""
+
+import os
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from dbvfiv.errors import CaseError
+from dbvfiv.runtime import mpi_size
+from dbvfiv.studies import workers as module
+from dbvfiv.studies.workers import Lost, Work, Workers, read_workers
+from tests.studies.work import TASKS, dies, expected, root_of, start
+
+ROOT = Path(__file__).parents[2]
+
+
+def shared(count, function=root_of, tasks=TASKS, said=None, on_result=lambda task: None):
+    found = {}
+    with Workers(count, start, (3,), (said if said is not None else []).append) as team:
+        for task, result in team.share(tasks, lambda task: Work(function, (task,))):
+            found[task] = result
+            on_result(task)
+    return found
+
+
+def test_processes_give_what_one_gives():
+    assert shared(2) == expected()
+
+
+def test_a_killed_process_costs_nothing_but_time():
+    killed, said = [], []
+
+    def kill(_task):
+        import multiprocessing
+
+        if not killed:
+            killed.append(multiprocessing.active_children()[0].pid)
+            os.kill(killed[0], signal.SIGKILL)
+
+    assert shared(2, said=said, on_result=kill) == expected()
+    assert killed and any("worker was lost" in sentence for sentence in said)
+
+
+def test_a_task_that_kills_every_worker_is_given_up(monkeypatch):
+    monkeypatch.setattr(module, "TRIES", 2)
+    found = shared(1, dies, (1, 2))
+    assert found[2] is Lost and found[1] in (Lost, expected()[1])
+
+
+def test_what_is_known_is_not_asked_of_workers():
+    with Workers(2, start, (3,), print) as team:
+        assert dict(team.share((1, 2), lambda task: -task)) == {1: -1, 2: -2}
+
+
+@pytest.fixture
+def cluster(tmp_path):
+    """Scheduler of Dask with two workers, each a process of its own, and their pids."""
+    pytest.importorskip("distributed")
+    environment = os.environ | {"PYTHONPATH": str(ROOT), "OMP_NUM_THREADS": "1"}
+    address = tmp_path / "scheduler.json"
+    command = [sys.executable, "-m", "distributed.cli.dask_scheduler"]
+    options = {"env": environment, "stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL, "cwd": tmp_path}
+    quiet = ["--no-dashboard", "--host", "127.0.0.1", "--port", "0", "--scheduler-file", str(address)]
+    started = [subprocess.Popen([*command, *quiet], **options)]
+    worker = [sys.executable, "-m", "distributed.cli.dask_worker", "--scheduler-file", str(address)]
+    single = ["--nthreads", "1", "--no-nanny", "--no-dashboard", "--local-directory", str(tmp_path)]
+    started += [subprocess.Popen([*worker, *single], **options) for _ in range(2)]
+    try:
+        for _ in range(600):
+            if address.exists():
+                break
+            time.sleep(0.05)
+        import json
+
+        from distributed import Client
+
+        where = json.loads(address.read_text())["address"]
+        with Client(where, set_as_default=False) as client:
+            client.wait_for_workers(2, timeout=60)
+        yield where, started[1:]
+    finally:
+        for process in started[::-1]:
+            process.kill()
+            process.wait()
+
+
+def test_a_cluster_gives_what_one_process_gives(cluster):
+    address, processes = cluster
+
+    def kill(_task):
+        processes[0].kill()
+
+    assert shared(address, on_result=kill) == expected()
+
+
+def test_a_scheduler_that_does_not_answer_is_said(monkeypatch):
+    pytest.importorskip("distributed")
+    monkeypatch.setattr(module, "PATIENCE", 1)
+    with pytest.raises(CaseError, match="no Dask scheduler answers within 1 s"):
+        shared("tcp://127.0.0.1:9")
+
+
+@pytest.mark.parametrize("given", ["few", "http://host:1", 0, 5000, True, 1.5])
+def test_workers_that_are_none_are_refused(given):
+    with pytest.raises(CaseError, match="Workers are given as"):
+        read_workers(given)
+
+
+def test_processes_of_mpiexec_give_what_one_gives():
+    pytest.importorskip("mpi4py")
+    if shutil.which("mpiexec") is None:
+        pytest.skip("mpiexec is not installed.")
+    command = [
+        "mpiexec",
+        "--oversubscribe",
+        "-n",
+        "3",
+        sys.executable,
+        "-m",
+        "mpi4py.futures",
+        "-m",
+        "tests.studies.work",
+    ]
+    allowed = {"OMPI_ALLOW_RUN_AS_ROOT": "1", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1", "OMPI_MCA_plm": "isolated"}
+    environment = os.environ | allowed | {"PYTHONPATH": str(ROOT)}
+    done = subprocess.run(command, cwd=ROOT, env=environment, capture_output=True, text=True, timeout=120)
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.strip() == repr(sorted(expected().items()))
+
+
+def test_the_number_of_processes_of_mpiexec_is_read(monkeypatch):
+    for name in ("OMPI_COMM_WORLD_SIZE", "PMI_SIZE", "MPI_LOCALNRANKS"):
+        monkeypatch.delenv(name, raising=False)
+    assert mpi_size() == 1
+    monkeypatch.setenv("PMI_SIZE", "4")
+    assert mpi_size() == 4
