@@ -8,6 +8,7 @@ import os
 import platform
 import sys
 from dataclasses import asdict, dataclass, field
+from pathlib import Path
 from typing import Any
 
 from . import __version__, runtime
@@ -16,6 +17,8 @@ _NEEDED = ("numpy", "scipy", "jax", "numba", "h5py", "matplotlib", "pydantic", "
 _FOR_TESTS = ("pytest", "hypothesis", "felupe")
 # SuperLU_DIST is left out: used a few times in one process, Debian's 8.1 corrupts the heap
 _SOLVERS = ("mumps", "superlu", "umfpack", "petsc")
+#: False for an installed wheel, which has no `make setup`.
+_IN_SOURCES = (Path(__file__).parents[1] / "Makefile").exists()
 
 
 @dataclass(frozen=True)
@@ -80,7 +83,8 @@ def examine() -> Report:
     """Look at packages, PETSc and SLEPc, the cache folder and the cores."""
     problems: list[Problem] = []
     packages = {name: _version(name, problems) for name in _NEEDED}
-    packages |= {name: _version(name, problems, fatal=False) for name in _FOR_TESTS}
+    if _IN_SOURCES:
+        packages |= {name: _version(name, problems, fatal=False) for name in _FOR_TESTS}
     return Report(
         dbvfiv=__version__,
         python=platform.python_version(),
@@ -100,7 +104,8 @@ def _version(name: str, problems: list[Problem], fatal: bool = True) -> str | No
     except Exception as error:  # a broken binary raises more than ImportError
         detail = " ".join(str(error).split())[:120]
         role = "" if fatal else " (only the tests need it)"
-        problems.append(Problem(f"{name} cannot be imported{role}: {detail}.", "make setup", fatal))
+        remedy = "make setup" if _IN_SOURCES else f"pip install {name}"
+        problems.append(Problem(f"{name} cannot be imported{role}: {detail}.", remedy, fatal))
         return None
 
 
@@ -119,7 +124,9 @@ def _petsc(problems: list[Problem]) -> dict[str, Any]:
         from slepc4py import SLEPc
     except Exception as error:
         detail = " ".join(str(error).split())[:160]
-        problems.append(Problem(f"PETSc or SLEPc is installed but cannot be imported: {detail}.", petsc_remedy()))
+        # petsc4py belongs to the numpy it was built with
+        remedy = "pip install 'numpy<2'" if "numpy" in detail.lower() else petsc_remedy()
+        problems.append(Problem(f"PETSc or SLEPc is installed but cannot be imported: {detail}.", remedy))
         return found
     found["petsc"] = ".".join(map(str, PETSc.Sys.getVersion()))
     found["slepc"] = ".".join(map(str, SLEPc.Sys.getVersion()))
@@ -179,11 +186,10 @@ def petsc_remedy() -> str:
     if os.environ.get("CONDA_PREFIX"):
         return "conda install -c conda-forge petsc4py slepc4py"
     if os.path.exists("/etc/debian_version"):
-        return (
-            "make setup (as root or with sudo: apt-get install python3-petsc4py-real "
-            "python3-slepc4py-real libopenblas0-pthread)"
-        )
-    return "conda env create -f environment.yml, or load your cluster's petsc4py and slepc4py modules, then make setup"
+        packages = "apt-get install python3-petsc4py-real python3-slepc4py-real libopenblas0-pthread"
+        return f"make setup (as root or with sudo: {packages})" if _IN_SOURCES else f"{packages} (as root or with sudo)"
+    then = ", then make setup" if _IN_SOURCES else ""
+    return f"conda env create -f environment.yml, or load your cluster's petsc4py and slepc4py modules{then}"
 
 
 def _cache(problems: list[Problem]) -> dict[str, Any]:

@@ -7,6 +7,7 @@ are first imported, and never overwrites what the user has set.
 from __future__ import annotations
 
 import hashlib
+import importlib.util
 import os
 import sys
 from pathlib import Path
@@ -71,8 +72,26 @@ def prepare() -> None:
         config = sys.modules["jax"].config
         config.update("jax_enable_x64", True)
         config.update("jax_compilation_cache_dir", os.environ["JAX_COMPILATION_CACHE_DIR"])
+    if importlib.util.find_spec("petsc4py") is None:
+        sys.path += debian_petsc()
     if mpi_size() > 1:
         _petsc_of_its_own()
+
+
+def debian_petsc(root: str = "/usr/lib") -> list[str]:
+    """Folders in which Debian and Ubuntu keep petsc4py and slepc4py for this Python, real scalars before complex ones.
+
+    They are on no path, so that a virtual environment finds them by name only.
+    """
+    library = f"*cpython-{sys.version_info.major}{sys.version_info.minor}-*.so"
+    for kind in ("real", "complex"):
+        found = [
+            max(Path(root).glob(f"{name}dir/{name}[0-9]*/*-{kind}/lib/python3/dist-packages"), default=None)
+            for name in ("petsc", "slepc")
+        ]
+        if None not in found and next(found[0].glob(f"petsc4py/**/{library}"), None):
+            return [str(folder) for folder in found]
+    return []
 
 
 def blas_core(processor: str) -> str | None:

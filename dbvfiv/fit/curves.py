@@ -1,4 +1,4 @@
-"""Tests of rubbers in uniaxial, planar and biaxial tension, read from CSV files, and the cycles in them.
+"""Tests of rubbers in uniaxial, planar and biaxial tension, read from CSV files or workbooks, and the cycles in them.
 
 The first line that is neither empty nor a comment (#) names the columns, each with its unit in
 brackets: ``engineering_strain [%], nominal_stress [MPa]``. Other columns are ignored; the order does not matter. A
@@ -23,6 +23,7 @@ import re
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
+from zipfile import BadZipFile
 
 import numpy as np
 
@@ -94,7 +95,8 @@ def read_curves(path: str | Path, mode: str | None = None) -> list[TensionTest]:
     ----------
     path : str or Path
         CSV with a header naming ``engineering_strain`` (or ``stretch``) and ``nominal_stress``
-        with units; separated by commas, semicolons or tabs. A column ``test`` may say which test each row belongs to
+        with units; separated by commas, semicolons or tabs; or the same on the first sheet of a
+        workbook (.xlsx). A column ``test`` may say which test each row belongs to
         (uniaxial, planar or biaxial), a column ``cycle`` which cycle (a whole number).
     mode : str, optional
         What the file holds if it has no column ``test``; uniaxial if not given.
@@ -204,19 +206,35 @@ def _cycle(place: str, cell: str) -> int:
 
 def _rows(path: Path) -> list[tuple[int, list[str]]]:
     """Line number and cells of every line that is neither empty nor a comment."""
+    sheet = path.suffix.lower() == ".xlsx"
     try:
-        text = path.read_text(encoding="utf-8-sig")
+        text = _sheet(path) if sheet else path.read_text(encoding="utf-8-sig")
     except UnicodeDecodeError:
         raise MaterialError(f"Tension test {path} is not a text file in UTF-8.") from None
+    except ImportError:
+        raise MaterialError(
+            f"Tension test {path} needs the package openpyxl (pip install 'dbvfiv[fit]'); a CSV file does not."
+        ) from None
     except (OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or error
         raise MaterialError(f"Tension test {path} cannot be read: {reason}.") from None
+    except (BadZipFile, KeyError):
+        raise MaterialError(f"Tension test {path} is not a workbook (.xlsx).") from None
     numbered = enumerate(text.splitlines(), 1)
     lines = [(number, line) for number, line in numbered if line.strip() and not line.lstrip().startswith("#")]
     if not lines:
         raise MaterialError(f"Tension test {path} is empty.")
-    delimiter = max(",;\t", key=lines[0][1].count)
+    delimiter = "\t" if sheet else max(",;\t", key=lines[0][1].count)
     return [(number, next(csv.reader([line], delimiter=delimiter))) for number, line in lines]
+
+
+def _sheet(path: Path) -> str:
+    """First sheet of a workbook as lines with tabs; cells that hold a formula count with their last value."""
+    from openpyxl import load_workbook  # optional
+
+    book = load_workbook(path, data_only=True)
+    cells = ((" ".join(str("" if v is None else v).split()) for v in row) for row in book.worksheets[0].values)
+    return "\n".join("\t".join(row) for row in cells)
 
 
 def _columns(

@@ -139,6 +139,22 @@ def test_doctor(command_line):
     assert "PETSc" in command_line("doctor").out
 
 
+def test_petsc_of_debian_is_found_for_this_python_alone(tmp_path):
+    from dbvfiv.runtime import debian_petsc
+
+    this = f"cpython-{sys.version_info.major}{sys.version_info.minor}"
+    for kind, python in (("real", "cpython-39"), ("complex", this)):
+        for package in ("petsc", "slepc"):
+            folder = tmp_path / f"{package}dir/{package}3.18/x86_64-{kind}/lib/python3/dist-packages/{package}4py/lib"
+            folder.mkdir(parents=True)
+            (folder / f"{package}.{python}-x86_64-linux-gnu.so").touch()
+    found = debian_petsc(tmp_path)
+    assert [path.split("/")[-6:-3] for path in found] == [
+        [f"{p}dir", f"{p}3.18", "x86_64-complex"] for p in ("petsc", "slepc")
+    ]
+    assert debian_petsc(tmp_path / "nothing") == []
+
+
 def test_doctor_names_the_remedy(monkeypatch, command_line):
     from dbvfiv import doctor
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from pathlib import Path
 
 import jax
@@ -219,6 +220,33 @@ def test_the_best_form_for_a_wall_is_told_and_its_table_can_be_pasted(treloar):
     assert report.chosen.stable_range.equivalent_strain == np.inf
     assert "stable in every state by its form" in "\n".join(report.lines("r", 1.0))
     assert report.first is None and not report.cycles
+
+
+def test_a_workbook_is_read_like_its_table(tmp_path, monkeypatch):
+    """Titles of two lines, empty rows and columns, formulas without a value, remarks."""
+    from openpyxl import Workbook
+
+    book, (head, *rows) = Workbook(), [line.split(",") for line in TRELOAR.read_text().splitlines() if line[0] != "#"]
+    book.active.append(["# the laboratory's remark"])
+    book.active.append([title.strip().replace(" [", "\n[") for title in head] + ["=1+1"])
+    book.active.append([])
+    for test, *numbers in rows:
+        book.active.append([test, *map(float, numbers)])
+    path = tmp_path / "treloar.xlsx"
+    book.save(path)
+    for found, expected in zip(read_curves(path), read_curves(TRELOAR), strict=True):
+        assert found.mode == expected.mode
+        assert np.array_equal(found.strain, expected.strain) and np.array_equal(found.stress, expected.stress)
+    book.active["C6"] = "=A1"
+    book.save(path)
+    with pytest.raises(MaterialError, match="line 6: column nominal_stress must hold a finite number, but ''"):
+        read_curves(path)
+    path.write_text("no workbook")
+    with pytest.raises(MaterialError, match="is not a workbook"):
+        read_curves(path)
+    monkeypatch.setitem(sys.modules, "openpyxl", None)
+    with pytest.raises(MaterialError, match=r"needs the package openpyxl \(pip install 'dbvfiv\[fit\]'\)"):
+        read_curves(path)
 
 
 def test_bad_questions_are_refused(tmp_path, treloar):

@@ -17,7 +17,7 @@ def fitzhugh_nagumo(rate: float) -> JaxSystem:
 
 
 def hodgkin_huxley() -> JaxSystem:
-    """Squid axon at 6.3 degrees, mV from rest, ms, uA/cm^2; Hodgkin & Huxley, J. Physiol. 117 (1952) 500."""
+    """Squid axon at 6.3 degrees, mV from rest, ms, uA/cm^2; Hodgkin & Huxley, J. Physiol. 117 (1952) 500, table 3."""
 
     def residual(u, mu):
         v, m, h, n = u
@@ -26,7 +26,7 @@ def hodgkin_huxley() -> JaxSystem:
             (0.07 * jnp.exp(-v / 20), 1 / (jnp.exp((30 - v) / 10) + 1), h),
             (0.01 * (10 - v) / jnp.expm1((10 - v) / 10), 0.125 * jnp.exp(-v / 80), n),
         )
-        ions = 120 * m**3 * h * (v - 115) + 36 * n**4 * (v + 12) + 0.3 * (v - 10.6)
+        ions = 120 * m**3 * h * (v - 115) + 36 * n**4 * (v + 12) + 0.3 * (v - 10.613)
         return jnp.stack([mu["I"] - ions, *(a * (1 - x) - b * x for a, b, x in rates)])
 
     return JaxSystem(residual, 4)

@@ -63,7 +63,9 @@ def require_sheet(path: Path) -> None:
     CaseError
     """
     if path.suffix.lower() == ".xlsx" and find_spec("openpyxl") is None:
-        raise CaseError(f"{str(path)!r} needs the package openpyxl, which is not installed; a name in .csv does not.")
+        raise CaseError(
+            f"{str(path)!r} needs the package openpyxl (pip install 'dbvfiv[report]'); a name in .csv does not."
+        )
     if path.is_dir() or not path.absolute().parent.is_dir():
         raise CaseError(f"{str(path)!r} cannot be written: it is a folder, or its folder does not exist.")
 
