@@ -16,7 +16,7 @@ from typing import Any
 import h5py
 import numpy as np
 
-from continuation.options import Reason, Said
+from continuation.options import NotAParameter, Reason, Said
 
 #: Version of the layout of files.
 FORMAT = 2
@@ -181,7 +181,7 @@ class Branch:
             return np.array([point.z[self.size + columns.index(name)] for point in self.points])
         if any(name in point.tests for point in self.points):
             return np.array([point.tests.get(name, np.nan) for point in self.points])
-        raise KeyError(f"The branch has no {name!r}; it has {', '.join(columns)}.")
+        raise NotAParameter(f"The branch has no {name!r}; it has {', '.join(columns)}.")
 
     def mu(self, index: int) -> dict[str, float]:
         """All parameters at a point."""
@@ -219,6 +219,8 @@ class Branch:
         ValueError
             The file is not one of these, or of an unknown format.
         """
+        if not Path(path).is_file():
+            raise FileNotFoundError(f"There is no file {path}.")
         with h5py.File(path, "r") as file:
             if file.attrs.get("format") != FORMAT:
                 raise ValueError(f"{path} is not a branch file of format {FORMAT}.")

@@ -6,6 +6,16 @@ import numpy as np
 
 from continuation.branch import Branch, SpecialPoint
 from continuation.branch_points import BranchPointMonitor
+from continuation.checks import (
+    events_of,
+    numbers_of,
+    options_of,
+    parameters_of,
+    require_names,
+    special_of,
+    spectrum_of,
+    system_of,
+)
 from continuation.event_location import EventMonitor, FoldMonitor
 from continuation.options import ContinuationOptions, NotABifurcation, NotConverged, Reason
 from continuation.problem import Problem
@@ -15,6 +25,9 @@ from continuation.tracer import SHRINK, Tracer
 
 def branch_tracer(system, mu, parameter, options, events=(), spectrum=None, observers=None):
     """The tracer of a branch with the monitors the options ask for."""
+    options, mu, events = options_of(ContinuationOptions, options), parameters_of(mu), events_of(events)
+    require_names(options, mu, (parameter,), events)
+    system_of(system)
     problem = Problem(system, mu, (parameter,), None, options.state_scale, options.units([parameter]))
     monitors: list = []
     if options.folds:
@@ -22,7 +35,7 @@ def branch_tracer(system, mu, parameter, options, events=(), spectrum=None, obse
     if options.branch_points:
         monitors.append(BranchPointMonitor())
     if options.eigenvalues:
-        monitors.append(SpectrumMonitor(spectrum))
+        monitors.append(SpectrumMonitor(spectrum_of(spectrum)))
     monitors += [EventMonitor(event) for event in events]
     return Tracer(problem, options, monitors, observers)
 
@@ -72,12 +85,8 @@ def continue_branch(
     >>> abs(branch.of_kind("fold")[0].mu["r"]) < 1e-9
     True
     """
-    options = options or ContinuationOptions()
-    mu = {name: float(value) for name, value in dict(mu).items()}
     tracer = branch_tracer(system, mu, parameter, options, events, spectrum, observers)
-    u = np.asarray(u, float)
-    if u.shape != (system.size,):
-        raise ValueError(f"The state has shape {u.shape}; the system needs ({system.size},).")
+    u, mu, options = numbers_of(u, "state", (system.size,)), tracer.problem.fixed, tracer.options
     direction = np.zeros(u.size + 1)
     direction[-1] = options.direction
     point = tracer.start(tracer.problem.pack(u, mu), direction)
@@ -121,15 +130,13 @@ def switch_branch(
     >>> bool(abs(other.states[-1, 0] ** 2 - 1) < 1e-9)
     True
     """
-    options = options or ContinuationOptions()
+    special_of(special, "Branches are switched at")
     if special.kind != "branch point" or not special.located or "direction" not in special.vectors:
-        raise NotABifurcation(
-            f"Branches are switched at located branch points; this is a {special.kind}"
-            f" ({special.reason or 'located: ' + str(special.located)})."
-        )
+        raise NotABifurcation(f"Branches are switched at located branch points; this is {special!r}.")
     if side not in (1, -1):
         raise ValueError(f"The side is +1 or -1, not {side}.")
     tracer = branch_tracer(system, special.mu, parameter, options, events, spectrum, observers)
+    options = tracer.options
     direction = side * special.vectors["direction"]
     problem = tracer.problem
     frame = problem.frame(direction[:, None])

@@ -10,6 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from continuation.branch import Branch, CurvePoint, SpecialPoint
+from continuation.checks import options_of, require_names, shown, special_of, spectrum_of, system_of
 from continuation.conditions import BogdanovTakensCondition, FoldCondition, HopfCondition, generic_borders, null_pair
 from continuation.event_location import solve_augmented, special_at
 from continuation.normal_form import fold_coefficient, hopf_normal_form
@@ -279,24 +280,28 @@ def continue_hopf(
 
 def _borders(kind, special):
     """Left and right vectors of a special point from which a curve of a kind can start."""
+    special_of(special, f"A {kind} starts at")
     if special.kind not in STARTS[kind] or "right" not in special.vectors:
         raise NotABifurcation(
-            f"A {kind} starts at a located point of kind {', '.join(STARTS[kind])}; this is a "
-            f"{special.kind}{'' if special.located else ' that was only bracketed'}."
+            f"A {kind} starts at a located point of kind {', '.join(STARTS[kind])}; this is {special!r}."
         )
     return special.vectors["left"], special.vectors["right"]
 
 
 def curve_tracer(system, kind, mu, parameters, borders, options, observers, spectrum, lyapunov=True):
     """Tracer of a fold or Hopf curve with the left and right vectors from which it starts."""
-    options = options or ContinuationOptions()
-    if len(set(parameters)) != 2:
-        raise ValueError(f"A curve needs two different parameters, not {parameters}.")
+    options = options_of(ContinuationOptions, options)
+    if isinstance(parameters, str) or len(set(parameters)) != 2:
+        raise ValueError(f"A curve needs two different parameters, not {shown(parameters)}.")
+    require_names(options, mu, parameters)
+    system_of(system)
     fold = kind == "fold curve"
     condition = (FoldCondition if fold else HopfCondition)(*borders)
     problem = Problem(system, mu, parameters, condition, options.state_scale, options.units(parameters))
     monitors = [FoldCurveMonitor() if fold else HopfCurveMonitor(lyapunov)]
-    return Tracer(problem, options, monitors + [CountMonitor(spectrum)] * bool(options.eigenvalues), observers)
+    return Tracer(
+        problem, options, monitors + [CountMonitor(spectrum_of(spectrum))] * bool(options.eigenvalues), observers
+    )
 
 
 def _start(tracer, special):

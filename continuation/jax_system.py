@@ -16,7 +16,9 @@ import jax.numpy as jnp  # noqa: E402
 import numpy as np  # noqa: E402
 import scipy.sparse as sp  # noqa: E402
 
+from continuation.checks import number_of, shown  # noqa: E402
 from continuation.linear import MatrixLinearisation  # noqa: E402
+from continuation.options import NotAParameter, require  # noqa: E402
 from continuation.system import System  # noqa: E402
 
 
@@ -51,7 +53,13 @@ class JaxSystem(System):
         mass=None,
         sparsity: sp.spmatrix | None = None,
     ):
-        self.size = int(size)
+        if not callable(residual):
+            raise TypeError(f"The residual is a function of the state and the parameters, not {shown(residual)}.")
+        self.size = int(number_of(size, "size"))
+        require(self.size == size and size >= 1, f"The size must be a whole number from 1, not {size}.")
+        for name, matrix in (("mass", None if callable(mass) else mass), ("sparsity", sparsity)):
+            shape = (self.size, self.size) if matrix is None else np.shape(matrix)
+            require(shape == (self.size, self.size), f"The {name} has shape {shape}; the size is {self.size}.")
         self._callable_mass = mass if callable(mass) else None
         self._constant_mass = None if callable(mass) else mass
         self.constant_mass, self.identity_mass = not callable(mass), mass is None
@@ -61,7 +69,7 @@ class JaxSystem(System):
             self._mass_colouring = self._colouring
 
         def f(u, mu):
-            return jnp.asarray(residual(u, mu), dtype=jnp.float64)
+            return _evaluate(residual, "residual", u, mu)
 
         self._residual = jax.jit(f)
         self._along = _directional_derivatives(f)
@@ -75,7 +83,7 @@ class JaxSystem(System):
         if self._callable_mass:
             # The direction multiplied by B rides along as part of the frozen arguments.
             def b(u, mu, c):
-                return jnp.asarray(mass(u, mu, c), dtype=jnp.float64)
+                return _evaluate(mass, "mass", u, mu, c)
 
             self._mass_d1 = jax.jit(lambda u, mu, c, a: _jvp(lambda x: b(x, mu, c), u, a))
             self._mass_d2 = jax.jit(lambda u, mu, c, a, d: _jvp(lambda x: _jvp(lambda y: b(y, mu, c), x, a), u, d))
@@ -125,7 +133,7 @@ class JaxSystem(System):
         tangents = []
         for vector, name in directions:
             if name is not None and name not in mu:
-                raise KeyError(f"The parameter {name!r} is not one of: {', '.join(sorted(mu))}.")
+                raise NotAParameter.named(name, mu)
             step = np.zeros(self.size) if vector is None else np.asarray(vector, float)
             tangents.append((step, {key: float(key == name) for key in mu}))
         return np.asarray(self._along[len(tangents)](np.asarray(u, float), mu, tangents))
@@ -147,6 +155,26 @@ class JaxSystem(System):
             return np.zeros(self.size)
         mu = _floats(mu)
         return np.asarray(self._mass_mu(u, mu, {k: float(k == name) for k in mu}, c))
+
+
+def _evaluate(function: Callable, name: str, u, mu, *more):
+    """Value of a model's function, traced; what it does wrong is said in a sentence."""
+    try:
+        value = function(u, mu, *more)
+        if value is None:
+            raise TypeError(f"The {name} returns nothing.")
+        value = jnp.asarray(value, dtype=jnp.float64)
+    except jax.errors.JAXTypeError as error:
+        raise TypeError(
+            f"The {name} must be written with jax.numpy: numpy and Python's float, int and if cannot be differentiated."
+        ) from error
+    except KeyError as error:
+        if error.args and error.args[0] not in mu:
+            raise NotAParameter.named(error.args[0], mu) from error
+        raise
+    if value.shape != u.shape:
+        raise ValueError(f"The {name} has shape {value.shape}; the state has {u.shape}.")
+    return value
 
 
 def _floats(mu) -> dict[str, float]:

@@ -2,10 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from enum import Enum
-from math import isfinite
+from math import isfinite, isnan
+from numbers import Integral, Real
+
+#: Kinds of special points.
+KINDS = (
+    "fold", "branch point", "hopf", "zero eigenvalue", "stability change",
+    "cusp", "bogdanov-takens", "generalised hopf", "zero-hopf",
+    "fold of cycles", "period doubling", "torus",
+)  # fmt: skip
 
 
 class Said(str):
@@ -91,6 +99,17 @@ class NotABifurcation(ContinuationError):
     """A point handed over as a bifurcation does not qualify as one."""
 
 
+class NotAParameter(ContinuationError, KeyError):
+    """A name that no parameter of the system has."""
+
+    __str__ = Exception.__str__  # KeyError puts quotes around its sentence
+
+    @classmethod
+    def named(cls, name, mu) -> NotAParameter:
+        """The error for a name and the parameters that there are."""
+        return cls(f"The parameter {name!r} is not one of: {', '.join(sorted(map(str, mu)))}.")
+
+
 class OutOfDomain(ContinuationError):
     """Model cannot be evaluated at a state; models raise it, and the step is then tried shorter."""
 
@@ -99,6 +118,13 @@ def require(condition: bool, sentence: str) -> None:
     """Raise ``ValueError(sentence)`` unless the condition holds."""
     if not condition:
         raise ValueError(sentence)
+
+
+def _require_numbers(options, *names: str, whole: bool = False) -> None:
+    for name in names:
+        value = getattr(options, name)
+        fits = isinstance(value, Integral if whole else Real) and not isinstance(value, bool) and not isnan(value)
+        require(fits, f"The option {name} must be a {'whole ' if whole else ''}number, not {value!r}.")
 
 
 @dataclass(frozen=True)
@@ -118,6 +144,8 @@ class NewtonOptions:
     max_iterations: int = 15
 
     def __post_init__(self):
+        _require_numbers(self, "tolerance")
+        _require_numbers(self, "max_iterations", whole=True)
         require(self.tolerance > 0, f"The Newton tolerance must be positive, not {self.tolerance}.")
         require(self.max_iterations >= 1, "Newton needs at least one iteration.")
 
@@ -157,8 +185,8 @@ class ContinuationOptions:
         Locate what was detected by Newton's method; otherwise it is only bracketed.
     location_tolerance : float
         Relative size of the last correction of a located point.
-    stop_at : frozenset of str
-        Kinds of special points that end the branch, e.g. ``frozenset({"hopf"})``.
+    stop_at : str or set of str
+        Kinds of special points that end the branch, e.g. ``"hopf"``, or names of events.
     newton : NewtonOptions
     """
 
@@ -186,6 +214,18 @@ class ContinuationOptions:
         return {name: float(self.parameter_scales.get(name, own.get(name, 1.0))) for name in names}
 
     def __post_init__(self):
+        _require_numbers(
+            self, "step", "min_step", "max_step", "direction", "max_angle", "state_scale", "location_tolerance"
+        )
+        _require_numbers(self, "max_points", "eigenvalues", whole=True)
+        for name in ("limits", "parameter_scales"):
+            given = getattr(self, name)
+            require(isinstance(given, Mapping), f"The option {name} goes by names of parameters, not {given!r}.")
+        stop_at = (self.stop_at,) if isinstance(self.stop_at, str) else self.stop_at
+        object.__setattr__(self, "stop_at", frozenset(stop_at))
+        require(
+            isinstance(self.newton, NewtonOptions), f"The option newton is NewtonOptions(...), not {self.newton!r}."
+        )
         require(
             0 < self.min_step <= self.step <= self.max_step,
             "The steps must satisfy 0 < min_step <= step <= max_step, not "
@@ -196,8 +236,13 @@ class ContinuationOptions:
         require(0 < self.max_angle < 1.6, "The largest angle must lie between 0 and 1.6 rad.")
         require(self.state_scale > 0, "The unit of the state must be positive.")
         for name, scale in self.parameter_scales.items():
-            require(scale > 0, f"The unit of the parameter {name!r} must be positive, not {scale}.")
-        for name, (low, high) in self.limits.items():
+            number = isinstance(scale, Real)
+            require(number and scale > 0, f"The unit of the parameter {name!r} must be positive, not {scale!r}.")
+        for name, pair in self.limits.items():
+            pair = tuple(pair) if isinstance(pair, Iterable) else (pair,)
+            numbers = len(pair) == 2 and all(isinstance(limit, Real) for limit in pair)
+            require(numbers, f"The limits of {name!r} must be two numbers, not {self.limits[name]!r}.")
+            low, high = pair
             require(low < high, f"The limits of {name!r} must increase, not {low}, {high}.")
         require(self.eigenvalues >= 0, "The number of eigenvalues cannot be negative.")
         require(self.location_tolerance > 0, "The location tolerance must be positive.")
@@ -227,6 +272,8 @@ class OrbitOptions:
     exponents: int = 8
 
     def __post_init__(self):
+        _require_numbers(self, "tail", "tolerance")
+        _require_numbers(self, "harmonics", "max_harmonics", "exponents", whole=True)
         require(
             1 <= self.harmonics <= self.max_harmonics, "The harmonics must satisfy 1 <= harmonics <= max_harmonics."
         )

@@ -14,6 +14,7 @@ import numpy as np
 
 from continuation.branch import Branch, CurvePoint, SpecialPoint
 from continuation.branches import branch_tracer
+from continuation.checks import options_of, require_names, shown, special_of, system_of
 from continuation.curves import STARTS, curve_tracer
 from continuation.cycle_branch import CycleTracer
 from continuation.cycle_points import TORUS, CyclePoint, SpecialCycle
@@ -94,6 +95,8 @@ def continue_orbits(
     >>> branch.reason
     'ended on the limit r = 1'
     """
+    if not isinstance(orbit, Orbit):
+        raise TypeError(f"Branches of orbits start at an Orbit, such as find_orbit gives, not at {shown(orbit)}.")
     follower = _Follower(system, parameter, options, discretisation, orbit.mu)
     first = Cycle(orbit.motion, dict(orbit.mu), 0.0, 0, 0)
 
@@ -147,8 +150,9 @@ def orbits_from_hopf(
     >>> last.amplitude().round(6), bool(last.stable)
     (array([1., 1.]), True)
     """
+    special_of(special, "Orbits start at")
     if special.kind != "hopf" or not special.located:
-        raise NotABifurcation(f"Orbits start at a located Hopf point, not at a {special.kind}.")
+        raise NotABifurcation(f"Orbits start at a located Hopf point; this is {special!r}.")
     follower = _Follower(system, parameter, options, discretisation, special.mu)
 
     def steps():
@@ -183,7 +187,8 @@ def resume(
     >>> resume(system, part, ContinuationOptions(limits=limits)).of_kind("fold")
     [<SpecialPoint: fold at r = 0, located>]
     """
-    options = options or ContinuationOptions()
+    if not isinstance(branch, Branch):
+        raise TypeError(f"A Branch is resumed, not {shown(branch)}.")
     if branch.kind == "equilibria":
         tracer = branch_tracer(system, branch.fixed, branch.names[0], options, events, spectrum, observers)
         return tracer.resume(branch)
@@ -202,6 +207,8 @@ def resume(
 def orbit_at(system, branch: Branch, index: int, discretisation: OrbitOptions | None = None) -> Orbit:
     """Orbit at a point of a branch of orbits, also one loaded from a file."""
     require(branch.kind == "orbits", f"This needs a branch of orbits, not {branch.kind}.")
+    if not -len(branch) <= index < len(branch):
+        raise IndexError(f"The branch has {len(branch)} points, so there is no point {index}.")
     return _orbit(system, branch.points[index].z[: branch.size], branch.mu(index), discretisation)
 
 
@@ -211,7 +218,7 @@ def special_orbit(system, branch: Branch, special: SpecialPoint, discretisation:
 
 
 def _orbit(system, u, mu, options):
-    options = options or OrbitOptions()
+    options = options_of(OrbitOptions, options)
     cycle = Cycle(_motion(u, system.size), mu, 0.0, 0, 0)
     return add_exponents(OrbitSolver(system, options), cycle, options)
 
@@ -228,8 +235,9 @@ class _Follower:
     """Tracer of orbits of a `System` that records what it finds in a `Branch`."""
 
     def __init__(self, system, parameter, options, discretisation, mu):
-        self.options, self.shape = options or ContinuationOptions(), discretisation or OrbitOptions()
-        options, n = self.options, system.size
+        self.options, self.shape = options_of(ContinuationOptions, options), options_of(OrbitOptions, discretisation)
+        options, n = self.options, system_of(system).size
+        require_names(options, mu, (parameter,))
         self.branch = Branch("orbits", 0, (parameter,), (), {name: float(value) for name, value in mu.items()})
         self.step_limits = options.min_step, options.max_step
         kept = replace(options, state_scale=options.state_scale * np.sqrt(n), max_points=options.max_points + 1)

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from continuation.checks import number_of, numbers_of, options_of, parameters_of, system_of
 from continuation.cycles import Cycle, CycleSolver
 from continuation.first_order import DirectLinearisation, FirstOrderSystem
 from continuation.harmonics import Harmonics
@@ -156,14 +157,16 @@ def find_orbit(system, states, period: float, mu, options: OrbitOptions | None =
     >>> round(orbit.period, 6), orbit.stable
     (6.663287, True)
     """
-    options = options or OrbitOptions()
+    options, period, mu = options_of(OrbitOptions, options), number_of(period, "period"), parameters_of(mu)
     require(period > 0, f"The period must be positive, not {period}.")
-    states = np.asarray(states, float)
+    states = numbers_of(states, "orbit", (None, system_of(system).size))
+    require(len(states) >= 3, f"An orbit needs three states at least, not {len(states)}.")
     series = np.fft.rfft(states, axis=0)[: min(options.harmonics, (len(states) - 1) // 2) + 1] / len(states)
     h = Harmonics(len(series) - 1)
     guess = PeriodicMotion(h, h.real(series), 2 * np.pi / period).resized(options.harmonics)
-    solver, mu = OrbitSolver(system, options), {name: float(value) for name, value in dict(mu).items()}
+    solver = OrbitSolver(system, options)
     least = 1e-6 * np.linalg.norm(guess.coefficients[1:])
+    require(least != 0.0, "The guess of an orbit must vary over its period.")
     while True:
         cycle = solver.solve(guess, mu)
         if np.linalg.norm(cycle.motion.coefficients[1:]) <= least:

@@ -17,8 +17,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from continuation.checks import numbers_of, options_of, parameters_of, system_of
 from continuation.linear import bordered
-from continuation.options import NewtonOptions, NotConverged, OutOfDomain, Reason, Said, SingularSystem
+from continuation.options import NewtonOptions, NotAParameter, NotConverged, OutOfDomain, Reason, Said, SingularSystem
 
 
 class Problem:
@@ -43,8 +44,7 @@ class Problem:
         self.names = tuple(names)
         for name in self.names:
             if name not in self.fixed:
-                known = ", ".join(sorted(self.fixed))
-                raise KeyError(f"The parameter {name!r} is not one of: {known}.")
+                raise NotAParameter.named(name, self.fixed)
         self.condition = condition
         self.n, self.k = system.size, len(self.names)
         self.e = 0 if condition is None else condition.extra
@@ -107,6 +107,8 @@ class Local:
         system, u, mu = problem.system, problem.u(z), problem.mu(z)
         self.u, self.mu = u, mu
         self.residual = system.residual(u, mu)
+        if np.shape(self.residual) != u.shape:
+            raise ValueError(f"The residual has shape {np.shape(self.residual)}; the state has {u.shape}.")
         self.size = residual_norm(system, self.residual)
         self.finite = bool(np.isfinite(self.size))
         if not self.finite:
@@ -297,8 +299,8 @@ def equilibrium(system, u, mu, options: NewtonOptions | None = None) -> np.ndarr
     >>> float(equilibrium(JaxSystem(lambda u, mu: u**2 - mu["c"], 1), [1.0], {"c": 2.0})[0])  # doctest: +ELLIPSIS
     1.41421356...
     """
-    problem = Problem(system, dict(mu), ())
-    found = correct(problem, np.array(u, float), problem.natural_frame(), options or NewtonOptions())
+    problem, options = Problem(system_of(system), parameters_of(mu), ()), options_of(NewtonOptions, options)
+    found = correct(problem, numbers_of(u, "state", (system.size,)), problem.natural_frame(), options)
     if not found.converged:
         where = ", ".join(f"{name} = {value:g}" for name, value in mu.items())
         raise NotConverged(

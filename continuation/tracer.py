@@ -7,7 +7,7 @@ functions at each point and look for events between two of them; observers are t
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from pathlib import Path
 
 import numpy as np
@@ -75,6 +75,8 @@ class Checkpoint(Observer):
     def __init__(self, path: str | Path, every: int = 10):
         if every < 1:
             raise ValueError(f"A checkpoint needs at least one point in between, not {every}.")
+        if not isinstance(path, (str, Path)):
+            raise TypeError(f"A checkpoint is written to a path, not to {path!r}.")
         self.path, self.every = Path(path), every
 
     def accepted(self, branch):
@@ -91,6 +93,8 @@ def as_observers(observers) -> list[Observer]:
         return []
     if isinstance(observers, Observer) or callable(observers):
         observers = [observers]
+    if not isinstance(observers, Iterable):
+        raise TypeError(f"Observers are Observer objects or functions of the branch, not {observers!r}.")
     return [o if isinstance(o, Observer) else _observer_of(o) for o in observers]
 
 
