@@ -93,6 +93,9 @@ class LargestPairs:
     vectors: np.ndarray
     images: np.ndarray
 
+    def __repr__(self) -> str:
+        return f"<LargestPairs: {len(self.values)} pairs of order {len(self.vectors)}>"
+
 
 def largest_pairs(
     apply: Callable[[np.ndarray], np.ndarray],

@@ -185,6 +185,9 @@ class CertifiedSpectrum:
     certificate: Certificate
     response_error: float | None
 
+    def __repr__(self) -> str:
+        return f"<CertifiedSpectrum: {self.statement} {self.spectrum!r}>"
+
     @property
     def agrees(self) -> bool:
         """Both routes find the same number, and the count is certain."""

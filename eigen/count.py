@@ -49,6 +49,11 @@ class Count:
     evaluations: int
     notes: tuple[str, ...] = ()
 
+    def __repr__(self) -> str:
+        sure = "certain" if self.certain else "not certain"
+        region = f"right of {self.line:.6g} 1/s up to {self.band:.6g} Hz"
+        return f"<Count: {self.number} eigenvalues {region}, {sure}, {self.evaluations} evaluations>"
+
 
 def unstable_count(
     pencil: CoupledPencil,

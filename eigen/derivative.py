@@ -29,6 +29,10 @@ class PencilDerivative(FluidParts):
     times: np.ndarray | None = None
     relaxing: tuple | None = None
 
+    def __repr__(self) -> str:
+        parts = [name for name, part in vars(self).items() if part is not None]
+        return f"<PencilDerivative: of {', '.join(parts) or 'nothing'}>"
+
 
 def coupling_of_modes(pencil: CoupledPencil, left_values, left_q, left_u, right_values, right_q, right_u) -> np.ndarray:
     r"""w_i^H [T(l_i) - T(l_j)] / (l_i - l_j) x_j, the product in which modes are orthogonal.

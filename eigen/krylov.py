@@ -58,6 +58,10 @@ class KrylovPairs:
     exhausted: bool
     beside: float = 0.0
 
+    def __repr__(self) -> str:
+        found = "all there are" if self.exhausted else f"complete within {self.reach:.6g} 1/s of the shift"
+        return f"<KrylovPairs: {len(self.eigenvalues)} pairs, {found}, {self.applications} applications>"
+
 
 def _apply(matrix, x):
     """Sparse product that keeps a real matrix real."""

@@ -47,6 +47,9 @@ class Relaxation:
     strengths: np.ndarray
     times: np.ndarray
 
+    def __repr__(self) -> str:
+        return f"<Relaxation: {len(self.matrices)} parts of a stiffness, {self.branches} times>"
+
     def __post_init__(self):
         matrices = tuple(sp.csr_matrix(m, dtype=float) for m in self.matrices)
         strengths = np.array(self.strengths, float, ndmin=2)
@@ -176,6 +179,10 @@ class CoupledPencil(FluidParts):
     G: sp.csr_matrix | None = None
     J: sp.csr_matrix | None = None
     relaxation: Relaxation | None = None
+
+    def __repr__(self) -> str:
+        relaxing = "" if self.relaxation is None else f", {self.relaxation.branches} relaxation times"
+        return f"<CoupledPencil: {self.n} structural and {self.b} fluid unknowns, {self.m} coupled motions{relaxing}>"
 
     def __post_init__(self):
         for name in ("M", "C", "K"):

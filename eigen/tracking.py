@@ -71,6 +71,10 @@ class Branches:
     confidence: np.ndarray
     solves: int
 
+    def __repr__(self) -> str:
+        sure = f"confidence at least {np.nanmin(self.confidence):.2g}" if self.confidence.size else "none followed"
+        return f"<Branches: {len(self.ids)} eigenvalues over {len(self.values)} values, {sure}, {self.solves} spectra>"
+
     @property
     def growth_rate(self) -> np.ndarray:
         """1/s, shape (k, p)."""

@@ -9,6 +9,8 @@ import scipy.linalg
 import dbvfiv
 from continuation import ContinuationOptions, continue_branch
 from dbvfiv.studies.case import thesis_case
+from eigen import certified_spectrum, track
+from tests.systems.beam import fluid_conveying_pipe
 from tests.systems.brusselator import brusselator
 
 LINES, WIDTH = 10, 200
@@ -37,7 +39,40 @@ def test_pencil_of_a_state_has_the_eigenvalues_of_its_modes(state):
     for found in modes.summary()["modes"]:
         value = complex(found["growth_rate"], 2 * np.pi * found["frequency"])
         assert abs(values - value).min() < 1e-7 * abs(value)
-    assert all(map(is_short, (state, state.results, modes)))
+
+
+def reached(thing, depth=2, seen=None):
+    """Objects of these packages that public attributes of one lead to, itself first."""
+    seen = {} if seen is None else seen
+    for one in thing[:2] if isinstance(thing, (list, tuple)) else [thing]:
+        known = type(one).__module__.split(".")[0] in ("dbvfiv", "eigen", "continuation")
+        if not known or id(one) in seen or isinstance(one, type) or callable(one):
+            continue
+        seen[id(one)] = one
+        for name in [name for name in dir(one) if depth and not name.startswith(("_", "model_"))]:
+            reached(getattr(one, name, None), depth - 1, seen)
+    return list(seen.values())
+
+
+def test_texts_of_all_that_a_result_leads_to_are_short(state):
+    """Case and sections, mesh, fields of layers, samples, verdicts: no arrays, ten lines at most."""
+    valve = dbvfiv.load(thesis_case(), {"mesh.around": 4, "mesh.along": 6})
+    modes = state.modes(count=2)
+    for start in (valve, valve.damping(), state, modes, valve.sweep("density=10,20"), valve.closure(["100 Pa"])):
+        long = {type(thing) for thing in reached(start) if not is_short(thing)}
+        assert not long, f"{type(start).__name__} leads to {long}"
+    text = repr(valve.case.valve)
+    assert text.startswith("<Valve: duckbill_length 0.21, ") and len(text.splitlines()) > 1
+    assert repr(modes.verdict).startswith("<Verdict: outcome 'stable', reason '0 unstable")
+
+
+def test_texts_of_spectra_are_short_and_say_whether_they_are_certain():
+    load = [fluid_conveying_pipe(u, 0.2, 8) for u in (1.0, 2.0)]
+    found = certified_spectrum(load[0], 4), track(lambda u: load[int(u) - 1], [1.0, 2.0])
+    for thing in [one for start in (*found, load[0]) for one in reached(start)]:
+        assert is_short(thing), thing
+    assert not any("object at" in repr(thing) for thing in (*found, load[0], found[0].count))
+    assert "agree" in repr(found[0]) and "2 values, confidence at least" in repr(found[1])
 
 
 def test_tables_come_with_units_and_ranges_as_arrays():

@@ -10,6 +10,8 @@ from typing import Any, TypeVar
 from pydantic import BaseModel, ConfigDict, Field
 from pydantic.fields import FieldInfo
 
+from ..texts import short_repr
+
 
 @dataclass(frozen=True)
 class Described:
@@ -67,6 +69,7 @@ class Section(BaseModel):
     """A table of the case file: immutable, and closed to keys it does not know."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", strict=False, allow_inf_nan=False, validate_default=True)
+    __repr__ = short_repr
 
     @classmethod
     def make_way(cls, data: dict[str, Any], changed: Collection[tuple[str, ...]]) -> None:

@@ -40,6 +40,7 @@ from dbvfiv.materials.laws import (
 )
 from dbvfiv.materials.prony import Prony
 from dbvfiv.materials.shipped import published_rubber, rubber, shipped_loss, shipped_loss_names
+from dbvfiv.texts import shortly
 
 if TYPE_CHECKING:
     from dbvfiv.case import Case
@@ -119,6 +120,7 @@ def _require_name(case: Case, name: str) -> None:
         raise CaseError(f"{name!r} is no material of this case; it must be one of {', '.join(names)}.", key="materials")
 
 
+@shortly
 @dataclass(frozen=True)
 class MaterialDamping:
     """Viscoelasticity of one material of a case.

@@ -17,6 +17,7 @@ from dbvfiv.errors import CaseError
 from dbvfiv.fit.cards import MaterialDamping, damping_of
 from dbvfiv.materials.laws import MaterialError
 from dbvfiv.materials.prony import Prony
+from dbvfiv.texts import shortly
 
 if TYPE_CHECKING:
     from dbvfiv.case import Case
@@ -83,6 +84,7 @@ class RayleighMatch:
     beta: float
 
 
+@shortly
 @dataclass(frozen=True)
 class DampingReport:
     """Damping of a case.

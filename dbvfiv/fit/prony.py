@@ -17,6 +17,7 @@ from dbvfiv.case.damping import LARGEST_LOSS, celsius, kelvin
 from dbvfiv.fit.curves import STRESS_UNITS
 from dbvfiv.materials.laws import MaterialError
 from dbvfiv.materials.prony import Prony, branch_moduli, fit_loss, nonnegative
+from dbvfiv.texts import shortly
 from dbvfiv.verdict.table import Table, read_table, seconds_in, unit_in_name
 
 #: How far the ends of the times reach beyond the band, in decades of frequency at its lower and upper end: offset and
@@ -40,6 +41,7 @@ _NAMES = {
 SAME_TEMPERATURE = 1.0
 
 
+@shortly
 @dataclass(frozen=True)
 class PronyFit:
     """A series and how well it meets what it was fitted to.

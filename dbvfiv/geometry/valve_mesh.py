@@ -15,10 +15,12 @@ from ..case.part import QUARTER, Part, part_of
 from ..case.valve import Valve
 from ..case.wall import Extent
 from ..errors import CaseError
+from ..texts import shortly
 from .divisions import column_division, grading, inverse_grading, row_division
 from .surface import Surface, surface_of
 
 
+@shortly
 @dataclass(frozen=True)
 class ValveMesh:
     """Nodes on rows of constant z, from the lip (row 0) to the flange (last row).

@@ -13,9 +13,11 @@ from ..case.quantity import GRAVITY, WATER, head_of
 from ..errors import SolveError
 from ..geometry import ValveMesh
 from ..shell import Shell
+from ..texts import shortly
 from .valve import ValveModel
 
 
+@shortly
 @dataclass(frozen=True)
 class SteadyState:
     """An equilibrium; flow and areas are those of the whole valve, station data those of the part that is computed.
@@ -285,6 +287,7 @@ class Behind:
     loss: float = 0.0
 
 
+@shortly
 @dataclass(frozen=True)
 class Hydraulics:
     """Heads, head loss and coefficients of the valve in a steady flow.

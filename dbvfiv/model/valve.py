@@ -92,6 +92,9 @@ class ValveModel:
     # -- layout
     # ----
 
+    def __repr__(self) -> str:
+        return f"<ValveModel: {self.size} unknowns, {self.case.fluid.continuity}>"
+
     @property
     def size(self) -> int:
         """Number of unknowns n."""

@@ -22,6 +22,7 @@ from ..case.model import Case
 from ..case.write import case_toml
 from ..errors import CaseError
 from ..runtime import cache_directory
+from ..texts import shortly
 from .table import LAYOUT
 
 
@@ -92,6 +93,7 @@ def _text(path: Path) -> str | None:
 _PACKAGES = ("numpy", "scipy", "jax", "jaxlib", "numba", "h5py")
 
 
+@shortly
 @dataclass(frozen=True)
 class Header:
     """Provenance of a result.

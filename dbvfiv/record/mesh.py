@@ -10,6 +10,7 @@ import numpy as np
 
 from ..case.part import PARTS, QUARTER, Part
 from ..flow.elastic_line import LineChannel
+from ..texts import shortly
 from .table import TEXT, Column, read_array, write_array
 
 if TYPE_CHECKING:
@@ -22,6 +23,7 @@ def _kept(units: str, words: str, dtype: str = "f8", default: Any = MISSING) -> 
     return field(metadata={"column": (units, words, dtype)}, **look)
 
 
+@shortly
 @dataclass(frozen=True)
 class MeshData:
     """Mesh of the part of the valve that is computed: nn nodes, ne elements, m rows, nl layers; the metadata of each

@@ -11,6 +11,8 @@ from typing import Any
 import h5py
 import numpy as np
 
+from ..texts import shortly
+
 LAYOUT = 3
 TEXT = "text"
 #: SI value of the units in which numbers are printed, where it is not 1.
@@ -107,6 +109,7 @@ def read_array(group: h5py.Group, column: Column) -> Any:
 MARK, TEXT_BYTES = "#", 400
 
 
+@shortly
 @dataclass(frozen=True)
 class TableSpec:
     """Columns that grow together.

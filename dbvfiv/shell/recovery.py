@@ -9,9 +9,11 @@ import jax.numpy as jnp
 import numpy as np
 
 from ..materials.energy import ENERGIES, MOONEY_RIVLIN
+from ..texts import shortly
 from .shell import Shell
 
 
+@shortly
 @dataclass(frozen=True)
 class LayerFields:
     """Element values of each layer: means over the in-plane and layer points of an element, extremes for von Mises.

@@ -85,6 +85,9 @@ class Session:
         self.settled: SettledLevels | None = None
         self._at_levels: Session | None = None
 
+    def __repr__(self) -> str:
+        return f"<Session of {self.name!r}>"
+
     def __getstate__(self) -> dict[str, Any]:
         """Without the model, which is built again when it is asked for."""
         return {name: value for name, value in vars(self).items() if name not in _MODELS}

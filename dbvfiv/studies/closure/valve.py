@@ -19,6 +19,7 @@ from ...model.valve import loaded_share
 from ...shell import Shell
 from ...shell.mesh import nodal_thickness
 from ...shell.recovery import LayerFields, layer_fields
+from ...texts import shortly
 from ..case import Case
 
 #: Contacting inner faces, or the supports of Th. 3.6.
@@ -79,6 +80,7 @@ class Passage:
         return [(float(a), float(b)) for a, b in cuts]
 
 
+@shortly
 @dataclass(frozen=True)
 class InnerFace:
     """Inner face of the wall before the closing plane, and the passage between them.
@@ -174,6 +176,7 @@ def contact_law(case: Case, pressure: float) -> ContactLaw:
     return ContactLaw(pressure / depth, ROUNDING * depth)
 
 
+@shortly
 @dataclass(frozen=True)
 class ClosureModel:
     """The computed part of a valve, pressed from outside.

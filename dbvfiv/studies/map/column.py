@@ -17,6 +17,7 @@ from ...case.axis import Axis
 from ...case.parameters import Mu
 from ...errors import CaseError, SolveError
 from ...model.symmetry import Symmetry, chosen_symmetries
+from ...texts import shortly
 from ..case import Case
 from ..stability.line import ROUGH, ParameterLine
 from ..stability.place import is_surrounding
@@ -51,6 +52,7 @@ class ColumnTask(NamedTuple):
         return self.value, self.level
 
 
+@shortly
 @dataclass(frozen=True)
 class MapPlan:
     """Plan of the map of a case: its cells, and the order in which they are computed.
@@ -136,6 +138,7 @@ class MapPlan:
         return a * (b / a) ** coordinate if axis.log else a + (b - a) * coordinate
 
 
+@shortly
 @dataclass(frozen=True)
 class MapColumn:
     """A finished column.

@@ -14,6 +14,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from ...texts import shortly
 from ..stability.line import ACCURATE
 from .column import MapColumn, MapPlan
 
@@ -264,6 +265,7 @@ def _onset(plan: MapPlan, row) -> Onset:
     return Onset(int(law), along, plan.coordinate(plan.along, along), frequency, direction, residual)
 
 
+@shortly
 @dataclass(frozen=True)
 class OnsetCurve:
     """A curve in the plane of the map on which a mode is neutral.

@@ -20,6 +20,7 @@ from ...model.state import SteadyState
 from ...model.symmetry import EQUILIBRIA, SYMMETRIES, Symmetry, symmetry_named
 from ...observer import Observer
 from ...record.table import Column
+from ...texts import shortly
 from ..stability.dimensions import VARIANT
 from ..stability.line import ParameterLine
 from ..stability.verdict import FLUTTERS, STABLE, UNDECIDED, Verdict, lowered, oscillates
@@ -157,6 +158,7 @@ CURVE = (
 )
 
 
+@shortly
 @dataclass(frozen=True, eq=False)
 class Certificate:
     """Eigenvalue count by two routes: the list of modes, and the argument principle.

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from ...model.symmetry import EQUILIBRIA
+from ...texts import shortly
 from ..stability.dimensions import Variant
 from ..stability.samples import WATCHED, Sample
 from ..stability.verdict import Verdict
@@ -131,6 +132,7 @@ class OnsetPoint:
         return cls(**given | sides | {"bracket": tuple(summary["bracket"]), "note": summary["note"] or ""})
 
 
+@shortly
 @dataclass(frozen=True)
 class FoundOnsets:
     """Onsets along one parameter in one variant, and the scan that found them.

@@ -18,6 +18,7 @@ from eigen.columns import DIRECT, MISSING
 
 from ...record.record import GrowingRecord, Record
 from ...record.table import Column, TableSpec
+from ...texts import shortly
 from .dimensions import CLASS_NAMES, VARIANT
 from .verdict import OUTCOMES, Verdict
 
@@ -36,6 +37,7 @@ class SampleKey(NamedTuple):
     across: float = np.nan
 
 
+@shortly
 @dataclass(frozen=True, eq=False)
 class Sample:
     """Leading eigenvalues at one parameter point, and both counts of the unstable ones.

@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 
 from ...case.parameters import PARAMETERS
+from ...texts import shortly
 
 STABLE, FLUTTERS, DIVERGES, NOT_VALID, UNDECIDED = "stable", "flutters", "diverges", "not valid", "undecided"
 #: Outcomes, the one that decides about several motions of a state first.
@@ -23,6 +24,7 @@ OUTCOMES = (NOT_VALID, DIVERGES, FLUTTERS, UNDECIDED, STABLE)
 NEUTRAL = 1e-9
 
 
+@shortly
 @dataclass(frozen=True)
 class Verdict:
     """Stability of one steady state.

@@ -94,6 +94,9 @@ class StateList(Sequence):
     def __init__(self, record: Record):
         self._record = record
 
+    def __repr__(self) -> str:
+        return f"<StateList: {len(self)} states>"
+
     def __len__(self) -> int:
         return self._record.rows(STATES)
 

@@ -1,0 +1,49 @@
+"""Short texts of objects that hold arrays and other objects: what `repr` shows of them."""
+
+from __future__ import annotations
+
+import textwrap
+from collections.abc import Mapping, Sequence, Set
+from dataclasses import fields, is_dataclass
+from itertools import islice
+from typing import Any
+
+#: Lines of a text, columns of a line, characters of one value.
+LINES, COLUMNS, VALUE = 10, 118, 60
+
+
+def short_repr(thing: Any) -> str:
+    """Type and fields of a dataclass or a section of a case, at most `LINES` lines: arrays by shape, objects by type.
+
+    The ``__repr__`` of a class, or given to a dataclass by `shortly`.
+    """
+    names = [f.name for f in fields(thing) if f.repr] if is_dataclass(thing) else list(type(thing).model_fields)
+    told = ", ".join(f"{name} {_value(getattr(thing, name))}" for name in names)
+    lines = textwrap.wrap(f"<{type(thing).__name__}: {told}>", COLUMNS, subsequent_indent="  ", break_long_words=False)
+    return "\n".join([*lines[: LINES - 1], "  ...>"] if len(lines) > LINES else lines)
+
+
+def shortly(kind):
+    """Give a dataclass the text of `short_repr`."""
+    kind.__repr__ = short_repr
+    return kind
+
+
+def _value(value: Any) -> str:
+    if value is None or isinstance(value, bool):
+        return str(value)
+    if isinstance(value, (int, float, complex)):
+        return f"{value:.6g}"
+    shape = getattr(value, "shape", None)
+    if shape is not None:
+        return f"{value:.6g}" if shape == () else f"array {shape}"
+    if isinstance(value, str):
+        return repr(value if len(value) <= VALUE else value[: VALUE - 3] + "...")
+    if isinstance(value, (Mapping, Set, Sequence)):
+        if isinstance(value, Mapping):
+            inner = (f"{_value(name)}: {_value(held)}" for name, held in value.items())
+        else:
+            inner = map(_value, value)
+        text = ", ".join(islice(inner, VALUE))
+        return f"({text})" if len(text) <= VALUE else f"{len(value)} of them"
+    return type(value).__name__
