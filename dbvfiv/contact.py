@@ -36,15 +36,18 @@ import numpy as np
 import scipy.sparse as sp
 
 from .shell import Shell
-from .shell.reference import SHAPE
+from .shell.reference import SHAPE, reference_geometry
 from .shell.rotation import director
 
 
 def tributary_area(shell: Shell) -> np.ndarray:
-    """Integrals (nn,) of the shape functions over the mid-surface at rest, m2; they sum to its area."""
+    """Integrals (nn,) of the shape functions over the mid-surface at rest, m2; they sum to its area. A preset wall
+    rests in the shape of its mesh.
+    """
     mesh = shell.mesh
+    geometry = shell.geometry if shell.stress_free is None else reference_geometry(mesh)
     out = np.zeros(mesh.node_count)
-    np.add.at(out, mesh.quads, shell.geometry.area @ SHAPE)
+    np.add.at(out, mesh.quads, geometry.area @ SHAPE)
     return out
 
 
@@ -89,6 +92,11 @@ class ContactLaw:
             slope = np.where(beyond, 1.0, np.where(inside, (x + w) / (2 * w), 0.0))
             area = np.where(beyond, 0.5 * x**2 + w**2 / 6, np.where(inside, (x + w) ** 3 / (12 * w), 0.0))
         return self.penalty * area, self.penalty * ramp, self.penalty * slope
+
+    def gap_at(self, pressure: float) -> float:
+        """Gap, m, at which faces without multipliers press on each other with a pressure, Pa, above zero."""
+        depth, w = pressure / self.penalty, self.rounding
+        return w - 2.0 * np.sqrt(w * depth) if depth < w else -depth
 
 
 @dataclass(frozen=True)
@@ -139,12 +147,12 @@ class PlaneContact:
     law : ContactLaw
     axis : int
         Normal of the plane: 0, 1 or 2.
-    least_gap : float, m
+    least_gap : float or (k,) array, m
         Points that start closer to the plane than this, or beyond it, are measured from where they start plus this gap,
         so that only further closing meets resistance. See `lifted`.
     """
 
-    def __init__(self, shell: Shell, nodes, depth, area, law: ContactLaw, axis: int = 1, least_gap: float = 0.0):
+    def __init__(self, shell: Shell, nodes, depth, area, law: ContactLaw, axis: int = 1, least_gap=0.0):
         nodes = np.asarray(nodes, int)
         index = shell.dofs.index
         keep = index[nodes, axis] >= 0
@@ -154,7 +162,7 @@ class PlaneContact:
         self.area = np.broadcast_to(np.asarray(area, float), nodes.shape)[keep].copy()
         start = shell.mesh.nodes[self.nodes, axis] - self.depth * shell.mesh.directors[self.nodes, axis]
         self.start = start
-        self.lift = np.maximum(least_gap - start, 0.0)
+        self.lift = np.maximum(np.broadcast_to(least_gap, nodes.shape)[keep] - start, 0.0)
         # Numbers and matrix slots of the displacement across the plane and the two rotations.
         self._unknowns = index[self.nodes][:, [axis, 3, 4]]
 

@@ -23,6 +23,11 @@ from .units import Units, unit_of
 from .valve import Valve
 from .wall import edges_of
 
+#: Pressure over depth with which faces resist, Pa/m: nearly rigid, and some modulus over thickness of a rubber wall.
+FACE_STIFFNESS, PRESET_STIFFNESS = 1e10, 1e9
+#: Share of the gap between rough faces in contact below which no passage of a bill that is moulded shut narrows.
+PRESET_FILM = 0.75
+
 
 class Case(Section):
     """The valve, its fluid and its load; ``Case()`` is the 12-inch inline valve.
@@ -110,6 +115,12 @@ class Case(Section):
             raise BrokenRule(
                 "drive.side", "'outside' with drive.kind = 'flow'", "it must be 'inside' unless drive.kind is 'uniform'"
             )
+        if self.valve.is_preset and self.supports.contact == "stops":
+            raise BrokenRule(
+                "supports.contact",
+                "'stops' for a bill that is moulded shut",
+                "its faces press on each other, so it must be 'faces' or left out",
+            )
         self._check_fillers()
         self.mesh.check_positions(self.valve.as_given.length)
         if self.drive.kind == "flow" and self.upstream.is_elastic and not self.fluid.unsteady:
@@ -179,6 +190,28 @@ class Case(Section):
     def part(self) -> Part:
         """The part of the valve that is computed."""
         return part_of(self.valve, self.mesh)
+
+    @property
+    def faces_touch(self) -> bool:
+        """True where the inner faces touch, and not stops."""
+        return self.supports.contact == "faces" or self.valve.is_preset
+
+    @property
+    def film_share(self) -> float:
+        """Share of the lip gap at rest below which no passage narrows."""
+        return PRESET_FILM if self.valve.is_preset else self.fluid.area_floor
+
+    @property
+    def face_stiffness(self) -> float:
+        """Pressure over depth with which faces that meet resist, Pa/m."""
+        given = self.supports.contact_stiffness
+        return (PRESET_STIFFNESS if self.valve.is_preset else FACE_STIFFNESS) if given is None else given
+
+    @property
+    def separation(self) -> float:
+        """Share of the velocity head that is lost where the passage widens downstream."""
+        given = self.fluid.separation
+        return float(self.valve.is_preset) if given is None else given
 
     @property
     def has_line(self) -> bool:

@@ -94,7 +94,19 @@ class Fluid(Section):
         le=PARAMETERS["pressure"].high,
     )
     area_floor: Number = key(
-        0.05, "Smallest flow area, as a fraction of the lip gap area at rest; keeps a shut passage finite.", gt=0, lt=1
+        0.05,
+        "Smallest flow area, as a fraction of the lip gap area at rest; keeps a shut passage finite. Of a bill that is "
+        "moulded shut it is three quarters.",
+        gt=0,
+        lt=1,
+    )
+    separation: Number | None = key(
+        None,
+        "Share of the velocity head that is lost where the passage widens downstream: 0 for a flow that follows the "
+        "wall (the thesis), 1 for a jet that leaves the narrowest section. Where not given 0, and 1 in a bill that is "
+        "moulded shut.",
+        ge=0,
+        le=1,
     )
 
     @property
@@ -173,14 +185,19 @@ class Drive(Section):
 class Supports(Section):
     """Contact condition of the lips: one-sided stops, or contact of the inner faces."""
 
-    contact: Literal["stops", "faces"] = key(
-        "stops",
+    contact: Literal["stops", "faces"] | None = key(
+        None,
         "What keeps the walls from crossing the closing plane y = 0: springs on the displacement of duckbill nodes "
         "(stops, App. A, said by the keys lip_stop...), which let the outer half of the lips cross, or contact of the "
-        "inner faces of the whole wall (faces), for which these keys say nothing.",
+        "inner faces of the whole wall (faces), for which these keys say nothing. Stops where not given, and faces "
+        "for a bill that is moulded shut.",
     )
-    contact_stiffness: FaceStiffness = key(
-        1e10, 'Pressure over depth with which faces that meet resist, for contact = "faces".', gt=0, le=1e15
+    contact_stiffness: FaceStiffness | None = key(
+        None,
+        'Pressure over depth with which faces that meet resist, for contact = "faces"; 1e10 Pa/m where not given, of '
+        "a bill that is moulded shut 1e9 Pa/m, some modulus over thickness of its wall.",
+        gt=0,
+        le=1e15,
     )
     rebound: Number = key(
         0.5,

@@ -165,4 +165,5 @@ class Units:
 
 def _shorter(number: str, ratio: float) -> str:
     digits = len(re.sub(r"e.*|\D", "", number).lstrip("0"))
-    return f"{float(number) * ratio:.{min(max(3, digits - 1), 5)}g}"
+    text = f"{float(number) * ratio:.{min(max(3, digits - 1), 5)}g}"
+    return f"{float(text):.0f}" if 1e3 <= abs(float(text)) < 1e6 and "e" in text else text

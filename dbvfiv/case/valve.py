@@ -5,12 +5,12 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
 
 from pydantic import PrivateAttr, ValidationInfo, field_validator, model_serializer, model_validator
 
 from .key_points import has_whole_sections, key_point_inlet, read_key_points
-from .quantity import Length, Number
+from .quantity import Length, LineForce, Number, Pressure, Quantity
 from .section import BrokenRule, Section, key
 from .wall import WallPatch, WallStep, edges_of
 
@@ -190,6 +190,29 @@ def _check_transitions(valve: Valve) -> None:
             )
 
 
+def check_preset(valve: Valve) -> None:
+    """Refuse a bill that is moulded shut in two ways, or on more than its duckbill."""
+    told = [name for name in PRESETS if getattr(valve, name)]
+    if len(told) > 1:
+        raise BrokenRule(
+            told[1],
+            f"{getattr(valve, told[1]):g} beside {told[0]} = {getattr(valve, told[0]):g}",
+            f"one of {', '.join(PRESETS)} says how firmly the bill is moulded shut, so leave the others out",
+        )
+    if valve.moulded_length > valve.duckbill_length * (1 + 1e-9):
+        raise BrokenRule(
+            "moulded_length",
+            f"{valve.moulded_length:g} m",
+            f"it must be at most duckbill_length = {valve.duckbill_length:g} m: behind it the walls stand apart",
+        )
+    if told and valve.lip_rise > 0:
+        raise BrokenRule(
+            told[0],
+            f"{getattr(valve, told[0]):g} with lip_rise = {valve.lip_rise:g} m",
+            "lips that leave a lens between them at rest are not moulded shut",
+        )
+
+
 def check_wall(valve: Valve) -> None:
     """Refuse a wall that does not cover the valve or fills the pipe."""
     if valve.wall == "measured":
@@ -249,12 +272,20 @@ _TWELVE_INCH = {
 _TWELVE_INCH_WALLS = {"measured": (0.012, 0.016), "uniform": (0.01438, 0.01438)}
 _R1, _TH1, _TH2 = 0.00619, 0.00619, 0.00819
 #: What follows from wall and shape where it is not given.
-_FOLLOWING = ("lip_radius", "cuff_radius", "duckbill_wall_deduction", "flange_wall_deduction")
+_FOLLOWING = (
+    *("lip_radius", "cuff_radius", "duckbill_wall_deduction", "flange_wall_deduction", "initial_gap"),
+    "moulded_length",
+)
+#: Half gap between lips at rest, m: of lips that stand apart (the thesis), and of lips that are moulded shut, between
+#: whose faces the roughness of rubber leaves it.
+_APART, _ROUGH = 1e-4, 3e-5
+#: How a bill that is moulded shut is told; one of them at most.
+PRESETS = ("sealing_pressure", "sealing_force", "overlap", "cracking_head")
 #: Lengths that `scale` multiplies, beside those of the wall map.
 _SIZES = (
     *("duckbill_length", "saddle_length", "cuff_length", "flare_length", "flange_length", "lip_half_width"),
     *("lip_rise", "lip_radius", "cuff_radius", "flange_radius", "wall_thickness", "initial_gap"),
-    *("duckbill_wall_deduction", "flange_wall_deduction"),
+    *("duckbill_wall_deduction", "flange_wall_deduction", "moulded_length", "overlap"),
 )
 
 
@@ -336,7 +367,41 @@ class Valve(Section):
     thickness_factor: Number = key(
         1.0, "Multiplies the wall thickness everywhere; mid-surface and flow section stay.", gt=0, le=10
     )
-    initial_gap: Length = key(1e-4, "Half gap between the closed lips that always lets fluid pass.", gt=0, le=1)
+    initial_gap: Length | None = key(
+        None,
+        "Half gap between the closed lips that always lets fluid pass; 0.1 mm where not given, of a bill that is "
+        "moulded shut 0.03 mm, which is what rough faces in contact leave and which carries no flow.",
+        gt=0,
+        le=1,
+    )
+    sealing_pressure: Pressure | None = key(
+        None,
+        "Even pressure with which the faces of a bill that is moulded shut press on each other at rest, on "
+        "moulded_length: the wall then has no stress in a shape whose lips cross. The bill cracks at a little more. "
+        'Needs supports.contact = "faces", which is taken where it is not given.',
+        gt=0,
+        le=1e7,
+    )
+    sealing_force: LineForce | None = key(
+        None, "The same as a force per width of the lips: sealing_pressure times moulded_length.", gt=0, le=1e8
+    )
+    overlap: Length | None = key(
+        None,
+        "The same by how far the middle of either lip would stand beyond the closing plane without contact; "
+        "0 for lips without a preset.",
+        ge=0,
+        le=10,
+    )
+    cracking_head: Annotated[float, Quantity("m", "m")] | None = key(
+        None,
+        "The same by the head of the fluid at which the bill cracks, as measured: see steady.cracking_area. The "
+        "sealing pressure is found for it.",
+        gt=0,
+        le=1e3,
+    )
+    moulded_length: Length | None = key(
+        None, "Length from the lip on that is moulded shut; that of the duckbill where not given.", gt=0, le=100
+    )
     duckbill_wall_deduction: Length | None = key(
         None,
         "Half wall taken off the flow section of the duckbill (TH1, Th. 4.12); where not given half the wall at the "
@@ -383,6 +448,11 @@ class Valve(Section):
     def as_given(self) -> Valve:
         """The valve with its sizes as the case gives them, before `scale` multiplies them."""
         return self if self._given is None else self._given
+
+    @property
+    def is_preset(self) -> bool:
+        """True for a bill that is moulded shut: its faces press on each other at rest."""
+        return any(getattr(self, name) for name in PRESETS)
 
     @property
     def is_double_symmetric(self) -> bool:
@@ -482,6 +552,8 @@ class Valve(Section):
         touching = 0.5 * lip if self.key_points is not None else min(0.5 * lip, radius)
         numbers["duckbill_wall_deduction"] = _TH1 if twelve_inch and radius == _R1 else touching
         numbers["flange_wall_deduction"] = _TH2 if twelve_inch else 0.5 * flange
+        numbers["initial_gap"] = _ROUGH if self.is_preset else _APART
+        numbers["moulded_length"] = self.duckbill_length
         self.__dict__.update({name: numbers[name] for name in self._following})
 
     @model_validator(mode="after")
@@ -489,6 +561,7 @@ class Valve(Section):
         if self._given is not None:  # a valve is checked again when it becomes part of a case
             return self
         self._fill()
+        check_preset(self)
         check_wall(self)
         if self.key_points is None:
             check_sections(self)
@@ -502,6 +575,7 @@ class Valve(Section):
         if self.scale == 1.0:
             return
         self._given = self.model_copy()
-        self.__dict__.update({name: self.scale * getattr(self, name) for name in _SIZES})
+        sizes = {name: getattr(self, name) for name in _SIZES}
+        self.__dict__.update({name: self.scale * size for name, size in sizes.items() if size is not None})
         for name in ("wall_map", "patches"):
             self.__dict__[name] = tuple(piece.enlarged(self.scale) for piece in getattr(self, name))

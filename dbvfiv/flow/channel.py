@@ -270,7 +270,7 @@ def _trial(count: int, size: float) -> Stream:
     """A stream of some size to try terms on."""
     area = np.linspace(2.0, 5.0, count)
     speed = size / area
-    return Stream(area, size * np.linspace(0.1, 0.3, count), speed, speed[-1:], area)
+    return Stream(area, size * np.linspace(0.1, 0.3, count), speed, speed[-1:], area, step=np.ones(count - 1))
 
 
 def outward_head(speed, velocity):

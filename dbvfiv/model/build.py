@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..case.model import Case
+from ..case.quantity import GRAVITY
 from ..fit.cards import law_from_case, relaxation_from_case
 from ..flow import Channel, FlowLaw, UniformLoad
 from ..flow.elastic_line import ElasticLine, LineChannel
@@ -17,6 +18,7 @@ from ..geometry.divisions import grading
 from ..materials.laws import OrthotropicPly
 from ..shell import Layer, Section, Shell, ShellMesh, Weight
 from ..shell.section import Zones
+from .preset import pressure_for_overlap, stress_free_shape
 from .supports import free_unknowns
 
 
@@ -47,7 +49,37 @@ def build_shell(case: Case, section: Section | None = None) -> tuple[ValveMesh, 
     section = section or build_section(case)
     zones = layer_zones(case, mesh) if fillers else None
     choices = (case.shell.metric, case.mesh.element, zones, case.shell.mass)
-    return mesh, Shell(surface, section, free_unknowns(mesh), *choices)
+    shell = Shell(surface, section, free_unknowns(mesh), *choices)
+    return mesh, _preset(case, mesh, shell) if case.valve.is_preset else shell
+
+
+def _preset(case: Case, mesh: ValveMesh, shell: Shell) -> Shell:
+    """The shell of a bill that is moulded shut, without stress in another shape."""
+    valve, loaded = case.valve, moulded_share(mesh, case)
+    pressure = valve.sealing_pressure
+    if valve.sealing_force:
+        pressure = valve.sealing_force / valve.moulded_length
+    elif valve.overlap:
+        pressure = pressure_for_overlap(shell, loaded, int(mesh.centre_line[0]), valve.overlap)
+    elif valve.cracking_head:
+        pressure = case.fluid.density * GRAVITY * valve.cracking_head
+    return shell.preset(stress_free_shape(shell, loaded, pressure), pressure)
+
+
+def moulded_share(mesh: ValveMesh, case: Case) -> np.ndarray:
+    """(ne,) share of each element of a bill that is moulded shut that the other lip presses on evenly."""
+    begin, end = (
+        mesh.z[np.searchsorted(mesh.z, mesh.element_z, side) - shift] for side, shift in (("left", 1), ("right", 0))
+    )
+    return loaded_share(mesh, case) * np.clip((case.valve.moulded_length - begin) / (end - begin), 0.0, 1.0)
+
+
+def loaded_share(mesh: ValveMesh, case: Case) -> np.ndarray:
+    """(ne,) share of each element that carries pressure: none beside the side edge of the duckbill (App. A)."""
+    limit = 1.0 - case.drive.unloaded_edge
+    left, right = mesh.element_columns.T
+    share = np.clip((limit - left) / (right - left), 0.0, 1.0)
+    return np.where(mesh.element_z < case.valve.duckbill_length, np.round(share, 12), 1.0)
 
 
 def layer_zones(case: Case, mesh: ValveMesh) -> Zones:
@@ -81,7 +113,7 @@ def build_flow(case: Case, mesh: ValveMesh) -> FlowLaw:
         return UniformLoad(len(mesh.z), 1.0 if case.drive.side == "inside" else -1.0)
     gap_area = mesh.rest_area[0] - mesh.wall_deduction[0]
     storage = 1.0 if case.fluid.continuity == "storage" else 0.0
-    terms, floor = terms_of(case), case.fluid.area_floor * gap_area
+    terms, floor = terms_of(case), case.film_share * gap_area
     given = {"back": case.downstream.pressure, "perimeter": mesh.perimeter, "density": case.fluid.density}
     given |= _levels(case, mesh)
     bowed = case.mesh.inertia == "parabolic"

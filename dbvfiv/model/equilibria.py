@@ -8,10 +8,12 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import brentq
 
+from ..case.model import Case
 from ..case.quantity import GRAVITY
 from ..errors import SolveError
 from ..geometry.divisions import grading
 from ..observer import Observer
+from .load_curve import LoadCurve, curve_of
 from .load_steps import Loading, LoadStepOptions, LoadStepResult, LoadSteps
 from .material_stability import beyond_levels, material_stability
 from .newton import NewtonOptions
@@ -79,7 +81,10 @@ class LoadPath(LoadSteps):
         """
         self._check_drive(target)
         try:
-            way = self._loaded(target) if self._at_rest else self.reach(target)
+            if self.follows_curve:
+                way = self._along_curve(target)
+            else:
+                way = self._loaded(target) if self._at_rest else self.reach(target)
         except SolveError as error:
             raise SolveError(f"{str(error).removesuffix('.')}{self._too_wide()}.") from None
         last = way.result
@@ -129,6 +134,26 @@ class LoadPath(LoadSteps):
         self.q, self.pressure = ramp.q, target
         settled = self.settle()
         return LoadStepResult(way.iterations + settled.iterations, way.steps, settled)
+
+    @property
+    def follows_curve(self) -> bool:
+        """True where one pressure may have several equilibria: of a bill that is moulded shut, whose faces part, and
+        of a wall that is pressed from outside, which may snap.
+        """
+        drive = self.model.case.drive
+        outside = drive.kind == "uniform" and drive.side == "outside" and self.model.weight is None
+        return self.model.case.valve.is_preset or outside
+
+    @property
+    def curve(self) -> LoadCurve:
+        """Equilibria from rest on, the same for all paths of the model."""
+        return curve_of(self.model, self.options.newton, self.observer)
+
+    def _along_curve(self, target: float) -> LoadStepResult:
+        result, points = self.curve.reach(target)
+        self.q, self.pressure = result.q, target
+        self.slope = None
+        return LoadStepResult(result.iterations, points, result)
 
     def _too_wide(self) -> str:
         """Clause on a passage that leaves no finite flow, of the last equilibrium; empty for other causes."""
@@ -301,6 +326,54 @@ def state_warnings(model: ValveModel, states: list[SteadyState]) -> Iterator[str
             f"The rubber's constants are unstable in {len(lost)} of {len(states)} states, from {min(pressures):.6g} to "
             f"{max(pressures):.6g} Pa."
         )
+
+
+#: Cracking over sealing pressure of the first bill that is tried for a cracking head; how far over the head the curves
+#: are followed; accuracy of the head, and most bills that are tried.
+_CRACKS_AT, _BEYOND, _HEAD_ACCURACY, _BILLS = 1.15, (1.1, 1.5, 2.5), 1e-3, 12
+
+
+def first_opening(model: ValveModel, area_ratio: float) -> float | None:
+    """Pressure, Pa, up to which the load has to rise from rest until the passage at the lips of a bill that is moulded
+    shut has grown to a multiple of that at rest; None where it has not as far as its curve is known.
+    """
+    curve = LoadPath(model, SteadyOptions.of(model.case)).curve
+    wanted = np.log(area_ratio * model.rows.areas(model.nodal(model.rest()))[0])
+    found = curve.first(lambda q: float(np.log(max(model.rows.areas(model.nodal(q))[0], 1e-300)) - wanted))
+    return None if found is None else found[0]
+
+
+def sealing_for_cracking(case: Case, area_ratio: float, observer: Observer | None = None) -> float:
+    """Sealing pressure, Pa, with which the bill of a case cracks at its valve.cracking_head.
+
+    Raises
+    ------
+    SolveError
+        If there is none, or an equilibrium on the way is not found.
+    """
+    observer = Observer() if observer is None else observer
+    head = case.valve.cracking_head
+    drive = case.fluid.density * GRAVITY * head
+    sealing, known = drive / _CRACKS_AT, []
+    for _ in range(_BILLS):
+        observer.progress(f"looking for a cracking head of {head:.4g} m with a sealing pressure of {sealing:.6g} Pa")
+        model = ValveModel(case.replace({"valve.cracking_head": None, "valve.sealing_pressure": sealing}))
+        path, cracks = LoadPath(model, SteadyOptions.of(case), observer=observer), None
+        for factor in _BEYOND:
+            path.go_to(model.flow.back + factor * drive)
+            cracks = first_opening(model, area_ratio)
+            if cracks is not None:
+                break
+        off = np.log((cracks - model.flow.back) / drive) if cracks is not None else np.log(_BEYOND[-1])
+        if abs(off) <= _HEAD_ACCURACY:
+            return sealing
+        known.append((np.log(sealing), off))
+        slope = 1.0
+        if len(known) > 1 and known[-1][0] != known[-2][0]:
+            (a, at_a), (b, at_b) = known[-2:]
+            slope = np.clip((at_b - at_a) / (b - a), 0.3, 3.0)
+        sealing = float(np.exp(known[-1][0] - off / slope))
+    raise SolveError(f"No sealing pressure was found with which the bill cracks at a head of {head:.4g} m.")
 
 
 #: Where the search begins: this part of the pump's largest head; and how far it goes up at once.

@@ -10,9 +10,7 @@ import numpy as np
 
 from ..errors import SolveError
 from ..observer import Observer
-from .linear import CoupledFactor
 from .newton import EquilibriumSolver, NewtonOptions, NewtonResult
-from .valve import Tangent, ValveModel
 
 
 @dataclass(frozen=True)
@@ -175,7 +173,7 @@ class Loading:
         That belongs to the whole load, Pa.
     """
 
-    def __init__(self, model: ValveModel, pressure: float):
+    def __init__(self, model: Any, pressure: float):
         self.model, self.whole = model, float(pressure)
         self.mesh, self.nodal, self.rest = model.mesh, model.nodal, model.rest
         self.apply, self.rounding = model.apply, model.rounding
@@ -189,15 +187,15 @@ class Loading:
         """Unbalanced force (n,) under a share of the load."""
         return self.model.residual(q, self.whole, share)
 
-    def tangent(self, q: np.ndarray, share: float) -> Tangent:
+    def tangent(self, q: np.ndarray, share: float) -> Any:
         """Residual and linearisation there."""
         return self.model.tangent(q, self.whole, share)
 
-    def factor(self) -> CoupledFactor:
+    def factor(self) -> Any:
         """A new factorisation object."""
         return self.model.factor()
 
-    def refactor(self, factor: CoupledFactor, tangent: Tangent) -> None:
+    def refactor(self, factor: Any, tangent: Any) -> None:
         """Factor a tangent."""
         self.model.refactor(factor, tangent)
 

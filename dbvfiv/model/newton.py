@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import weakref
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from petsc4py import PETSc
 
 from .linear import SingularMatrix
-from .valve import Tangent, ValveModel
 
 _REASONS = {
     -1: "the residual or tangent could not be evaluated",
@@ -77,15 +77,15 @@ class EquilibriumSolver:
 
     Parameters
     ----------
-    model : ValveModel
+    model : ValveModel, PressedShell or alike
     options : NewtonOptions
     """
 
-    def __init__(self, model: ValveModel, options: NewtonOptions = NewtonOptions()):
+    def __init__(self, model: Any, options: NewtonOptions = NewtonOptions()):
         self.model = model
         self.options = options
         self.factor = model.factor()
-        self.tangent: Tangent | None = None
+        self.tangent: Any = None
         self.tangents = 0
         self.residuals = 0
         self.last: np.ndarray | None = None

@@ -57,7 +57,7 @@ class SteadyState:
         Where it occurs, on the mid-surface at rest.
     lip_opening : float, m
         Full clear opening between the inner faces of both lips at x = z = 0; never below zero, see
-        `dbvfiv.model.state.LipCentre.opening`.
+        `dbvfiv.model.state.LipCentre.opening`. Of a bill that is moulded shut by how much it is more than at rest.
     lip_displacement : float, m
         Displacement in y of the mid-surface of one lip there.
     station_area, station_velocity, station_pressure : (m,) arrays, m2 (of the part), m/s, Pa
@@ -106,6 +106,11 @@ class SteadyState:
     reason: str
 
     @property
+    def is_sealed(self) -> bool:
+        """True where the faces of a bill that is moulded shut let nothing pass."""
+        return not self.mass_flow > 0
+
+    @property
     def hydraulics(self) -> Hydraulics | None:
         """Heads, loss and coefficients; None where nothing flows."""
         if not self.volume_flow > 0:
@@ -137,10 +142,12 @@ def describe_state(model: ValveModel, q: np.ndarray, pressure: float, **solution
     velocity = model.flow.inlet_velocity(area, pressure, density)
     if not np.isfinite(velocity):
         raise SolveError(_boundless(model, area, pressure))
-    speeds = model.flow.steady_velocities(area, pressure, density)
+    share = model.open_share(area)
+    speeds = model.flow.steady_velocities(area, pressure, density) * float(share > 0.0)
     displacement = np.linalg.norm(nodal[:, :3], axis=1)
     where = int(np.argmax(displacement))
     lip = LipCentre(model.mesh, model.shell)
+    shut = lip.opening(model.rest()) if model.case.valve.is_preset else 0.0
     mass_flow = model.mass_flow(area, pressure)
     station_pressure = model.flow.steady_pressure(area, pressure)
     line = model.line
@@ -160,11 +167,11 @@ def describe_state(model: ValveModel, q: np.ndarray, pressure: float, **solution
         nodal=nodal,
         mass_flow=mass_flow,
         volume_flow=mass_flow / density,
-        outlet_area=float(model.mesh.part.copies * area[0]),
+        outlet_area=float(model.mesh.part.copies * area[0] * share),
         outlet_velocity=float(speeds[0]),
         max_displacement=float(displacement[where]),
         max_displacement_position=tuple(float(value) for value in model.mesh.nodes[where]),
-        lip_opening=lip.opening(q),
+        lip_opening=max(0.0, lip.opening(q) - shut) if share else 0.0,
         lip_displacement=lip.displacement(q),
         station_area=area,
         station_velocity=speeds,
@@ -212,6 +219,19 @@ def _boundless(model: ValveModel, area: np.ndarray, pressure: float) -> str:
         f"its passage at the lips, {lips}, is not smaller than that of the flange, {flange}, so no pressure would be "
         "left to hold the fluid back."
     )
+
+
+def parted_width(model: ValveModel, q: np.ndarray) -> tuple[float, float]:
+    """Widths, m, of the whole lip that has parted, and that is pressed at rest, of a bill that is moulded shut."""
+    row, where = model.mesh.rows[0], np.full(len(model.mesh.nodes), -1)
+    where[model.contact.plane.nodes] = np.arange(model.contact.plane.count)
+    known = where[row] >= 0
+    x = np.abs(model.mesh.nodes[row, 0])
+    width = np.gradient(x) if model.mesh.part.is_quarter else np.abs(np.gradient(model.mesh.nodes[row, 0]))
+    pressed = model.contact.state(model.rest()).touching[where[row]] & known
+    parted = pressed & ~model.contact.state(q).touching[where[row]]
+    copies = 2.0 if model.mesh.part.is_quarter else 1.0
+    return copies * float(np.abs(width[parted]).sum()), copies * float(np.abs(width[pressed]).sum())
 
 
 class LipCentre:

@@ -4,8 +4,9 @@ Faces touch the closing plane. Each node's touching point lies half a wall insid
 director, so contact forces act on rotations as well. The faces of the duckbill are those that the fluid knows: its
 passage at rest has the half gap `valve.initial_gap`, whatever wall and lip radius leave, and the faces meet where
 `fluid.area_floor` of it is left, so that lips that lie on each other leave the passage that a shut valve has, and none
-below zero. Elsewhere the gap is that of the geometry. Points that start closer to the plane than this gap, or beyond
-it, as where the wall folds at the side edge, are measured from where they start plus the gap.
+below zero. Faces of a bill that is moulded shut touch in the shape it is drawn in, and press on each other there with
+the pressure that it was cured for. Elsewhere the gap is that of the geometry. Points that start closer to the plane
+than this gap, or beyond it, as where the wall folds at the side edge, are measured from where they start plus the gap.
 
 The force is no part of the structure's: neither stiffness damping nor loss factors act on it. Equations (T.26) and, of
 contact in a time step, (T.27) of docs/theory.md.
@@ -20,7 +21,6 @@ import numpy as np
 import scipy.sparse as sp
 
 from ..case.model import Case
-from ..case.physics import Supports
 from ..contact import (
     ContactLaw,
     ContactState,
@@ -79,9 +79,10 @@ class LipStops:
         return int(np.count_nonzero(q[self.unknowns] < 0.0))
 
 
-def lip_stops(mesh: ValveMesh, index: np.ndarray, supports: Supports, joint: float) -> LipStops:
+def lip_stops(case: Case, mesh: ValveMesh, index: np.ndarray) -> LipStops:
     """Stops on the duckbill nodes of the inner half of the columns, or of all; none where faces touch instead."""
-    if not supports.lip_stop or supports.contact != "stops":
+    supports, joint = case.supports, case.valve.duckbill_length
+    if not supports.lip_stop or case.faces_touch:
         return LipStops(np.zeros(0, int), supports.lip_stop_stiffness)
     limit = 0.5 if supports.lip_stop_columns == "inner-half" else 1.0 + 1e-9
     rows = mesh.z <= joint * (1 + 1e-9)
@@ -94,8 +95,9 @@ def lip_stops(mesh: ValveMesh, index: np.ndarray, supports: Supports, joint: flo
     return LipStops(unknowns[moving].astype(int), stiffness)
 
 
-#: Half width of the rounded kink of the contact law over the initial gap.
-ROUNDING = 0.01
+#: Half width of the rounded kink of the contact law over the initial gap, and that over it of a bill that is moulded
+#: shut, whose faces take up and lose contact row by row.
+ROUNDING, PRESET_ROUNDING = 0.01, 1 / 3
 
 
 @dataclass(frozen=True)
@@ -161,20 +163,23 @@ class FaceContact:
 
 def face_contact(case: Case, mesh: ValveMesh, shell: Shell) -> FaceContact | None:
     """Contact of the inner faces of a case; None where it has stops."""
-    supports = case.supports
-    if supports.contact != "faces":
+    if not case.faces_touch:
         return None
-    gap = (1.0 - case.fluid.area_floor) * case.valve.initial_gap
+    preset = case.valve.is_preset
+    law = ContactLaw(case.face_stiffness, (PRESET_ROUNDING if preset else ROUNDING) * case.valve.initial_gap)
+    gap = np.full(shell.mesh.node_count, (1.0 - case.film_share) * case.valve.initial_gap)
+    if preset:
+        moulded = mesh.nodes[:, 2] <= case.valve.moulded_length * (1 + 1e-9)
+        gap = np.where(moulded, law.gap_at(shell.closing_pressure), law.rounding)
     depth = 0.5 * nodal_thickness(shell.mesh)
     at_lips = mesh.nodes[:, 2] <= case.valve.duckbill_length * (1 + 1e-9)
     depth = np.where(at_lips, depth + _inside(case, gap), depth)
-    law = ContactLaw(supports.contact_stiffness, ROUNDING * case.valve.initial_gap)
     every = np.arange(shell.mesh.node_count)
     return FaceContact(shell, PlaneContact(shell, every, depth, tributary_area(shell), law, axis=1, least_gap=gap))
 
 
-def _inside(case: Case, gap: float) -> float:
-    """Distance, m, of the faces in contact inside those of the duckbill's wall without patches."""
+def _inside(case: Case, gap: np.ndarray) -> np.ndarray:
+    """Distance (nn,), m, of the faces in contact inside those of the duckbill's wall without patches."""
     valve = case.valve
     return valve.duckbill_wall_deduction - gap - 0.5 * valve.thickness_at(0.0)
 

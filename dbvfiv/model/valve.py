@@ -19,18 +19,23 @@ import numpy as np
 import scipy.sparse as sp
 
 from ..case.model import Case
+from ..errors import SolveError
 from ..flow import RowAreas
 from ..flow.terms.line import Line, PiecedLine
 from ..flow.terms.pump import Pump
 from ..flow.terms.tail import Tail
-from ..geometry import ValveMesh
 from ..shell import Section, StepWall, Weight
 from ..shell.pressure import pressure_force, pressure_stiffness, station_forces
-from .build import build_flow, build_shell, build_weight
+from .build import build_flow, build_shell, build_weight, loaded_share
 from .linear import CoupledFactor
+from .load_steps import Loading
+from .newton import EquilibriumSolver, NewtonOptions
 from .outside import OutsideFluid
 from .relaxing import WallRelaxation
 from .supports import FaceContact, face_contact, lip_stops
+
+#: Faces that meet change the residual from one step to the next: its norm has to fall.
+_AT_REST = NewtonOptions(1e-10, 200, "l2")
 
 
 @dataclass(frozen=True)
@@ -78,7 +83,7 @@ class ValveModel:
         self.mesh, self.shell = build_shell(case, section)
         dofs = self.shell.dofs
         self.rows = RowAreas(self.mesh, dofs.index)
-        self.stops = lip_stops(self.mesh, dofs.index, case.supports, case.valve.duckbill_length)
+        self.stops = lip_stops(case, self.mesh, dofs.index)
         self.contact: FaceContact | None = face_contact(case, self.mesh, self.shell)
         self.station_of_node = np.empty(len(self.mesh.nodes), np.int64)
         self.station_of_node[self.mesh.rows] = np.arange(len(self.mesh.rows))[:, None]
@@ -124,7 +129,30 @@ class ValveModel:
         return len(self.mesh.z)
 
     def rest(self) -> np.ndarray:
-        return np.zeros(self.size)
+        """Unknowns (n,) of the wall at rest without load: zeros, or of a bill that is moulded shut those with which its
+        faces hold each other.
+
+        Raises
+        ------
+        SolveError
+            If they do not.
+        """
+        return self._rest.copy()
+
+    @cached_property
+    def _rest(self) -> np.ndarray:
+        drawn = np.zeros(self.size)
+        if self.shell.stress_free is None:
+            return drawn
+        found = EquilibriumSolver(Loading(self, self.flow.back), _AT_REST).solve(drawn, 0.0)
+        if not found.converged:
+            raise SolveError(f"The bill that is moulded shut has no equilibrium at rest: {found.reason}.")
+        return found.q
+
+    @cached_property
+    def _preset_force(self) -> float:
+        """Norm of the force, N, that a bill that is moulded shut needs in the shape it is drawn in."""
+        return 0.0 if self.shell.stress_free is None else float(np.linalg.norm(self.shell.force(np.zeros(self.size))))
 
     def nodal(self, q: np.ndarray) -> np.ndarray:
         """Nodal displacements and rotations (nn, c)."""
@@ -252,8 +280,8 @@ class ValveModel:
         """A new factorisation object for tangents of this model; see `refactor`."""
         return CoupledFactor(
             self.shell.dofs.matrix(np.ones(len(self.shell.dofs.pattern[1]))),
-            self.station_forces(self.nodal(self.rest())),
-            self.rows.jacobian(self.nodal(self.rest())),
+            self.station_forces(self.nodal(np.zeros(self.size))),
+            self.rows.jacobian(self.nodal(np.zeros(self.size))),
         )
 
     @staticmethod
@@ -272,6 +300,16 @@ class ValveModel:
         k, g, j = self.matrices(tangent)
         return k @ direction - g @ (tangent.pressure_slope @ (j @ direction))
 
+    def apply_transposed(self, tangent: Tangent, direction: np.ndarray) -> np.ndarray:
+        """Product (n,) of the transpose of the coupled tangent with a direction (n,)."""
+        k, g, j = self.matrices(tangent)
+        return k.T @ direction - j.T @ (tangent.pressure_slope.T @ (g.T @ direction))
+
+    @property
+    def load_unit(self) -> float:
+        """Pressure, Pa, in which loads are counted: that which closes a preset wall; 1 mm of water without one."""
+        return max(self.shell.closing_pressure, 10.0)
+
     def rounding(self, q: np.ndarray, tangent: Tangent) -> float:
         """Norm of the residual that rounding of the positions alone can leave, N: machine epsilon times |K| |x|."""
         position = np.abs(self.nodal(q))
@@ -285,11 +323,11 @@ class ValveModel:
         return -self.pressure_force(nodal, self.flow.steady_slope(self.rows.areas(nodal), pressure))
 
     def force_scale(self, q: np.ndarray, pressure: float) -> float:
-        """Norm of the pressure forces and of the weight, N: what residuals are measured against."""
+        """Norm of the pressure forces, of the weight and of the preset, N: what residuals are measured against."""
         nodal = self.nodal(q)
         p = self.flow.steady_pressure(self.rows.areas(nodal), pressure)
         own = 0.0 if self.weight is None else np.linalg.norm(self.weight.force(self.shell, q))
-        return float(np.linalg.norm(self.pressure_force(nodal, p)) + own)
+        return float(np.linalg.norm(self.pressure_force(nodal, p)) + own + self._preset_force)
 
     # -- dynamics
     # ----
@@ -298,18 +336,20 @@ class ValveModel:
         """Values (nnz,) of the mass matrix at a state."""
         return self.shell.mass(q)
 
+    @cached_property
+    def _film(self) -> np.ndarray | float:
+        """Areas (m,), m2, that rough faces in contact leave, of a bill that is moulded shut: those at rest; else 0."""
+        return 0.0 if self.shell.stress_free is None else self.rows.areas(self.nodal(self.rest()))
+
+    def open_share(self, area: np.ndarray) -> float:
+        """Share of the narrowest of sections (m,), m2, that is open: what faces in contact leave carries no flow."""
+        narrowest = int(np.argmin(area))
+        return float(np.clip(1.0 - np.broadcast_to(self._film, area.shape)[narrowest] / area[narrowest], 0.0, 1.0))
+
     def mass_flow(self, area: np.ndarray, pressure: float, density: float | None = None) -> float:
-        """Steady mass flow of the whole valve, kg/s."""
+        """Steady mass flow of the whole valve, kg/s; none where its faces shut a section."""
         density = self.case.fluid.density if density is None else density
         velocity = self.flow.inlet_velocity(area, pressure, density)
         density = self.flow.inlet_density(area, pressure, density)
         inlet = float(self.mesh.rest_area[-1] - self.mesh.wall_deduction[-1])
-        return self.mesh.part.copies * density * velocity * inlet
-
-
-def loaded_share(mesh: ValveMesh, case: Case) -> np.ndarray:
-    """(ne,) share of each element that carries pressure: none beside the side edge of the duckbill (App. A)."""
-    limit = 1.0 - case.drive.unloaded_edge
-    left, right = mesh.element_columns.T
-    share = np.clip((limit - left) / (right - left), 0.0, 1.0)
-    return np.where(mesh.element_z < case.valve.duckbill_length, np.round(share, 12), 1.0)
+        return self.open_share(area) * self.mesh.part.copies * density * velocity * inlet

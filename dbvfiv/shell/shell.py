@@ -61,6 +61,11 @@ class Shell:
         Where which layers of the section are; all are everywhere by default.
     mass_kind : "consistent" or "averaged"
         See `dbvfiv.shell.mass`.
+    stress_free : ShellMesh, optional
+        The shape without stress, on the same elements, where the wall of `mesh` is preset: strains are measured from
+        it, displacements and rotations from `mesh`.
+    closing_pressure : float, Pa
+        Even pressure that holds such a wall in the shape of `mesh`.
 
     All states are vectors of the free unknowns (n,): displacements in m, rotations in rad. Forces are in N and N m.
     """
@@ -74,19 +79,23 @@ class Shell:
         element: str = ENHANCED,
         zones: Zones | None = None,
         mass_kind: str = AVERAGED,
+        stress_free: ShellMesh | None = None,
+        closing_pressure: float = 0.0,
     ):
         self.mesh = mesh
+        self.stress_free, self.closing_pressure = stress_free, float(closing_pressure)
+        unstrained = mesh if stress_free is None else stress_free
         self.section = section
         free = np.ones((mesh.node_count, UNKNOWNS_PER_NODE), bool) if free is None else np.asarray(free, bool)
         self.dofs = DofMap(free, mesh.quads)
         self.metric = metric
-        self.geometry = reference_geometry(mesh)
+        self.geometry = reference_geometry(unstrained)
         g = self.geometry
         self.element = element
         self.zones = zones
         self.mass_kind = mass_kind
         self.at_rest = section if zones is None else WallParts(section, zones)
-        self._assumed = a = assumed_strains(mesh, g, self.at_rest, element)
+        self._assumed = a = assumed_strains(unstrained, g, self.at_rest, element)
         reference = (a.products, g.shear0, local_map(g) @ a.inplane, shear_map(g), g.area, g.thickness)
         if zones is None:
             self.parts = (_Part(slice(None), mesh.quads, reference),)
@@ -100,7 +109,14 @@ class Shell:
 
     def with_free(self, free=None) -> Shell:
         """Copy of the shell with other free unknowns (nn, 5); all free by default."""
-        return Shell(self.mesh, self.section, free, self.metric, self.element, self.zones, self.mass_kind)
+        return self._copy(free, self.stress_free, self.closing_pressure)
+
+    def preset(self, stress_free: ShellMesh, closing_pressure: float) -> Shell:
+        """Copy of the shell without stress in another shape of its mesh; a pressure, Pa, holds it in its own."""
+        return self._copy(self.dofs.free, stress_free, closing_pressure)
+
+    def _copy(self, free, *preset) -> Shell:
+        return Shell(self.mesh, self.section, free, self.metric, self.element, self.zones, self.mass_kind, *preset)
 
     def wall_of(self, factors: np.ndarray | None = None) -> tuple:
         """Arguments of the compiled loops, zone by zone; `factors` (nl,) multiply the stress of each layer."""

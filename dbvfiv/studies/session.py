@@ -10,7 +10,7 @@ from typing import Any
 from ..case.parameters import PARAMETERS
 from ..errors import CaseError
 from ..model import ValveModel
-from ..model.equilibria import find_equilibrium, operating_pressure, redescribe, rest_state
+from ..model.equilibria import find_equilibrium, operating_pressure, redescribe, rest_state, sealing_for_cracking
 from ..model.state import SteadyState
 from ..model.strain_level import SettledLevels, settle_levels
 from ..observer import Observer
@@ -84,6 +84,7 @@ class Session:
         #: How its strain levels were settled, which every study of it tells.
         self.settled: SettledLevels | None = None
         self._at_levels: Session | None = None
+        self._cracks: Session | None = None
 
     def __repr__(self) -> str:
         return f"<Session of {self.name!r}>"
@@ -101,7 +102,17 @@ class Session:
         CaseError
             If the case gives no model.
         """
-        return self.settle().model if self.case.seeks_levels else self.described
+        if self.case.seeks_levels:
+            return self.settle().model
+        return self._at_cracking().model if self.case.valve.cracking_head else self.described
+
+    def _at_cracking(self, observer: Observer | None = None) -> Session:
+        """The session with the sealing pressure that valve.cracking_head asks for."""
+        if self._cracks is None:
+            ratio = self.case.steady.cracking_area
+            found = _attempt(lambda: sealing_for_cracking(self.case, ratio, observer))
+            self._cracks = self.replace({"valve.cracking_head": None, "valve.sealing_pressure": found})
+        return self._cracks
 
     @cached_property
     def described(self) -> ValveModel:
@@ -192,6 +203,8 @@ class Session:
         require_consistent(self.case, kind)  # before levels are settled
         if self.case.seeks_levels and kind != "levels":
             return self.settle(observer).perform(kind, output, observer, **choices)
+        if self.case.valve.cracking_head:
+            return self._at_cracking(observer).perform(kind, output, observer, **choices)
         if self.case.meets_pump(kind):
             return self._at_operating_point(kind, observer).perform(kind, output, observer, **choices)
         header = Header.of(kind, self.case, self.name)

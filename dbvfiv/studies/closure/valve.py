@@ -10,12 +10,11 @@ from scipy.integrate import trapezoid
 
 from ...contact import ContactLaw, PlaneContact, tributary_area
 from ...geometry import ValveMesh
-from ...model.build import build_shell
+from ...model.build import build_shell, loaded_share
 from ...model.pressed_shell import PressedShell
 from ...model.state import LipCentre
 from ...model.supports import free_unknowns
 from ...model.symmetry import EQUILIBRIA
-from ...model.valve import loaded_share
 from ...shell import Shell
 from ...shell.mesh import nodal_thickness
 from ...shell.recovery import LayerFields, layer_fields

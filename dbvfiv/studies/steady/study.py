@@ -1,13 +1,15 @@
 """Equilibria over a list of pressures, each from the one before, and what can be read off them.
 
-The lips leave a gap at rest, so no pressure divides shut from open. What is called cracking here is a passage at the
-lips that has grown to a stated multiple of that at rest.
+Lips that leave a gap at rest have no pressure that divides shut from open. What is called cracking here is a passage at
+the lips that has grown to a stated multiple of that at rest; of a bill that is moulded shut, of what rough faces leave,
+which carries nothing.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import suppress
+from dataclasses import replace
 from functools import cached_property, partial
 from typing import Any, NamedTuple
 
@@ -21,8 +23,16 @@ from ...case.quantity import head_of
 from ...drawing import views
 from ...errors import CaseError, SolveError
 from ...model import ValveModel
-from ...model.equilibria import LoadPath, SteadyOptions, model_warnings, state_warnings
-from ...model.state import SteadyState
+from ...model.equilibria import (
+    LoadPath,
+    SteadyOptions,
+    first_opening,
+    model_warnings,
+    redescribe,
+    state_warnings,
+)
+from ...model.load_curve import LimitPoint
+from ...model.state import SteadyState, parted_width
 from ...record.mesh import MeshData, WholeValve
 from ...record.record import GrowingRecord
 from ...record.states import PATH_RESTART, shown_summary, state_table
@@ -37,12 +47,13 @@ from ..state import State, gather_states, pressure_steps, reach_states, states_o
 from ..study import Study, print_rows
 from . import figures
 
-#: Table of the states, and kind of the note that holds the cracking pressure.
-STATES, CRACKING = "states", "cracking"
+#: Table of the states, and kinds of the notes that hold the cracking pressure, limit points, further equilibria at the
+#: pressure of a state, and how much of the lip has parted.
+STATES, CRACKING, LIMIT, FURTHER, PARTED = "states", "cracking", "limit point", "further equilibrium", "parted"
 #: Measurements that belong beside steady states.
 MEASURED = {DISCHARGE: FLOW, AREA: LIP_AREA, SHAPE: None, TAPS: None}
-#: Relative accuracy of the cracking pressure.
-_ACCURACY = 1e-5
+#: Relative accuracy of the cracking pressure, and difference of two displacements below which they are of one state.
+_ACCURACY, _SAME = 1e-5, 1e-4
 
 
 def tables_of(mesh: MeshData) -> tuple[TableSpec, ...]:
@@ -70,6 +81,32 @@ def run(session: Session, record: GrowingRecord) -> None:
         record.progress("cracking pressure")
         with suppress(SolveError):  # none is given then
             record.note(CRACKING, **find_cracking(model, states, steady.cracking_area)._asdict())
+    if states and LoadPath(model, SteadyOptions.of(case)).follows_curve:
+        _note_curve(model, states, record)
+
+
+def _note_curve(model: ValveModel, states: Sequence[SteadyState], record: GrowingRecord) -> None:
+    """Keep limit points of the curve of equilibria, what else it holds at the pressures of the states, and how much of
+    the lip has parted.
+    """
+    path, case = LoadPath(model, SteadyOptions.of(model.case), observer=record), model.case
+    with suppress(SolveError):
+        path.go_to(max(state.pressure for state in states))
+    limits = path.curve.limits()
+    for limit in limits if not record.notes(LIMIT) else ():
+        record.note(LIMIT, **limit._asdict())
+    span = [limit.pressure for limit in limits]
+    for state in states:
+        if case.valve.is_preset and not state.is_sealed and state.pressure > model.flow.back:
+            width, pressed = parted_width(model, state.q)
+            record.note(PARTED, pressure=state.pressure, width=width, pressed=pressed)
+        if len(span) < 2 or not min(span) <= state.pressure <= max(span):
+            continue
+        for q in path.curve.passages(state.pressure):
+            other = redescribe(model, replace(state, q=q))
+            if abs(other.lip_displacement - state.lip_displacement) > _SAME * abs(state.max_displacement):
+                found = {name: getattr(other, name) for name in ("lip_opening", "mass_flow", "max_displacement")}
+                record.note(FURTHER, pressure=state.pressure, **found)
 
 
 class Cracking(NamedTuple):
@@ -83,15 +120,25 @@ class Cracking(NamedTuple):
         Driving pressure there, over the pressure downstream; None where no state is open so far.
     head : float or None, m
         The same as a head of the fluid.
+    sealed : bool
+        The faces press on each other at rest, so nothing passes before.
     """
 
     area_ratio: float
     pressure: float | None = None
     head: float | None = None
+    sealed: bool = False
 
     def sentence(self, highest: float) -> str:
         """Sentence on the cracking pressure; `highest` is the highest pressure among the states, Pa."""
         grown = f"{self.area_ratio:g} times the passage at rest"
+        if self.sealed and self.pressure is None:
+            return f"Cracking: not up to {highest / 1e3:.4g} kPa; the faces press on each other and nothing flows."
+        if self.sealed:
+            return (
+                f"Cracking pressure: {self.pressure:.4g} Pa ({1e3 * self.head:.3g} mm of the fluid) over that "
+                "downstream; before it the faces press on each other and nothing flows."
+            )
         if self.pressure is None:
             return f"Cracking: not up to {highest / 1e3:.4g} kPa, where the lips leave less than {grown}."
         return (
@@ -110,6 +157,8 @@ def find_cracking(model: ValveModel, states: Iterable[SteadyState], area_ratio: 
     """
     rest = model.rows.areas(model.nodal(model.rest()))[0]
     wanted = np.log(area_ratio * rest)
+    if model.case.valve.is_preset:
+        return _first_opening(model, max(state.pressure for state in states), area_ratio)
     open_ = [state for state in states if np.log(max(state.station_area[0], rest)) >= wanted]
     if not open_:
         return Cracking(area_ratio)
@@ -127,6 +176,16 @@ def find_cracking(model: ValveModel, states: Iterable[SteadyState], area_ratio: 
         return Cracking(area_ratio, 0.0, 0.0)
     drive = float(brentq(missing, 0.0, upper.pressure - back, xtol=1e-12, rtol=_ACCURACY))
     return Cracking(area_ratio, drive, head_of(drive, model.case.fluid.density))
+
+
+def _first_opening(model: ValveModel, highest: float, area_ratio: float) -> Cracking:
+    """Cracking pressure of a bill that is moulded shut, on its curve of equilibria up to a pressure, Pa."""
+    LoadPath(model, SteadyOptions.of(model.case)).go_to(highest)
+    pressure = first_opening(model, area_ratio)
+    if pressure is None or pressure > highest:
+        return Cracking(area_ratio, sealed=True)
+    drive = pressure - model.flow.back
+    return Cracking(area_ratio, drive, head_of(drive, model.case.fluid.density), True)
 
 
 def flow_at(states: Sequence[SteadyState], pressure: np.ndarray, rest: float, name: str = "mass_flow") -> np.ndarray:
@@ -220,7 +279,12 @@ class SteadyResult(StudyResult):
     def cracking(self) -> Cracking | None:
         """Cracking pressure at which the valve begins to open; None without a flow."""
         notes = self.record.notes(CRACKING)
-        return Cracking(*(notes[-1][name] for name in Cracking._fields)) if notes else None
+        return Cracking(**{name: notes[-1][name] for name in Cracking._fields if name in notes[-1]}) if notes else None
+
+    @property
+    def limits(self) -> list[LimitPoint]:
+        """Limit points of the curve of equilibria up to the highest pressure, in its order."""
+        return [LimitPoint(note["pressure"], note["highest"]) for note in self.record.notes(LIMIT)]
 
     @cached_property
     def measured(self) -> Measured:
@@ -242,7 +306,13 @@ class SteadyResult(StudyResult):
     def summary(self) -> dict[str, Any]:
         """Keys as scripts rely on, in SI units."""
         cracking = self.cracking and self.cracking._asdict()
+        if cracking is not None and not cracking["sealed"]:
+            del cracking["sealed"]
         states = {"points": [state.summary() for state in self.states], "cracking": cracking}
+        if self.limits:
+            states["limit_points"] = [limit._asdict() for limit in self.limits]
+            further = self.record.notes(FURTHER)
+            states["further_equilibria"] = [{name: note[name] for name in _FURTHER} for note in further]
         return states | self.measured.summary() | self.ending()
 
     def lines(self) -> list[str]:
@@ -253,7 +323,41 @@ class SteadyResult(StudyResult):
         lines, cracking = hydraulic_lines(self.case, self.states), self.cracking
         if cracking is not None and self.states:
             lines.append(cracking.sentence(max(state.pressure for state in self.states)))
+        lines += self._parted_sentences() + self._limit_sentences()
         return [*lines, *self.measured.sentences()]
+
+    def _parted_sentences(self) -> list[str]:
+        part = [note for note in self.record.notes(PARTED) if 0 < note["width"] < note["pressed"] * (1 - 1e-9)]
+        return [
+            f"At {note['pressure']:.4g} Pa {1e3 * note['width']:.3g} of the {1e3 * note['pressed']:.3g} mm of the lips "
+            "that touch at rest have parted; the rest is pressed."
+            for note in part
+        ]
+
+    def _limit_sentences(self) -> list[str]:
+        """Sentences on limit points and on what else is in equilibrium at the pressures of the states."""
+        if not self.limits:
+            return []
+        high = [limit.pressure for limit in self.limits if limit.highest]
+        low = [limit.pressure for limit in self.limits if not limit.highest]
+        back = f"; one that falls jumps back at {min(low):.4g} Pa" if low else ""
+        rows = ""
+        if len(high) > 1 and len(low) > 1 and self.case.valve.is_preset:
+            rows = (
+                f" There are {len(high)} such pairs between {min(low):.4g} and {max(high):.4g} Pa, as the faces part "
+                "row by row of the mesh; a finer one has fewer."
+            )
+        said = [
+            f"Limit points: a pressure that rises leaves the curve of equilibria at {max(high):.4g} Pa and jumps to "
+            f"where it goes on{back}. The states are those of a pressure that rises slowly from rest." + rows
+        ]
+        for note in self.record.notes(FURTHER):
+            said.append(
+                f"At {note['pressure']:.4g} Pa there is another equilibrium, with a lip opening of "
+                f"{1e3 * note['lip_opening']:.3g} mm, {note['mass_flow']:.4g} kg/s and displacements up to "
+                f"{1e3 * note['max_displacement']:.3g} mm."
+            )
+        return said
 
     def shortfall(self) -> str | None:
         if not self.failures:
@@ -277,6 +381,8 @@ class SteadyResult(StudyResult):
         return pressure_steps(self.states, valve, rows=("pressure", "velocity"))
 
 
+#: What is said of a further equilibrium.
+_FURTHER = ("pressure", "lip_opening", "mass_flow", "max_displacement")
 #: Keys that do not change what a run finds.
 _QUIET = tuple(f"steady.{key}" for key in ("pressures", "measured", "cracking_area", "max_iterations", "min_step"))
 _COMPARED = (Compared("mass_flow"), Compared("volume_flow", 1e3, unit="L/s", share=True, key="difference"))

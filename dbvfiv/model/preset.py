@@ -1,0 +1,129 @@
+"""Walls that are moulded shut: the shape without stress whose closing presses the faces on each other evenly.
+
+A bill is cured with lips that would cross. Pressed into the shape that it is drawn in, x, it would be in equilibrium
+under an even pressure s on the inner faces of the length that is moulded shut, which is what the other lip gives it.
+The stress-free shape X is the answer to an inverse problem of elasticity (Govindjee & Mihalic 1996, Comput. Methods
+Appl. Mech. Eng. 136, 47-57),
+
+    f(x; X) = s G(x)
+
+with f the internal force of a wall without stress in X. It is found by fixed points: the first X is x under s from
+outside; then each X is moved back by how far its equilibrium under s lies from x, and the last ones are mixed. A
+constant overlap of the lips would press at its ends only.
+
+Equation (T.32) of docs/theory.md.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from scipy.optimize import root_scalar
+
+from ..errors import SolveError
+from ..shell import Shell, ShellMesh
+from .load_steps import LoadStepOptions, LoadSteps
+from .newton import EquilibriumSolver, NewtonOptions
+from .pressed_shell import PressedShell
+
+#: Unbalanced force over that of the pressure at which the shape is found, and most fixed points on the way.
+_BALANCED, _MOST = 1e-8, 60
+#: Earlier fixed points that are mixed.
+_REMEMBERED = 8
+#: Newton's tolerance on that way.
+_NEWTON = NewtonOptions(1e-11, 30)
+#: Relative accuracy of the sealing pressure that an overlap asks for.
+_ACCURACY = 1e-9
+
+
+def stress_free_shape(shell: Shell, loaded: np.ndarray, pressure: float) -> ShellMesh:
+    """Shape in which a wall has no stress that balances an even pressure in the shape of its mesh.
+
+    Parameters
+    ----------
+    shell : Shell
+        Without stress in the shape of its mesh.
+    loaded : (ne,) array
+        Share of each element on which the pressure acts.
+    pressure : float, Pa
+        On the inner face.
+
+    Raises
+    ------
+    SolveError
+        If there is none: the wall buckles before, or is too soft.
+    """
+    mesh = shell.mesh
+    outside = LoadSteps(PressedShell(shell, None, -1.0, loaded), LoadStepOptions(_NEWTON))
+    refused = (
+        f"No shape without stress was found from which closing takes {pressure:.6g} Pa: the wall is too soft for such "
+        "a preset; take a lower one, or a thicker or shorter bill."
+    )
+    try:
+        outside.reach(pressure)
+    except SolveError as error:
+        raise SolveError(refused) from error
+    nodal = shell.dofs.expand(outside.q)
+    place, off = np.hstack([mesh.nodes + nodal[:, :3], shell.directors(nodal)[0]]), np.inf
+    mixing = _Mixing()
+    for _ in range(_MOST):
+        shape = replace(mesh, nodes=place[:, :3], directors=place[:, 3:])
+        pressed = PressedShell(shell.preset(shape, pressure), None, 1.0, loaded)
+        q, before = pressed.rest(), off
+        off = np.linalg.norm(pressed.residual(q, pressure)) / pressed.force_scale(q, pressure)
+        if off <= _BALANCED or _BALANCED * 1e3 >= off > 0.5 * before:  # the latter is rounding
+            return shape
+        found = EquilibriumSolver(pressed, _NEWTON).solve(q, pressure)
+        if not found.converged:
+            break
+        nodal = pressed.nodal(found.q)
+        moved = np.hstack([nodal[:, :3], pressed.shell.directors(nodal)[0] - mesh.directors])
+        place = mixing.step(place, moved)
+        place[:, 3:] /= np.linalg.norm(place[:, 3:], axis=1, keepdims=True)
+    raise SolveError(refused)
+
+
+class _Mixing:
+    """Anderson's mixing of fixed points (Walker & Ni 2011, SIAM J. Numer. Anal. 49, 1715-1735): the next place by the
+    combination of the last ones whose defect is least.
+    """
+
+    def __init__(self):
+        self._places: list[np.ndarray] = []
+        self._defects: list[np.ndarray] = []
+
+    def step(self, place: np.ndarray, defect: np.ndarray) -> np.ndarray:
+        """Place after one with a defect, which a plain iteration would take off."""
+        self._places, self._defects = self._places[-_REMEMBERED:] + [place], self._defects[-_REMEMBERED:] + [defect]
+        changes = np.array([(a - b).ravel() for a, b in zip(self._defects[1:], self._defects[:-1])]).T
+        after = place - defect
+        if not changes.size:
+            return after
+        share = np.linalg.lstsq(changes, defect.ravel(), rcond=1e-12)[0]
+        steps = np.array([(a - b).ravel() for a, b in zip(self._places[1:], self._places[:-1])]).T - changes
+        return after - (steps @ share).reshape(place.shape)
+
+
+def pressure_for_overlap(shell: Shell, loaded: np.ndarray, node: int, overlap: float) -> float:
+    """Sealing pressure, Pa, with whose shape a node lies beyond the closing plane y = 0 by more than it stands before
+    it at rest by an overlap, m.
+
+    Raises
+    ------
+    SolveError
+        As `stress_free_shape` does.
+    """
+
+    def excess(pressure: float) -> float:
+        shape = stress_free_shape(shell, loaded, pressure)
+        return float(shell.mesh.nodes[node, 1] - shape.nodes[node, 1]) / overlap - 1.0
+
+    small = PressedShell(shell, None, -1.0, loaded)
+    steps = LoadSteps(small, LoadStepOptions(_NEWTON))
+    steps.reach(1e-3)
+    first = 1e-3 * overlap / abs(float(small.nodal(steps.q)[node, 1]))
+    found = root_scalar(excess, x0=first, x1=0.9 * first, rtol=_ACCURACY, method="secant")
+    if not found.converged or not found.root > 0:
+        raise SolveError(f"No sealing pressure was found that gives an overlap of {overlap:.6g} m.")
+    return float(found.root)

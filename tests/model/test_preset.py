@@ -1,0 +1,170 @@
+"""Bills that are moulded shut: the shape without stress, contact at rest, cracking on one curve of equilibria."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.integrate import cumulative_trapezoid
+
+from dbvfiv.contact import ContactLaw, PlaneContact, tributary_area
+from dbvfiv.errors import CaseError
+from dbvfiv.model import ValveModel
+from dbvfiv.model.build import moulded_share
+from dbvfiv.model.equilibria import LoadPath, SteadyOptions, first_opening, sealing_for_cracking
+from dbvfiv.model.newton import EquilibriumSolver, NewtonOptions
+from dbvfiv.model.preset import stress_free_shape
+from dbvfiv.model.pressed_shell import PressedShell
+from dbvfiv.studies.case import thesis_case
+from tests.verification.test_shell_large_displacement import cantilever
+
+#: The 12-inch valve on a mesh that cracks in some seconds.
+COARSE = {"mesh.around": 8, "mesh.along": 12, "fluid.continuity": "storage"}
+PRESSURE = 800.0
+
+
+def strip(elements: int, pressure: float):
+    """Cantilever of length 10 and bending stiffness 100, and its shape without stress that a pressure flattens."""
+    shell, index = cantilever(10.0, elements, planar=True)
+    shape = stress_free_shape(shell, np.ones(shell.mesh.element_count), pressure)
+    return shell.preset(shape, pressure), shape.nodes[index[:, 0]]
+
+
+def elastica(pressure: float) -> np.ndarray:
+    """Points (k, 2) at even distances of an inextensible strip that an even follower pressure makes flat: there the
+    moment is s (L - x)^2/2, so without it the strip has the curvature of that.
+    """
+    x = np.linspace(0.0, 10.0, 20001)
+    turn = cumulative_trapezoid(pressure * (10.0 - x) ** 2 / 200.0, x, initial=0.0)
+    return np.stack([cumulative_trapezoid(f(turn), x, initial=0.0) for f in (np.cos, np.sin)], axis=1)
+
+
+def test_stress_free_shape_is_the_elastica_and_converges_with_the_mesh():
+    wanted = elastica(0.4)[-1] * [1.0, -1.0]
+    errors = [np.linalg.norm(strip(n, 0.4)[1][-1, [0, 2]] - wanted) for n in (8, 16, 32)]
+    assert wanted[1] < -3.0 and errors[1] < 0.01 * abs(wanted[1])
+    assert errors[0] > 3.0 * (errors[1] - errors[2]) > 0 and errors[2] < 2e-3 * abs(wanted[1])
+
+
+@pytest.mark.parametrize("share", [0.2, 0.5, 0.9, 1.1])
+def test_strip_against_a_wall_keeps_what_the_fluid_leaves_of_its_pressure(share):
+    """A pressure in the strip takes off as much of the even contact pressure, and lifts it off at all of it."""
+    sealing = 0.4
+    shell, _ = strip(10, sealing)
+    area = tributary_area(shell)
+    law = ContactLaw(1e11)
+    contact = PlaneContact(
+        shell, np.arange(len(area)), sealing / 1e11, area, law, axis=2, least_gap=law.gap_at(sealing)
+    )
+    pressed = PressedShell(shell, contact, 1.0)
+    found = EquilibriumSolver(pressed, NewtonOptions(1e-11, 50, "l2")).solve(pressed.rest(), share * sealing)
+    state = pressed.contact_state(found.q)
+    assert found.converged
+    if share > 1:
+        assert not state.touching.any() and pressed.nodal(found.q)[-1, 2] > 0
+        return
+    assert state.pressure == pytest.approx((1 - share) * sealing, abs=1e-6 * sealing)
+    assert state.total == pytest.approx((1 - share) * sealing * contact.area.sum(), rel=1e-6)
+
+
+@pytest.fixture(scope="module")
+def model():
+    return ValveModel(thesis_case(COARSE | {"valve.sealing_pressure": PRESSURE}))
+
+
+@pytest.fixture(scope="module")
+def path(model):
+    return LoadPath(model, SteadyOptions.of(model.case))
+
+
+def test_faces_press_evenly_at_rest_in_the_shape_that_is_drawn(model):
+    state, valve = model.contact.state(model.rest()), model.case.valve
+    nodes = model.mesh.nodes[model.contact.plane.nodes]
+    inside = (nodes[:, 0] < 0.7 * valve.lip_half_width) & (nodes[:, 2] < 0.7 * valve.moulded_length)
+    assert np.count_nonzero(inside) > 10
+    assert state.pressure[inside] == pytest.approx(PRESSURE, rel=0.03)
+    assert np.abs(model.nodal(model.rest())[:, :3]).max() < valve.initial_gap
+    beyond = model.mesh.nodes[:, 1] - model.shell.stress_free.nodes[:, 1]
+    assert beyond[model.mesh.centre_line[0]] > 5e-3  # the lips cross without contact
+
+
+def test_overlap_and_force_give_the_pressure_that_they_belong_to(model):
+    node = model.mesh.centre_line[0]
+    overlap = float(model.mesh.nodes[node, 1] - model.shell.stress_free.nodes[node, 1])
+    force = PRESSURE * model.case.valve.moulded_length
+    for name, value in (("overlap", overlap), ("sealing_force", force)):
+        other = ValveModel(thesis_case(COARSE | {f"valve.{name}": value}))
+        assert other.shell.closing_pressure == pytest.approx(PRESSURE, rel=1e-6)
+
+
+def test_a_shorter_moulded_length_presses_there_only():
+    case = thesis_case(COARSE | {"valve.sealing_pressure": PRESSURE, "valve.moulded_length": "80 mm"})
+    model = ValveModel(case)
+    share = moulded_share(model.mesh, case).reshape(model.mesh.shape[::-1])[:, 0]
+    length = np.diff(model.mesh.z)
+    assert share @ length == pytest.approx(0.08, rel=1e-12)
+    state = model.contact.state(model.rest())
+    z = model.mesh.nodes[model.contact.plane.nodes, 2]
+    assert np.median(state.pressure[z < 0.04]) == pytest.approx(PRESSURE, rel=0.03)
+    assert state.pressure[z > 0.1].max() < 0.3 * PRESSURE
+
+
+def test_an_overlap_of_zero_is_no_preset():
+    plain, zero = (ValveModel(thesis_case(COARSE | more)) for more in ({}, {"valve.overlap": 0.0}))
+    assert zero.contact is None and not zero.case.separation and zero.case.valve.initial_gap == 1e-4
+    found = [LoadPath(model).go_to(4e3) for model in (plain, zero)]
+    assert np.array_equal(found[0].q, found[1].q) and found[0].mass_flow == found[1].mass_flow
+
+
+def test_sealed_below_cracking_and_open_above_whatever_the_order(model, path):
+    pressures = (0.6 * PRESSURE, 3.0 * PRESSURE, 1.6 * PRESSURE)
+    rising = {p: path.go_to(p) for p in sorted(pressures)}
+    other = LoadPath(ValveModel(model.case), SteadyOptions.of(model.case))
+    for pressure in (pressures[1], pressures[0], pressures[2]):
+        found = other.go_to(pressure)
+        assert found.q == pytest.approx(rising[pressure].q, abs=1e-7)
+    sealed, most, part = (rising[p] for p in pressures)
+    assert sealed.is_sealed and sealed.outlet_velocity == sealed.outlet_area == sealed.volume_flow == 0.0
+    assert sealed.stops > 10 and sealed.hydraulics is None and sealed.lip_opening == 0.0
+    assert most.mass_flow > part.mass_flow > 0 and most.lip_opening > part.lip_opening
+    cracks = first_opening(model, 2.0)
+    assert PRESSURE < cracks < 2.0 * PRESSURE
+
+
+def test_pressure_falls_along_the_passage_and_nowhere_below_that_around_the_jet(model, path):
+    """A throat without area does not suck itself shut: what separates behind it recovers nothing."""
+    for pressure in (0.6 * PRESSURE, 1.2 * PRESSURE, 3.0 * PRESSURE):
+        found = path.go_to(pressure).station_pressure
+        assert np.all(np.diff(found) >= -1e-9 * pressure) and found[0] >= -1e-9 * pressure
+
+
+def test_limit_points_bound_the_pressures_with_several_equilibria(model, path):
+    path.go_to(3.0 * PRESSURE)
+    limits = path.curve.limits()
+    assert len(limits) >= 2 and all(high.pressure > low.pressure for high, low in zip(limits[::2], limits[1::2]))
+    high, low = limits[0], limits[1]
+    assert high.highest and not low.highest
+    assert len(path.curve.passages(0.5 * (high.pressure + low.pressure))) >= 3
+    assert len(path.curve.passages(0.5 * PRESSURE)) == 1
+
+
+def test_cracking_head_that_is_asked_for_is_found(model):
+    head = 0.09
+    case = model.case.replace({"valve.sealing_pressure": None, "valve.cracking_head": head})
+    sealing = sealing_for_cracking(case, 2.0)
+    other = ValveModel(model.case.replace({"valve.sealing_pressure": sealing}))
+    LoadPath(other, SteadyOptions.of(case)).go_to(1.3e3)
+    assert first_opening(other, 2.0) == pytest.approx(case.fluid.density * 9.80665 * head, rel=0.01)
+
+
+@pytest.mark.parametrize(
+    ("keys", "words"),
+    [
+        ({"valve.overlap": 1e-3, "valve.sealing_pressure": 1e3}, "valve.overlap is 0.001 beside sealing_pressure"),
+        ({"valve.overlap": 1e-3, "supports.contact": "stops"}, "supports.contact is 'stops' for a bill"),
+        ({"valve.overlap": 1e-3, "valve.lip_rise": "20 mm"}, "lips that leave a lens"),
+        ({"valve.moulded_length": "300 mm"}, "must be at most duckbill_length"),
+    ],
+)
+def test_presets_that_cannot_be_are_refused_in_a_sentence(keys, words):
+    with pytest.raises(CaseError, match=words):
+        thesis_case(keys)
