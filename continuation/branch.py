@@ -237,9 +237,9 @@ class Branch:
 
         Parameters
         ----------
-        observable : callable or int, optional
-            ``observable(u)``, or the index of an unknown; the largest absolute entry by default.
-            Curves in two parameters need none.
+        observable : callable, int or str, optional
+            ``observable(u)``, the index of an unknown, or a name that `values` takes; by default the largest absolute
+            entry, of orbits their period.  Curves in two parameters need none.
         ax : matplotlib axes, optional
 
         Returns
@@ -250,23 +250,8 @@ class Branch:
             import matplotlib.pyplot as plt
 
             ax = plt.subplots()[1]
-        two = len(self.names) == 2
-        if observable is None:
-
-            def observable(u):
-                return np.abs(u).max()
-        elif isinstance(observable, (int, np.integer)):
-            index = int(observable)
-
-            def observable(u):
-                return u[index]
-
-        def height(u, mu):
-            return mu[self.names[1]] if two else observable(u)
-
-        x = self.values()
-        y = np.array([height(u, self.mu(i)) for i, u in enumerate(self.states)])
-        unstable = self.unstable
+        label, values, height = self._observed(observable)
+        x, y, unstable = self.values(), values(), self.unstable
         if np.all(unstable < 0):
             ax.plot(x, y, "k-")
         else:
@@ -274,23 +259,50 @@ class Branch:
             for keep, style in ((unstable == 0, "k-"), (unstable > 0, "k--")):
                 # A segment belongs to a style when both of its ends do.
                 ax.plot(x, np.where(keep, y, np.nan), style)
+        kinds = list(dict.fromkeys(special.kind for special in self.special))
         for special in self.special:
-            if not np.isfinite(special.u).all():
-                continue
-            ax.plot(
-                special.mu[self.names[0]],
-                height(special.u, special.mu),
-                _MARKERS.get(special.kind, "x"),
-                label=special.kind,
-                fillstyle="full" if special.located else "none",
-            )
+            if np.isfinite(special.u).all():
+                ax.plot(
+                    special.mu[self.names[0]],
+                    height(special),
+                    f"C{kinds.index(special.kind)}{_MARKERS.get(special.kind, 'x')}",
+                    label=special.kind,
+                    fillstyle="full" if special.located else "none",
+                )
         handles, labels = ax.get_legend_handles_labels()
         unique = dict(zip(labels, handles))
         if unique:
             ax.legend(unique.values(), unique.keys())
         ax.set_xlabel(self.names[0])
-        ax.set_ylabel(self.names[1] if two else "state")
+        ax.set_ylabel(label)
         return ax
+
+    def _observed(self, observable):
+        """Label of what a figure shows, its values along the branch, and its value at a special point."""
+        if observable is None and len(self.names) == 2:
+            name = self.names[1]
+            return name, lambda: self.values(name), lambda special: special.mu[name]
+        if observable is None and self.kind == "orbits":
+            observable = "period"
+        if isinstance(observable, str):
+
+            def beside(special):
+                own = {**special.values, **special.mu}
+                return own[observable] if observable in own else self.values(observable)[special.index]
+
+            return observable, lambda: self.values(observable), beside
+        label = f"unknown {observable}"
+        if observable is None:
+            label, function = "largest |u|", lambda u: np.abs(u).max()
+        elif callable(observable):
+            label, function = getattr(observable, "__name__", "observable"), observable
+        else:
+            index = int(observable)
+
+            def function(u):
+                return u[index]
+
+        return label, lambda: np.array([function(u) for u in self.states]), lambda special: function(special.u)
 
 
 def _write(file, branch: Branch) -> None:

@@ -57,7 +57,10 @@ class Reason(Enum):
     DOUBTFUL = "a {kind} was seen and not located"
     LOST_AT_LIMIT = "the curve was lost at its limit"
     KNOWN_BRANCH = "the corrector fell back to the known branch"
-    HARMONICS = "{count} harmonics are too few: the last two hold {share:.2g} of the motion"
+    HARMONICS = (
+        "{count} harmonics are too few: the last two hold {share:.2g} of the motion "
+        "(max_harmonics allows more, tail a larger share)"
+    )
     REST = "the guess shrank to an equilibrium"
     NOT_NORMAL = "the first orbit is not where the normal form has it"
 

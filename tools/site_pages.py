@@ -40,10 +40,12 @@ def first_page(text: str) -> str:
 
 
 def notebook_page(path: Path) -> str:
-    """Cells of a notebook as a page, with a link to the file itself."""
-    cells = json.loads(path.read_text())["cells"]
-    texts = ["".join(cell["source"]) for cell in cells]
-    page = [text if cell["cell_type"] == "markdown" else f"```python\n{text}\n```" for cell, text in zip(cells, texts)]
+    """Cells of a notebook as a page, each with the text that it gave, and a link to the file itself."""
+    page = []
+    for cell in json.loads(path.read_text())["cells"]:
+        text = "".join(cell["source"])
+        page.append(text if cell["cell_type"] == "markdown" else f"```python\n{text}\n```")
+        page += [f"```text\n{''.join(output['text'])}```" for output in cell.get("outputs", [])]
     return "\n\n".join([*page, f"The notebook itself: [{path.name}]({path.name})."])
 
 

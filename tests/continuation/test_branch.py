@@ -291,7 +291,11 @@ def test_plot_draws_stability_and_special_points():
     labels = [text.get_text() for text in ax.get_legend().get_texts()]
     assert labels == ["fold"]
     drawn = [np.isfinite(line.get_ydata()).sum() for line in ax.lines if line.get_linestyle() == "--"]
-    assert drawn == [np.sum(branch.unstable > 0)]
+    assert drawn == [np.sum(branch.unstable > 0)] and ax.get_ylabel() == "unknown 0"
+    assert len({line.get_color() for line in ax.lines if line.get_marker() == "s"}) == 1
+    assert branch.plot().get_ylabel() == "largest |u|" and branch.plot("fold").get_ylabel() == "fold"
+    with pytest.raises(KeyError, match="no 'height'"):
+        branch.plot("height")
 
 
 def test_scales_make_a_branch_in_other_units_the_same():

@@ -138,7 +138,7 @@ def test_curves_are_saved_and_resumed(tmp_path, cusp_fold):
     assert len(longer) == len(whole)
     assert np.allclose(longer.values("a"), whole.values("a"), rtol=0, atol=1e-8)
     assert len(longer.of_kind("cusp")) == 1
-    assert longer.plot() is not None
+    assert longer.plot().get_ylabel() == "b"
 
 
 def test_wrong_starts_are_refused(cusp_fold, takens):

@@ -149,6 +149,7 @@ def test_steps_of_any_unit_pass_a_fold_of_cycles_once(scale):
     branch = orbits_from_hopf(system, hopf, "mu", ContinuationOptions(limits={"mu": (-1, 0.3)}, parameter_scales=given))
     assert branch.values()[-1] == 0.3
     assert [(s.kind, s.located) for s in branch.special] == [("fold of cycles", True)]
+    assert branch.plot().get_ylabel() == "period"
     radius = np.array([orbit_at(system, branch, i).amplitude()[0] for i in range(len(branch))])
     assert np.all(np.diff(radius) > 0)
     assert np.allclose(branch.values(), radius**4 - radius**2, rtol=0, atol=1e-8)
