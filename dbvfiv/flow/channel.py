@@ -255,6 +255,34 @@ class Channel(FlowLaw):
         speed = jnp.sqrt(2.0 * inlet / (parameters["density"] * jnp.where(ratio > 0, ratio, 1.0)))
         return pressure, jnp.where(ratio > 0, speed, jnp.inf)[None]
 
+    def shut_pressures(self, area: np.ndarray, given, seal: int) -> tuple[np.ndarray, np.ndarray]:
+        """Derivatives (m, m) of the pressures by rates and accelerations of the areas about still fluid that ends at a
+        shut station.
+
+        Nothing leaves there, so what the wall displaces between it and a station comes from the inlet; in the sections
+        from there to the outlet the faces lie on each other.
+        """
+        parameters, still = self.values(given), jnp.zeros(len(area))
+
+        def stream(rate):
+            _, opening = jax.jvp(lambda a: above_floor(a, self.floor), (area,), (rate,))
+            behind = jnp.where(jnp.arange(self.count) >= seal, self._blend(parameters) * opening, 0.0)
+            pieces = 0.5 * self.step * (behind[1:] + behind[:-1]) * (jnp.arange(self.count - 1) >= seal)
+            speed = -jnp.concatenate([jnp.zeros(1), jnp.cumsum(pieces)]) / above_floor(area, self.floor)
+            return self.stream(area, rate, -speed, -speed[-1:])
+
+        def heads(rate):
+            return self.term_heads(stream(rate), parameters, self.losses)
+
+        def psi(rate):
+            flow = stream(rate)
+            found = upstream_integral(self.step, flow.speed) + self.term_momenta(flow, parameters)
+            return found + wall_share(self.step, flow.speed) if self.bowed else found
+
+        open_ = np.arange(self.count) > seal
+        found = (-parameters["density"] * np.asarray(jax.jacfwd(f)(still)) * open_[:, None] for f in (heads, psi))
+        return tuple(found)
+
     def without_drives(self) -> Channel:
         """Copy of the channel with only those terms that act on steady flow."""
         return self.changed(terms=self.losses)

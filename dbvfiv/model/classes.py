@@ -51,8 +51,11 @@ class LinearisedClass(LinearisedState):
         if self.symmetry.sway_axis is None or not flow.has_fluid:
             return {}
         speeds = flow.steady_velocities(self.area, self.inlet, density)
-        passage = np.asarray(flow.open_area(self.area)), np.asarray(speeds)
+        passage = np.asarray(flow.open_area(self.area)), np.asarray(speeds) * float(self.seal is None)
         return plug_parts(self.model.mesh.z, *passage, density, flow.unsteady)
+
+    def shut_parts(self, density, storage, line) -> dict[str, np.ndarray]:
+        return self.no_flow() | self.fluid_parts(density)
 
     def steady_parts(self) -> dict[str, np.ndarray]:
         return self.fluid_parts(1.0)  # the centrifugal force, which depends on the pressure alone

@@ -19,7 +19,7 @@ from eigen.operator import FLUID_PARTS
 
 from ..case.parameters import PIPES
 from ..errors import SolveError
-from ..flow import FlowMotion
+from ..flow import Channel, FlowLaw, FlowMotion
 from .outside import AddedMass
 from .valve import ValveModel
 
@@ -68,6 +68,23 @@ class LinearisedState:
     def coupling(self) -> tuple:
         """G and J with what couples the fluid outside behind what couples the flow."""
         return (self.forces, self.slope) if self.added is None else self.added.coupling(self.forces, self.slope)
+
+    @property
+    def seal(self) -> int | None:
+        """Last of the stations, from the outlet on, that the faces of a bill that is moulded shut shut; None where it
+        is open.
+        """
+        return self.model.seal(self.area)
+
+    def shut_parts(self, density: float, storage: float | None, line: Mapping[str, float]) -> dict[str, np.ndarray]:
+        """A0 to S1 of the still fluid in front of a seal, whose front and pressures stay where they are."""
+        flow = self.model.flow
+        given = {"inlet": self.inlet, "density": density, **line} | ({} if storage is None else {"storage": storage})
+        parts = self.no_flow(flow.inner)
+        if flow.unsteady:
+            parts["A1"], parts["A2"] = still_channel(flow).shut_pressures(self.area, given, self.seal)
+        parts["S0"] = np.eye(flow.inner)
+        return parts
 
     def fluid_parts(self, density: float, storage: float | None = None, line: Mapping[str, float] = {}):
         """A0 to S1 of `eigen.CoupledPencil`: response of the unsteady fluid to `slope`; `line` as `Mu.pipes`."""
@@ -147,14 +164,23 @@ class LinearisedState:
 
     def flow_parts(self, density: float, storage: float | None = None, line: dict | None = None) -> dict:
         """A0 to S1 of the flow alone at a density; of a steady flow A0 is all."""
+        if self.seal is not None:
+            return self.shut_parts(density, storage, line or {})
         moving = self.model.flow.unsteady
         return self.no_flow() | (self.fluid_parts(density, storage, line or {}) if moving else self.steady_parts())
 
-    def no_flow(self) -> dict:
+    def no_flow(self, inner: int = 0) -> dict:
         """A0 to S1 of a flow that does nothing."""
         m = self.forces.shape[1]
-        shapes = {"A": (m, m), "B": (m, 0), "R": (0, m), "S": (0, 0)}
+        shapes = {"A": (m, m), "B": (m, inner), "R": (inner, m), "S": (inner, inner)}
         return {name: np.zeros(shapes[name[0]]) for name in FLUID_PARTS}
+
+
+def still_channel(flow: FlowLaw) -> Channel:
+    """The incompressible passage of a flow law, a pipe in front of it as a rigid column."""
+    while not isinstance(flow, Channel):
+        flow = getattr(flow, "rigid", None) or flow.channel
+    return flow
 
 
 def linearise(

@@ -34,6 +34,8 @@ from .outside import OutsideFluid
 from .relaxing import WallRelaxation
 from .supports import FaceContact, face_contact, lip_stops
 
+#: Section that counts as shut over what rough faces in contact leave.
+_SHUT = 1.5
 #: Faces that meet change the residual from one step to the next: its norm has to fall.
 _AT_REST = NewtonOptions(1e-10, 200, "l2")
 
@@ -214,6 +216,20 @@ class ValveModel:
         if self.contact is not None:
             self.contact.add_tangent(q, data)
 
+    def contact_reach(self, q: np.ndarray, shape: np.ndarray) -> float:
+        """Amplitude of a motion (nn, c), complex, up to which no face parts or meets, over that of the motion;
+        infinite without contact of faces. The motion is taken to first order.
+        """
+        if self.contact is None:
+            return np.inf
+        plane = self.contact.plane
+        nodal = self.nodal(q)
+        directors, first, _ = self.shell.directors(nodal)
+        columns = [plane.axis, 3, 4]
+        moved = np.abs(np.sum(plane.slope(first) * shape[plane.nodes][:, columns], axis=1))
+        room = np.abs(plane.gap(nodal, directors) - plane.law.rounding)
+        return float(np.min(room / np.maximum(moved, 1e-300), initial=np.inf))
+
     def touching(self, q: np.ndarray) -> int:
         """Number of stops, or of nodes with their inner face, in contact."""
         return self.stops.touching(q) if self.contact is None else self.contact.touching(q)
@@ -345,6 +361,12 @@ class ValveModel:
         """Share of the narrowest of sections (m,), m2, that is open: what faces in contact leave carries no flow."""
         narrowest = int(np.argmin(area))
         return float(np.clip(1.0 - np.broadcast_to(self._film, area.shape)[narrowest] / area[narrowest], 0.0, 1.0))
+
+    def seal(self, area: np.ndarray) -> int | None:
+        """Last station, from the outlet on, of sections (m,), m2, that faces in contact shut; None where none is."""
+        if self.shell.stress_free is None or self.open_share(area) > 0.0:
+            return None
+        return int(np.flatnonzero(area <= _SHUT * self._film.min())[-1])
 
     def mass_flow(self, area: np.ndarray, pressure: float, density: float | None = None) -> float:
         """Steady mass flow of the whole valve, kg/s; none where its faces shut a section."""

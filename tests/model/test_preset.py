@@ -2,19 +2,26 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 from scipy.integrate import cumulative_trapezoid
 
+from dbvfiv.case.parameters import Mu
 from dbvfiv.contact import ContactLaw, PlaneContact, tributary_area
-from dbvfiv.errors import CaseError
+from dbvfiv.errors import CaseError, SolveError
+from dbvfiv.flow import Channel
 from dbvfiv.model import ValveModel
 from dbvfiv.model.build import moulded_share
+from dbvfiv.model.classes import linearise_class
 from dbvfiv.model.equilibria import LoadPath, SteadyOptions, first_opening, sealing_for_cracking
 from dbvfiv.model.newton import EquilibriumSolver, NewtonOptions
 from dbvfiv.model.preset import stress_free_shape
 from dbvfiv.model.pressed_shell import PressedShell
-from dbvfiv.studies.case import thesis_case
+from dbvfiv.model.symmetry import SYMMETRIES
+from dbvfiv.studies.case import load_case, thesis_case
+from eigen import SearchOptions, leading_modes
 from tests.verification.test_shell_large_displacement import cantilever
 
 #: The 12-inch valve on a mesh that cracks in some seconds.
@@ -168,3 +175,89 @@ def test_cracking_head_that_is_asked_for_is_found(model):
 def test_presets_that_cannot_be_are_refused_in_a_sentence(keys, words):
     with pytest.raises(CaseError, match=words):
         thesis_case(keys)
+
+
+def test_still_fluid_behind_a_seal_is_the_mass_of_what_the_wall_displaces():
+    """Of a straight passage whose sections widen alike from the seal on: -rho/(2 a) [(l - s)^2 - (z - s)^2]."""
+    z, area, seal = np.linspace(0.0, 0.5, 11) ** 1.5, 2e-3, 3
+    channel = Channel(z, 1e-9, storage=1.0)
+    given = {"inlet": 1e3, "density": 900.0}
+    rate, acceleration = channel.shut_pressures(np.full(len(z), area), given, seal)
+    widening = np.where(np.arange(len(z)) >= seal, 1.0, 0.0)
+    wanted = -900.0 / (2 * area) * ((z[-1] - z[seal]) ** 2 - (z - z[seal]) ** 2)
+    assert (acceleration @ widening)[seal + 1 :] == pytest.approx(wanted[seal + 1 :], rel=1e-12, abs=1e-12)
+    assert not rate.any() and not acceleration[: seal + 1].any()
+    none = channel.shut_pressures(np.full(len(z), area), given | {"storage": 0.0}, seal)
+    assert not np.any(none)  # no fluid is displaced under the quasi-steady flow model
+
+
+@pytest.mark.parametrize("storage", [0.0, 1.0])
+@pytest.mark.parametrize("symmetry", SYMMETRIES)
+def test_a_sealed_bill_is_stable_in_every_class_and_flow_model(model, path, storage, symmetry):
+    state = path.go_to(0.6 * PRESSURE)
+    linear = linearise_class(model, state.q, state.pressure, SYMMETRIES[symmetry])
+    mu = Mu.of(model.case).at(storage=storage, pressure=state.pressure, alpha=0.0, beta=1e-3)
+    pencil = linear.pencil(mu)
+    found = leading_modes(pencil, 4, SearchOptions())
+    assert linear.seal is not None and np.all(found.eigenvalues.real < 0)
+
+
+def test_contact_holds_up_to_the_amplitude_at_which_the_first_face_parts_or_meets(model, path):
+    state = path.go_to(1.6 * PRESSURE)
+    shape = np.random.default_rng(1).normal(size=(len(model.mesh.nodes), 5)) * model.shell.dofs.free
+    reach = model.contact_reach(state.q, shape)
+
+    def changes(size: float) -> bool:
+        both = (model.contact.state(state.q + sign * size * model.shell.dofs.restrict(shape)) for sign in (1, -1))
+        return any(np.any(found.touching != model.contact.state(state.q).touching) for found in both)
+
+    assert not changes(0.97 * reach) and changes(1.03 * reach)
+
+
+CASES = Path(__file__).parents[2] / "cases"
+#: Five valves of the trade, and the cracking heads that it promises, psi.
+TRADE, CRACKING = ("dbv4-wide", "dbv6", "dbv12-moulded", "dbv18", "dbv36"), (0.1, 0.5)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", TRADE)
+def test_cases_of_the_trade_seal_at_rest_and_crack_in_its_range(name):
+    keys = {"mesh.around": 10, "mesh.along": 20, "valve.sealing_pressure": 1500.0, "materials.strain_level": "10 %"}
+    model = ValveModel(load_case(CASES / f"{name}.toml").replace(keys))
+    path = LoadPath(model, SteadyOptions.of(model.case))
+    rest = path.go_to(model.flow.back)
+    assert rest.is_sealed and rest.stops > 10
+    assert path.go_to(model.flow.back + 689.0).is_sealed
+    opened = path.go_to(model.flow.back + 3447.0)
+    cracks = (first_opening(model, 2.0) - model.flow.back) / 6894.76
+    assert CRACKING[0] < cracks < CRACKING[1] and opened.mass_flow > 0
+
+
+@pytest.mark.random
+@pytest.mark.parametrize("seed", range(6))
+def test_random_presets_open_without_a_jump_in_flow_that_no_limit_point_explains(seed):
+    """Random bills and heads: states that are found are sealed or open, the flow rises with the head, and a sealed
+    bill is stable; what is not found is said in a sentence.
+    """
+    random = np.random.default_rng(seed)
+    keys = {
+        "valve.sealing_pressure": float(10 ** random.uniform(2.0, 3.6)),
+        "valve.moulded_length": float(random.uniform(0.08, 0.21)),
+        "valve.thickness_factor": float(random.uniform(0.8, 1.3)),
+        "fluid.continuity": str(random.choice(["storage", "quasi-steady"])),
+    }
+    model = ValveModel(thesis_case(COARSE | keys))
+    path = LoadPath(model, SteadyOptions.of(model.case))
+    flows = []
+    for pressure in np.sort(10 ** random.uniform(2.0, 4.3, 6)):
+        try:
+            state = path.go_to(float(pressure))
+        except SolveError as error:
+            assert str(error).endswith(".")
+            break
+        flows.append(state.mass_flow)
+        if state.is_sealed:
+            linear = linearise_class(model, state.q, state.pressure, next(iter(SYMMETRIES.values())))
+            mu = Mu.of(model.case).at(pressure=state.pressure, beta=1e-3)
+            assert np.all(leading_modes(linear.pencil(mu), 3, SearchOptions()).eigenvalues.real < 0)
+    assert flows and np.all(np.diff(flows) >= 0)

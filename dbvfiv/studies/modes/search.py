@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -392,10 +392,30 @@ def run_modes(
     searched = family.is_searched(certified.spectrum.eigenvalues, place, search.band)
     verdict = _verdict(certified, searched, search.claimed)
     modes = _shapes(model, pencil, linear, certified.spectrum, symmetry, in_vacuo)
+    notes = (*notes, *_contact_notes(model, state, linear, modes, symmetry))
     result = FoundModes(modes, Certificate.of(certified), verdict, notes, certified.spectrum)
     if result.stable is None:
         observer.warn(result.verdict.reason)
     return result
+
+
+def _contact_notes(model, state: SteadyState, linear, modes: Sequence[ModeShape], symmetry: Symmetry) -> list[str]:
+    """What holds the modes of a bill that is moulded shut, and up to which amplitude."""
+    if not model.case.valve.is_preset:
+        return []
+    said = []
+    if linear.seal is not None:
+        said.append(
+            f"Sealed: the faces touch up to z = {1e3 * model.mesh.z[linear.seal]:.4g} mm and nothing flows; the modes "
+            "are those of the wall held there, with the still fluid behind the seal."
+        )
+    if symmetry.of_equilibria and modes and model.touching(state.q):
+        reach = model.contact_reach(state.q, modes[0].shape)
+        said.append(
+            f"The first mode is that of the {model.touching(state.q)} nodes whose faces touch; from {1e3 * reach:.2g} "
+            "mm of its largest displacement on faces part or meet."
+        )
+    return said
 
 
 def _verdict(found: CertifiedSpectrum, searched: np.ndarray, claimed: float) -> Verdict:
