@@ -34,6 +34,7 @@ _PUBLIC = {
     "SteadyResult": "studies.steady.study",
     "SweepResult": "studies.sweep.study",
     "TransientResult": "studies.transient.study",
+    "UncertaintyResult": "studies.uncertainty.study",
 }
 __all__ = sorted(_PUBLIC)
 

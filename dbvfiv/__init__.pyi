@@ -18,6 +18,7 @@ from .studies.state import State as State
 from .studies.steady.study import SteadyResult as SteadyResult
 from .studies.sweep.study import SweepResult as SweepResult
 from .studies.transient.study import TransientResult as TransientResult
+from .studies.uncertainty.study import UncertaintyResult as UncertaintyResult
 
 __version__: str
 __all__: list[str]

@@ -27,6 +27,7 @@ from .studies.state import State, sensitivity_keys
 from .studies.steady.study import SteadyResult
 from .studies.sweep.study import SweepResult
 from .studies.transient.study import TransientResult
+from .studies.uncertainty.study import UncertaintyResult
 
 #: A result file to write; none without it.
 Output = str | Path | None
@@ -352,6 +353,41 @@ class Valve:
             self.case.replace({"map.workers": workers})  # refuses what is no number of processes
         session = self._ask({"map.x": write_axis(x), "map.y": write_axis(y)}, changes)
         return session.perform("map", output, observer or bar(), workers=workers)
+
+    def uncertainty(
+        self,
+        over: Range | None = None,
+        *,
+        samples: int | None = None,
+        inputs: Mapping[str, str] | None = None,
+        workers: int | str | None = None,
+        output: Output = None,
+        observer: Observer | None = None,
+        **changes: Any,
+    ) -> UncertaintyResult:
+        """Probability of flutter where inputs are known to a spread only, and the input that decides it.
+
+        Parameters
+        ----------
+        over : str or mapping, optional
+            Range as for `onset`, at whose values the probability is asked; uncertainty.over of the case by default.
+        samples : int, optional
+            Of the inputs.
+        inputs : mapping, optional
+            Distributions by the names of parameters or keys of the case, {"loss_factor": "lognormal(1.3)"}.
+        workers : int or str, optional
+            As for `map`.
+        output, observer, changes
+            As for `onset`.
+
+        Raises
+        ------
+        CaseError, SolveError
+        """
+        asked = {"uncertainty.over": write_axis(over), "uncertainty.samples": samples, "uncertainty.inputs": inputs}
+        if workers is not None:
+            asked["uncertainty.workers"] = workers
+        return self._ask(asked, changes).perform("uncertainty", output, observer or bar())
 
     def transient(
         self,

@@ -11,10 +11,10 @@ from .record.files import kind_of
 from .studies.session import resume_result
 from .studies.workers import read_workers
 
-#: What a resumed study may be given anew, the study that takes it, and what it is called in a sentence.
+#: What a resumed study may be given anew, the studies that take it, and what it is called in a sentence.
 _OWN = {
-    "duration": ("transient", "A new duration belongs to transient runs"),
-    "workers": ("map", "Workers belong to maps"),
+    "duration": (("transient",), "A new duration belongs to transient runs"),
+    "workers": (("map", "uncertainty"), "Workers belong to maps and to samples of an uncertainty"),
 }
 
 
@@ -34,7 +34,7 @@ def resume(
     duration : number (s) or text with a unit, optional
         Of a transient run: a later end.
     workers : int or str, optional
-        Of a map: processes that share the columns, or the address of a Dask scheduler.
+        Of a map or an uncertainty: processes that share the work, or the address of a Dask scheduler.
     observer : Observer, optional
 
     Returns
@@ -54,8 +54,8 @@ def resume(
     kind = kind_of(path)
     given = {"duration": duration, "workers": workers}
     for name, value in given.items():
-        owner, words = _OWN[name]
-        if value is not None and kind != owner:
+        owners, words = _OWN[name]
+        if value is not None and kind not in owners:
             raise CaseError(f"{words}; {str(path)!r} is of kind {kind!r}.")
     changes = {} if duration is None else {"transient.duration": duration}
     return resume_result(path, observer, changes, **({} if workers is None else {"workers": read_workers(workers)}))

@@ -110,6 +110,7 @@ LossFactor = Annotated[
         "plain number or text",
         f"a number from 0 to {LARGEST_LOSS:g}, or one of {', '.join(SHIPPED_LOSSES)} for a value that comes with the "
         "program",
+        _PLAIN,
     ),
 ]
 Temperature = Annotated[
@@ -131,8 +132,13 @@ Series = Annotated[
 
 
 class Relaxing(Section):
-    """Viscoelasticity of a material beyond its long-term (equilibrium) law, given in one of several ways."""
+    """What any material has besides the constants of its long-term (equilibrium) law: a factor on them, and its
+    viscoelasticity, given in one of several ways.
+    """
 
+    stiffness_factor: Number = key(
+        1.0, "Factor on all moduli of the material: of a harder or softer batch, or by temperature.", gt=0, le=100
+    )
     loss_factor: LossFactor | None = key(
         None,
         "Loss factor (tan delta), the same over damping.band; the name of a material takes the value shipped for it.",

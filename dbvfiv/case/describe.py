@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 import difflib
+import math
 import re
 import types
 import typing
@@ -70,6 +71,12 @@ def _limits(metadata: list[Any]) -> dict[str, Any]:
     return {n: getattr(m, n) for m in metadata for n in names if getattr(m, n, None) is not None}
 
 
+def numeric_limits(field: FieldInfo) -> tuple[float, float]:
+    """Bounds of a number that a field holds, SI; infinite where it has none."""
+    limits = _limits(field.metadata) | _item_limits(field.annotation)
+    return limits.get("ge", limits.get("gt", -math.inf)), limits.get("le", limits.get("lt", math.inf))
+
+
 def _item_limits(annotation: Any) -> dict[str, Any]:
     meta = [m for a in typing.get_args(annotation) for m in getattr(a, "__metadata__", ())]
     flat = [n for m in meta for n in (m.metadata if isinstance(m, FieldInfo) else [m])]
@@ -91,6 +98,9 @@ def show_value(value: Any, quantity: Quantity | None) -> str:
         given = {n: f for n, f in fields.items() if getattr(value, n) is not None}
         pairs = (f"{n} = {show_value(getattr(value, n), quantity_of(f))}" for n, f in given.items())
         return "{ " + ", ".join(pairs) + " }"
+    if isinstance(value, dict):
+        pairs = ", ".join(f'"{name}" = {show_value(v, quantity)}' for name, v in value.items())
+        return f"{{ {pairs} }}" if pairs else "{}"
     text = str(value).replace("\\", "\\\\").replace('"', '\\"')
     return f'"{text}"'
 

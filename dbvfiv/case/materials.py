@@ -369,11 +369,13 @@ class Materials(Section):
         """
         if not self.is_built_in(name) and name in self.named:
             return self.named[name]
+        factor = self.named[name].stiffness_factor if name in self.named else 1.0
         if name in RUBBERS:
             level = LOWEST_LEVEL if self.strain_level == AUTO else self.strain_level
-            return ShippedRubber(kind="shipped", rubber=name, strain_level=level, constants=self.constants)
+            own = {"strain_level": level, "constants": self.constants, "stiffness_factor": factor}
+            return ShippedRubber(kind="shipped", rubber=name, **own)
         if name == "fibre":
-            return HalpinTsai()
+            return HalpinTsai(stiffness_factor=factor)
         raise KeyError(name)
 
 

@@ -16,6 +16,9 @@ def case(
         str | None, typer.Argument(metavar="[FILE|KEY]", help="Case file; with --explain a key or a section.")
     ] = None,
     every: Annotated[bool, typer.Option("--all", help="Print every key of the case.")] = False,
+    uncertain: Annotated[
+        bool, typer.Option("--uncertain", help="Print what `dbvfiv uncertainty` takes for uncertain, and why.")
+    ] = False,
     explain: Annotated[bool, typer.Option("--explain", help="Explain KEY, or every key.")] = False,
     new: Annotated[bool, typer.Option("--new", help="Write a commented starter to FILE.")] = False,
     key_points: Annotated[
@@ -46,20 +49,33 @@ def case(
     from ..case.write import case_toml
     from ..studies.case import load_case
 
-    if explain + new + (key_points is not None) > 1:
-        raise CaseError("Only one of --explain, --new and --key-points can be given at a time.")
+    if explain + new + uncertain + (key_points is not None) > 1:
+        raise CaseError("Only one of --explain, --new, --uncertain and --key-points can be given at a time.")
     if explain:
         _explain_keys(target, as_json)
     elif new:
         _write_new(target, overrides, as_json)
     elif key_points is not None:
         _write_key_points(load_case(target, overrides or ()).valve, key_points, points, profiles, as_json)
+    elif uncertain:
+        _print_inputs(load_case(target, overrides or ()), as_json)
     elif as_json:
         print_json(load_case(target, overrides or ()).to_dict())
     elif every:
         print(case_toml(load_case(target, overrides or ()), comments=False), end="")
     else:
         _check(load_case(target, overrides or ()), target or "The 12-inch valve")
+
+
+def _print_inputs(case, as_json: bool) -> None:
+    """Print the uncertain inputs of a case with their sources."""
+    from ..studies.uncertainty.inputs import inputs_of
+
+    inputs = inputs_of(case)
+    if as_json:
+        print_json({"inputs": [one.summary() for one in inputs]})
+    else:
+        print("\n".join(one.words() for one in inputs))
 
 
 def _check(case, name: str) -> None:

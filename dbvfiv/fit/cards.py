@@ -81,7 +81,7 @@ def law_from_card(card: Any) -> Law:
     Parameters
     ----------
     card : dbvfiv.case.Card
-        Any object with ``kind`` and the constants of that kind.
+        Any object with ``kind``, the constants of that kind and ``stiffness_factor``.
 
     Raises
     ------
@@ -90,7 +90,7 @@ def law_from_card(card: Any) -> Law:
     """
     if card.kind not in _LAWS:
         raise MaterialError(f"A material's kind must be one of {', '.join(CARD_KINDS)}, but {card.kind!r} was given.")
-    return _LAWS[card.kind](card)
+    return _LAWS[card.kind](card).scaled(card.stiffness_factor)
 
 
 def law_from_case(case: Case, name: str) -> Law:
@@ -107,7 +107,7 @@ def law_from_case(case: Case, name: str) -> Law:
     _require_name(case, name)
     materials = case.materials
     if name == "fibre" and materials.is_built_in(name):
-        return fibre_ply(materials.fibre_constants)
+        return fibre_ply(materials.fibre_constants).scaled(materials.card(name).stiffness_factor)
     try:
         return law_from_card(materials.card(name))
     except CaseError as error:

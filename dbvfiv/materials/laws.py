@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from numbers import Real
 from typing import ClassVar
 
@@ -56,6 +56,8 @@ class Law:
 
     kind: ClassVar[int]
     title: ClassVar[str]
+    #: Names of the constants that are moduli.
+    moduli: ClassVar[tuple[str, ...]]
     density: float
     parameters: np.ndarray
     small_strain_shear_modulus: float
@@ -63,6 +65,12 @@ class Law:
     def energy(self, e):
         """Strain energy per reference volume, J/m3, of ``e = [E11, E22, 2 E12, 2 E13, 2 E23]``."""
         return ENERGIES[self.kind](self.parameters, e)
+
+    def scaled(self, factor: float) -> Law:
+        """The law with all moduli, and so its energy, times a factor."""
+        values = {name: getattr(self, name) for name in self.moduli}
+        times = {n: tuple(factor * v for v in x) if isinstance(x, tuple) else factor * x for n, x in values.items()}
+        return replace(self, **times)
 
     def _require(self, positive: tuple[str, ...], finite: tuple[str, ...] = ()) -> None:
         require_finite(self.title, **{name: getattr(self, name) for name in finite})
@@ -106,6 +114,7 @@ class MooneyRivlin(Rubber):
     """
 
     title = "Mooney-Rivlin rubber"
+    moduli = ("c10", "c01", "c11")
 
     c10: float
     c01: float
@@ -145,6 +154,7 @@ class Yeoh(Rubber):
     """
 
     title = "Yeoh rubber"
+    moduli = ("c10", "c20", "c30")
 
     c10: float
     c20: float
@@ -195,6 +205,7 @@ class SofteningRubber(Rubber):
     """
 
     title = "Softening rubber"
+    moduli = ("mu_inf", "mu_0", "c", "c_3")
 
     mu_inf: float
     mu_0: float
@@ -204,9 +215,8 @@ class SofteningRubber(Rubber):
     c_3: float = 0.0
 
     def __post_init__(self) -> None:
-        moduli = ("mu_inf", "mu_0", "c", "c_3")
-        self._require(("x_0", "density"), moduli)
-        for key in moduli:
+        self._require(("x_0", "density"), self.moduli)
+        for key in self.moduli:
             if getattr(self, key) < 0.0:
                 raise MaterialError(
                     f"{self.title}: {key} must not be negative, but {getattr(self, key):g} Pa was given."
@@ -238,6 +248,7 @@ class Ogden(Rubber):
     """
 
     title = "Ogden rubber"
+    moduli = ("mu",)
 
     mu: tuple[float, ...]
     alpha: tuple[float, ...]
@@ -282,6 +293,7 @@ class IsotropicElastic(Law):
 
     kind = LINEAR_ELASTIC
     title = "Isotropic material"
+    moduli = ("youngs_modulus",)
 
     youngs_modulus: float
     poisson_ratio: float
@@ -327,6 +339,7 @@ class OrthotropicPly(Law):
 
     kind = LINEAR_ELASTIC
     title = "Orthotropic ply"
+    moduli = ("e1", "e2", "g12", "g13", "g23")
 
     e1: float
     e2: float

@@ -15,6 +15,7 @@ KINDS = (
     "sensitivity",
     "onset",
     "map",
+    "uncertainty",
     "transient",
     "cycle",
     "closure",

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import multiprocessing
 import os
+import pickle
 import signal
 import threading
 from collections.abc import Callable, Hashable, Iterable, Iterator
@@ -98,7 +99,7 @@ class Workers:
 
     def __init__(self, count: int | str, start: Callable[..., Any], data: tuple, warn: Callable[[str], None]):
         self.count, self.warn = count, warn
-        self._context = start, data
+        self._context = pickle.dumps((start, data))
         self._pool: Executor | None = None
         self._cluster: Any = None
 
@@ -171,7 +172,7 @@ class Workers:
                     yield task, work
                     continue
                 try:
-                    running[self._pool.submit(_do, *self._context, work)] = task
+                    running[self._pool.submit(_do, self._context, work)] = task
                 except BrokenExecutor:
                     queue.insert(0, task)
                     break
@@ -271,12 +272,14 @@ def _end_with_parent() -> None:
 
 #: One task at a time in a process, whatever threads a cluster has there; what they share is made once.
 _one = threading.Lock()
-_known: tuple[Any, Any] | None = None
+_known: tuple[bytes, Any] | None = None
 
 
-def _do(start: Callable[..., Any], data: tuple, work: Work) -> Any:
+def _do(context: bytes, work: Work) -> Any:
+    """Do a task in a worker, with the context that is made of its pickled start and data."""
     global _known
     with _one:
-        if _known is None or _known[0] != (start, data):
-            _known = (start, data), start(*data)
+        if _known is None or _known[0] != context:
+            start, data = pickle.loads(context)
+            _known = context, start(*data)
         return work.function(_known[1], *work.arguments)

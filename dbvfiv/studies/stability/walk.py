@@ -211,6 +211,8 @@ class StabilityWalk:
         Of the case, where it is at hand.
     symmetry : Symmetry, optional
         Class of the motions; that of the equilibria by default.
+    solver : ColumnSolver, optional
+        Of another walk on the same mesh, whose symbolic factorisations it keeps.
     """
 
     def __init__(
@@ -219,8 +221,9 @@ class StabilityWalk:
         observer: Observer | None = None,
         model: ValveModel | None = None,
         symmetry: Symmetry | None = None,
+        solver: ColumnSolver | None = None,
     ):
-        self.case, self.symmetry = case, symmetry or equilibria_of(case.part)
+        self.case, self.symmetry, self._solver = case, symmetry or equilibria_of(case.part), solver
         self._recalled: list[Mu] = []
         self._validity: dict[tuple, str] = {}
         self._workspace = Workspace()  # for structural frequencies
@@ -236,7 +239,7 @@ class StabilityWalk:
 
     def _new(self, model: ValveModel) -> _Built:
         path = LoadPath(model, SteadyOptions.of(self.case))
-        return _Built(model, path, ColumnSolver(), {})
+        return _Built(model, path, self._solver or ColumnSolver(), {})
 
     def _key(self, place: Mu) -> tuple:
         """Key of the model of a parameter point: the design, and those conditions that move the steady state."""
@@ -281,6 +284,26 @@ class StabilityWalk:
         if isinstance(state, SteadyState):
             built.described[place.pressure], state = state, state.q
         built.known[place.pressure] = state
+
+    def settle(self, place: Mu, q: np.ndarray | None) -> None:
+        """Find the steady state of a place from displacements q (n,) next to it; by load steps where these are not
+        known or Newton's method does not lead from them.
+
+        Raises
+        ------
+        SolveError
+        """
+        built, path = self.built(place), self.built(place).path
+        before = path.pressure, path.q, path.slope
+        if q is not None and place.pressure not in built.known:
+            path.pressure, path.q, path.slope = place.pressure, q, None
+            try:
+                path.settle()
+                self.give(place, path.go_to(place.pressure))
+                return
+            except SolveError:
+                path.pressure, path.q, path.slope = before
+        self.equilibrium(place)
 
     def state(self, place: Mu) -> SteadyState:
         """Steady state of a place with what is read off it.

@@ -1,0 +1,1 @@
+"""Probability of flutter, and what decides it: uncertain inputs, sampling, verdicts on the samples."""

@@ -1,0 +1,121 @@
+"""Figures of an uncertainty: probability over a range, spread of the margin, and what decides."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from ...case.parameters import PARAMETERS
+from ...drawing.style import ACCENT, COMPUTED, REST, headline, new_figure, parameter_label
+from ..result import StudyResult
+from ..stability.place import describe_fixed
+from ..stability.verdict import FLUTTERS, NOT_VALID, OUTCOMES, STABLE
+
+_LOOKS = {STABLE: COMPUTED, FLUTTERS: ACCENT}
+
+
+def draw(result: StudyResult) -> Iterator[tuple[str, Callable[[], Figure]]]:
+    """Figures of an uncertainty, each with its name."""
+    if not result.points:
+        return
+    if len(result.points) > 1:
+        yield "probability", lambda: probability(result)
+    yield "margin", lambda: margin(result)
+    if (result.deciding or {}).get("decides") and result.deciding["decides"][0]["share"] is not None:
+        yield "what-decides", lambda: what_decides(result)
+
+
+def _axis(axes, result: StudyResult) -> np.ndarray:
+    """Label the range, and its values in the units shown."""
+    axis = result.case.uncertainty.axis
+    axes.set_xlabel(parameter_label(result.case, result.parameter))
+    if axis is not None and axis.log:
+        axes.set_xscale("log")
+    return np.array([point["value"] for point in result.points]) / PARAMETERS[result.parameter].scale
+
+
+def _under(figure: Figure, result: StudyResult) -> None:
+    names = [one.name for one in result.plan.inputs]
+    words = f"{describe_fixed(result.case, result.parameter, *names)} · {result.points[0]['samples']} samples"
+    figure.supxlabel(words, x=0.01, ha="left", fontsize=8.5, color="0.35")
+
+
+def probability(result: StudyResult) -> Figure:
+    """Probability of flutter, and of states that are not valid, over the range, with their intervals."""
+    figure = new_figure()
+    axes = figure.add_subplot()
+    x = _axis(axes, result)
+    for name, colour in ((FLUTTERS, ACCENT), (NOT_VALID, REST)):
+        found = [point["outcomes"][name] for point in result.points]
+        value = np.array([np.nan if one["probability"] is None else one["probability"] for one in found])
+        if name != FLUTTERS and not value.any():
+            continue
+        low, high = np.array([one["interval"] for one in found]).T
+        axes.fill_between(x, 100 * low, 100 * high, color=colour, alpha=0.25, lw=0, label=f"{name}, 95 % interval")
+        axes.plot(x, 100 * value, "o-", color=colour, label=name)
+    axes.set(ylabel="Probability, %", ylim=(-2, 102))
+    axes.legend()
+    headline(figure, f"Probability of flutter of {result.header.name}")
+    _under(figure, result)
+    return figure
+
+
+def margin(result: StudyResult) -> Figure:
+    """Least damping ratio: percentiles over the range, or its distribution at the one state."""
+    figure = new_figure()
+    axes = figure.add_subplot()
+    if len(result.points) > 1:
+        x = _axis(axes, result)
+        low, middle, high = np.array(
+            [[np.nan if v is None else 100 * v for v in p["percentiles"]["damping_ratio"]] for p in result.points]
+        ).T
+        axes.fill_between(x, low, high, color=COMPUTED, alpha=0.25, lw=0, label="95 % of the valves")
+        axes.plot(x, middle, "o-", color=COMPUTED, label="median")
+        axes.set_ylabel("Least damping ratio, %")
+        axes.axhline(0.0, color="black", lw=0.8)
+    else:
+        found = result.at(result.points[0]["value"])
+        plain = (found["stage"] == 0) & np.isfinite(found["damping_ratio"])
+        ratio, outcome = 100 * found["damping_ratio"][plain], found["outcome"][plain]
+        edges = np.histogram_bin_edges(ratio, bins="auto")
+        for name in (STABLE, FLUTTERS):
+            here = ratio[outcome == OUTCOMES.index(name)]
+            if here.size:
+                axes.hist(here, edges, color=_LOOKS[name], label=f"{name}, {here.size} samples")
+        axes.set(xlabel="Least damping ratio, %", ylabel="Samples")
+        axes.axvline(0.0, color="black", lw=0.8)
+    axes.legend()
+    headline(figure, f"Margin of {result.header.name}")
+    _under(figure, result)
+    return figure
+
+
+def what_decides(result: StudyResult) -> Figure:
+    """Shares of the inputs in the variance of the margin, and the margin over the first of them."""
+    point = result.deciding
+    rows = [row for row in point["decides"] if row["share"] is not None][::-1]
+    titles = {one.name: one.title for one in result.plan.inputs}
+    figure = new_figure(9.6, 4.2)
+    left, right = figure.subplots(1, 2)
+    left.barh([titles[row["parameter"]] for row in rows], [100 * row["share"] for row in rows], color=COMPUTED)
+    left.set(xlabel="Share of the variance of the least damping ratio, %", xlim=(0, 100))
+    first = rows[-1]["parameter"]
+    number = [one.name for one in result.plan.inputs].index(first)
+    found = result.at(point["value"])
+    plain = found["stage"] == 0
+    row = PARAMETERS.get(first)
+    scale, unit = (row.scale, row.shown_unit) if row else (1.0, result.plan.inputs[number].quantity.si)
+    for name, colour in _LOOKS.items():
+        here = plain & (found["outcome"] == OUTCOMES.index(name))
+        if here.any():
+            at = found["inputs"][here, number] / scale
+            right.plot(at, 100 * found["damping_ratio"][here], ".", color=colour, label=name)
+    right.axhline(0.0, color="black", lw=0.8)
+    right.set(xlabel=f"{titles[first]}, {unit}".rstrip(", "), ylabel="Least damping ratio, %")
+    right.legend()
+    shown = PARAMETERS[result.parameter]
+    headline(figure, f"What decides at {point['value'] / shown.scale:.4g} {shown.shown_unit}".rstrip())
+    _under(figure, result)
+    return figure

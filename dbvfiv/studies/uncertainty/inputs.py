@@ -1,0 +1,262 @@
+"""Uncertain inputs of a case: those that it names, or the shipped ones of what it is made of."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from pydantic.fields import FieldInfo
+
+from ...case.damping import LARGEST_LOSS
+from ...case.describe import numeric_limits, quantity_of
+from ...case.distribution import ALLOWED, FORMS, Distribution
+from ...case.materials import BUILT_IN, BuiltIn, Materials
+from ...case.parameters import PARAMETERS, Mu
+from ...case.quantity import Quantity
+from ...case.section import Section
+from ...errors import CaseError
+from ...materials.shipped import shipped_loss, shipped_loss_names
+from ..case import Case
+from ..stability.place import is_surrounding, require_parameter
+
+#: Hardness of a compound lies within 5 Shore A of what was ordered (trade practice with ISO 48-4), a fifth of its shear
+#: modulus (Gent, Rubber Chem. Technol. 31, 1958, 896); read as 95 %.
+HARDNESS = 1.2 ** (1 / 1.96)
+#: ISO 3302-1:2014, class M3, dimensions across the mould's closure: up to, mm, and tolerance, mm; beyond, a share.
+CLOSURE = ((4.0, 0.40), (6.3, 0.40), (10.0, 0.50), (16.0, 0.60), (25.0, 0.80), (40.0, 1.0), (63.0, 1.3), (100.0, 1.6))
+CLOSURE_BEYOND = 0.013
+
+
+@dataclass(frozen=True)
+class Input:
+    """One uncertain number.
+
+    Attributes
+    ----------
+    name : str
+        Of a parameter of the table, or a key of the case.
+    distribution : Distribution
+        SI; angles in degrees.
+    quantity : Quantity
+    source : str
+        Why it is as uncertain as that.
+    surrounding : bool
+        Whether steady states and structure stay as they are.
+    """
+
+    name: str
+    distribution: Distribution
+    quantity: Quantity
+    source: str
+    surrounding: bool
+
+    @property
+    def title(self) -> str:
+        """Name for figures and tables."""
+        if self.name in PARAMETERS:
+            return PARAMETERS[self.name].title
+        material = self.name.split(".")
+        if material[0] == "materials" and len(material) == 3:
+            return f"{material[1]}: {material[2].replace('_', ' ')}"
+        return self.name
+
+    def summary(self) -> dict[str, str]:
+        """Texts for JSON."""
+        words = self.distribution.words(self.quantity)
+        return {"parameter": self.name, "distribution": words, "source": self.source}
+
+    def words(self) -> str:
+        """The input as a sentence."""
+        return f"{self.name} = {self.distribution.words(self.quantity)}: {self.source}"
+
+
+def inputs_of(case: Case) -> list[Input]:
+    """Uncertain inputs of a case.
+
+    Raises
+    ------
+    CaseError
+        For a name that is no number of the case, a distribution that cannot be read, or one of which more than
+        `ALLOWED` lies where the number cannot be.
+    """
+    asked = case.uncertainty
+    axis = asked.axis
+    if asked.inputs:
+        found = [_input(case, name, text, "given") for name, text in asked.inputs.items()]
+    else:
+        found = [_input(case, name, text, source) for name, text, source in _shipped(case)]
+    moved = [one for one in found if axis is not None and one.name == axis.parameter]
+    if moved and asked.inputs:
+        raise CaseError(
+            f"uncertainty.inputs holds {moved[0].name!r}, which uncertainty.over moves; one of them has to go.",
+            key="uncertainty.inputs",
+        )
+    found = [one for one in found if one not in moved]
+    if not found:
+        raise CaseError(
+            "Nothing of this case is known to be uncertain; give uncertainty.inputs, such as "
+            '{ loss_factor = "lognormal(1.3)" }.',
+            key="uncertainty.inputs",
+        )
+    return found
+
+
+def correlation_of(case: Case, inputs: Sequence[Input]) -> np.ndarray:
+    """Lower triangle (d, d) that turns independent standard normal scores into those of the inputs.
+
+    Raises
+    ------
+    CaseError
+        For a name that is no input, or correlations that no numbers can have.
+    """
+    names = [one.name for one in inputs]
+    matrix = np.eye(len(names))
+    for first, second, value in case.uncertainty.correlation:
+        unknown = next((name for name in (first, second) if name not in names), None)
+        if unknown or first == second:
+            raise CaseError(
+                f"uncertainty.correlation names {unknown or first!r}"
+                + (", which is no input" if unknown else " twice")
+                + f"; the inputs are {', '.join(names)}.",
+                key="uncertainty.correlation",
+            )
+        i, j = names.index(first), names.index(second)
+        matrix[i, j] = matrix[j, i] = value
+    try:
+        return np.linalg.cholesky(matrix)
+    except np.linalg.LinAlgError:
+        raise CaseError(
+            "uncertainty.correlation is given such that no numbers can be correlated so: the matrix of the "
+            f"correlations has the eigenvalue {np.linalg.eigvalsh(matrix)[0]:.3g}, and all must be greater than 0.",
+            key="uncertainty.correlation",
+        ) from None
+
+
+def _input(case: Case, name: str, text: str, source: str) -> Input:
+    key = f"uncertainty.inputs.{name}"
+    if name in PARAMETERS:
+        row = PARAMETERS[name]
+        try:
+            require_parameter(case, name)
+        except CaseError as error:
+            raise CaseError(f"{key} is given, but {str(error)[0].lower()}{str(error)[1:]}", key=key) from None
+        quantity, own, limits = row.quantity, _own(case, name), (row.low, row.high)
+    else:
+        field, value = _located(case, name, key)
+        quantity = quantity_of(field)
+        own = value if isinstance(value, (int, float)) and not isinstance(value, bool) else None
+        own = _shipped_value(case, name) if own is None else own
+        limits = (0.0, LARGEST_LOSS) if name.endswith(".loss_factor") else numeric_limits(field)
+    try:
+        distribution = Distribution.parse(text, quantity, own)
+    except ValueError as error:
+        raise CaseError(f"{key} is given as {text!r}, {error}; {FORMS}.", key=key) from None
+    outside = distribution.share_outside(*limits)
+    if outside > ALLOWED:
+        raise CaseError(
+            f"{key} is given as {text!r}, of which {outside:.2g} lies where {name} cannot be: it must be within "
+            f"{limits[0]:g} to {limits[1]:g} {quantity.si}".rstrip()
+            + "; choose a narrower one, or a lognormal one.",
+            key=key,
+        )
+    return Input(name, distribution, quantity, source, name in PARAMETERS and is_surrounding(case, name))
+
+
+def _own(case: Case, name: str) -> float | None:
+    """Value of a parameter of the table in the case, SI, angles in degrees."""
+    if name == "thickness":
+        return 1.0
+    if name == "angle":
+        sizes = {abs(layer.angle) for layer in case.layers if layer.angle}
+        return sizes.pop() if len(sizes) == 1 else None
+    if name == "strain":
+        levels = set(case.materials.levels({layer.material for layer in case.layers}).values())
+        return levels.pop() if len(levels) == 1 else None
+    return Mu.of(case)[name]
+
+
+def _located(case: Case, name: str, key: str) -> tuple[FieldInfo, Any]:
+    """Field and value of a key of the case that holds a number.
+
+    Raises
+    ------
+    CaseError
+    """
+    target: Any = case
+    field = None
+    for part in name.split("."):
+        if isinstance(target, Materials) and part not in type(target).model_fields and part in target.names:
+            target, field = target.named.get(part) or _card(target, part), None
+        elif isinstance(target, tuple) and part.isdigit() and int(part) < len(target):
+            target, field = target[int(part)], None
+        elif isinstance(target, Section) and part in type(target).model_fields:
+            field, target = type(target).model_fields[part], getattr(target, part)
+        else:
+            field = None
+            break
+    if field is None or quantity_of(field) is None:
+        raise CaseError(
+            f"{key} is given, and {name!r} is neither a parameter ({', '.join(PARAMETERS)}) nor a key of the case that "
+            "holds a number, such as materials.CR.stiffness_factor or valve.initial_gap.",
+            key=key,
+        )
+    return field, target
+
+
+def _card(materials: Materials, name: str) -> Section:
+    return materials.card(name) if name in BUILT_IN else BuiltIn()
+
+
+def _shipped_value(case: Case, name: str) -> float | None:
+    """Loss factor that a material has where the case names none."""
+    parts = name.split(".")
+    if parts[0] != "materials" or parts[-1] != "loss_factor":
+        return None
+    data = case.materials.loss(parts[1])
+    known = data.loss_factor if data is not None else None
+    return shipped_loss(known).value if isinstance(known, str) else known
+
+
+def _shipped(case: Case) -> Iterator[tuple[str, str, str]]:
+    """Names, distributions and sources of what is uncertain in any case."""
+    used = list(dict.fromkeys(layer.material for layer in case.layers))
+    for name in used:
+        kind = "fibre" if name == "fibre" else case.materials.card(name).kind
+        if kind in ("fibre", "halpin-tsai", "orthotropic", "isotropic"):
+            source = "an estimate: share of fibres and bond between them"
+            yield f"materials.{name}.stiffness_factor", "lognormal(1.1)", source
+        else:
+            source = "hardness within 5 Shore A of what was ordered, a fifth of the shear modulus (Gent 1958)"
+            yield f"materials.{name}.stiffness_factor", f"lognormal({HARDNESS:.4g})", source
+    yield from _losses(case, used)
+    wall = 1e3 * case.valve.thickness_at(0.0)
+    tolerance = next((t for upto, t in CLOSURE if wall <= upto), CLOSURE_BEYOND * wall)
+    spread = tolerance / wall / 1.96
+    source = f"ISO 3302-1, class M3: +-{tolerance:.2g} mm across the closure of the mould on {wall:.3g} mm"
+    yield "thickness", f"normal(1, {spread:.3g})", source
+    if len({abs(layer.angle) for layer in case.layers if layer.angle}) == 1:
+        yield "angle", f"normal({_own(case, 'angle'):g}, 2)", "an estimate: plies laid by hand"
+    if case.has_line and not case.upstream.pieces and case.upstream.length:
+        yield "pipe_length", "normal(2 %)", "an estimate: drawings against the pipe as laid"
+    if case.has_waves and not case.upstream.pieces:
+        yield "wave_speed", "lognormal(1.1)", "an estimate: air in the water and stiffness of the pipe"
+
+
+def _losses(case: Case, used: Sequence[str]) -> Iterator[tuple[str, str, str]]:
+    if not case.damping.relaxes:
+        for name in ("alpha", "beta"):
+            if getattr(case.damping, name):
+                yield name, "lognormal(1.3)", "an estimate: damping that no test of the valve has settled"
+        return
+    for name in used:
+        data = case.materials.loss(name)
+        if data is None or data.loss_factor is None:
+            continue
+        key = f"materials.{name}.loss_factor"
+        if data.loss_factor in shipped_loss_names():
+            low, high = shipped_loss(data.loss_factor).range
+            yield key, f"uniform({low:g}, {high:g})", "the range of published compounds"
+        elif data.loss_factor:
+            yield key, "lognormal(1.1)", "a measured loss factor; an estimate"

@@ -1,0 +1,206 @@
+"""Samples of independent standard normal scores, probabilities with their intervals, and shares of variance."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+#: Confidence of intervals.
+CONFIDENCE = 0.95
+#: Coefficient of variation of the weights that a step towards a rare event is chosen by (Papaioannou, Geyer and Straub,
+#: Struct. Saf. 76, 2019, 10-20).
+SPREAD = 1.5
+#: Steps towards a rare event at most: each shifts samples by one to two standard deviations.
+STEPS = 12
+#: Share of samples that keep the density of the inputs, so that no weight exceeds its inverse.
+DEFENSIVE = 0.1
+#: Regions of a rare event that are told apart.
+REGIONS = 2
+
+
+def quasi_random(count: int, dimension: int, seed: int) -> np.ndarray:
+    """Scores (count, dimension) of a scrambled Sobol sequence; the first are those of a shorter one."""
+    from scipy.special import ndtri
+    from scipy.stats import qmc
+
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", UserWarning)  # counts that are no power of two are balanced a little less
+        return ndtri(np.clip(qmc.Sobol(dimension, seed=seed).random(count), 1e-12, 1 - 1e-12))
+
+
+@dataclass(frozen=True)
+class Probability:
+    """Probability of an outcome with its interval.
+
+    Attributes
+    ----------
+    value : float
+        Among the decided samples.
+    low, high : float
+        Interval of `CONFIDENCE`; undecided samples count as not being of the outcome for the lower end, as being of it
+        for the upper one.
+    """
+
+    value: float
+    low: float
+    high: float
+
+
+def counted(hits: int, undecided: int, count: int) -> Probability:
+    """Probability of an outcome that some of `count` samples have, by Clopper and Pearson (Biometrika 26, 1934,
+    404-413), which holds for independent samples and is too wide for quasi-random ones.
+    """
+    from scipy.stats import beta
+
+    tail, most = 0.5 * (1 - CONFIDENCE), hits + undecided
+    low = float(beta.ppf(tail, hits, count - hits + 1)) if hits else 0.0
+    high = float(beta.ppf(1 - tail, most + 1, count - most)) if most < count else 1.0
+    decided = count - undecided
+    return Probability(hits / decided if decided else float("nan"), low, high)
+
+
+def weighted(weights: np.ndarray, hits: np.ndarray, undecided: np.ndarray) -> Probability:
+    """Probability of an outcome from samples of another density, with the weights that make up for it: the mean of the
+    weights of hits, by Student's distribution.
+    """
+    value, low, _ = _mean(weights * hits)
+    _, _, high = _mean(weights * (hits | undecided))
+    return Probability(value, max(low, 0.0), min(high, 1.0))
+
+
+def _mean(terms: np.ndarray) -> tuple[float, float, float]:
+    """Mean of independent terms, not negative, with the interval that holds those of Student for it and for its
+    logarithm: few large weights make its distribution skew, between normal and lognormal.
+    """
+    from scipy.stats import t
+
+    mean = float(terms.mean())
+    if mean <= 0:
+        # none of n samples: three over the number of samples, were they of the density of the inputs
+        return 0.0, 0.0, 1 - (0.5 * (1 - CONFIDENCE)) ** (1 / len(terms))
+    freedom = max(float(terms.sum() ** 2 / (terms**2).sum()) - 1, 1.0)  # hits of equal weight that tell as much
+    reach = float(t.ppf(0.5 * (1 + CONFIDENCE), freedom)) * float(terms.std(ddof=1)) / np.sqrt(len(terms)) / mean
+    return mean, mean * (1 - reach), mean * np.exp(reach)
+
+
+@dataclass(frozen=True)
+class Shifted:
+    """Density of samples: unit normal ones about several centres, and `DEFENSIVE` of them about zero."""
+
+    centres: np.ndarray
+    shares: np.ndarray
+
+    @classmethod
+    def none(cls, dimension: int) -> Shifted:
+        """Density of the inputs themselves."""
+        return cls(np.zeros((1, dimension)), np.ones(1))
+
+    def draw(self, count: int, random: np.random.Generator) -> np.ndarray:
+        """Independent scores (count, d)."""
+        which = random.choice(len(self.shares), size=count, p=self.shares)
+        return self.centres[which] + random.standard_normal((count, self.centres.shape[1]))
+
+    def log_weight(self, scores: np.ndarray) -> np.ndarray:
+        """Logarithm (count,) of the density of the inputs over this one."""
+        apart = scores[:, None] - self.centres
+        ratio = 0.5 * (scores**2).sum(axis=1)[:, None] - 0.5 * (apart**2).sum(axis=2) + np.log(self.shares)
+        return -np.logaddexp.reduce(ratio, axis=1)
+
+    def fitted(self, scores: np.ndarray, weights: np.ndarray) -> Shifted:
+        """Density with its centres where weighted scores are (expectation and maximisation, unit covariance)."""
+        start = np.argsort(weights)[::-1]
+        far = start[np.argmax(((scores[start[: len(start) // 4 + 1]] - scores[start[0]]) ** 2).sum(axis=1))]
+        centres, shares = scores[[start[0], far]][:REGIONS], np.full(REGIONS, 1 / REGIONS)
+        for _ in range(50):
+            near = np.log(shares) - 0.5 * ((scores[:, None] - centres) ** 2).sum(axis=2)
+            near = np.exp(near - np.logaddexp.reduce(near, axis=1)[:, None]) * weights[:, None]
+            mass = near.sum(axis=0)
+            shares = np.maximum(mass / mass.sum(), 1e-6)
+            shares = shares / shares.sum()
+            centres = (near.T @ scores) / np.maximum(mass, 1e-300)[:, None]
+        zero = np.zeros((1, scores.shape[1]))
+        return Shifted(np.vstack([centres, zero]), np.append((1 - DEFENSIVE) * shares, DEFENSIVE))
+
+
+def approach(
+    evaluate: Callable[[np.ndarray, np.ndarray], np.ndarray], dimension: int, count: int, seed: int
+) -> Shifted:
+    """Density of samples about a rare event, where a performance is positive: cross entropy in steps that make it ever
+    less smooth.
+
+    Parameters
+    ----------
+    evaluate : callable
+        From scores (m, d) and the logarithm of their weights to performances (m,), NaN where undecided.
+    dimension, count : int
+        Number of inputs, and of samples a step.
+    """
+    from scipy.optimize import brentq
+    from scipy.special import log_ndtr, ndtr
+
+    density, random = Shifted.none(dimension), np.random.default_rng(seed)
+    smooth = np.inf
+    for step in range(STEPS):
+        scores = quasi_random(count, dimension, seed) if step == 0 else density.draw(count, random)
+        log_weight = density.log_weight(scores)
+        performance = evaluate(scores, log_weight)
+        known = np.isfinite(performance)
+        g, z, log_weight = performance[known], scores[known], log_weight[known]
+        if not len(g):
+            return density
+        unit = float(np.std(g)) or 1.0
+
+        def spread(sigma: float, log_weight=log_weight, g=g) -> float:
+            terms = log_weight + log_ndtr(g / sigma)
+            terms = np.exp(terms - terms.max())
+            return float(terms.std() / terms.mean())
+
+        if _variation((g > 0) / ndtr(np.maximum(g, 0.0) / smooth)) <= SPREAD:
+            return density
+        low, high = 1e-6 * unit, min(smooth, 1e3 * unit)
+        if spread(low) <= SPREAD:
+            smooth = low
+        elif spread(high) >= SPREAD:
+            smooth = high
+        else:
+            smooth = float(
+                np.exp(brentq(lambda log: spread(np.exp(log)) - SPREAD, np.log(low), np.log(high), xtol=1e-2))
+            )
+        terms = log_weight + log_ndtr(g / smooth)
+        density = density.fitted(z, np.exp(terms - terms.max()))
+    return density
+
+
+def _variation(terms: np.ndarray) -> float:
+    """Coefficient of variation; infinite where all are zero."""
+    mean = float(terms.mean())
+    return float(terms.std() / mean) if mean > 0 else np.inf
+
+
+def shares(scores: np.ndarray, values: np.ndarray) -> np.ndarray:
+    """First-order Sobol indices (d,): share of the variance of values (n,) that each input alone explains.
+
+    The variance between groups of equal size in the order of an input, without what chance alone puts there (epsilon
+    squared of an analysis of variance): no form of the dependence is assumed.
+
+    Parameters
+    ----------
+    scores : (n, d) array
+        Of the inputs; only their order matters.
+    """
+    known = np.isfinite(values)
+    scores, values = scores[known], values[known]
+    count, total = len(values), float(np.var(values)) * len(values)
+    groups = max(2, round(2 * count ** (1 / 3)))
+    if count < 4 * groups or total == 0:
+        return np.full(scores.shape[1], np.nan)
+    found = []
+    for column in scores.T:
+        parts = np.array_split(values[np.argsort(column, kind="stable")], groups)
+        within = sum(float(np.var(part)) * len(part) for part in parts) / (count - groups)
+        between = total - within * (count - groups)
+        found.append((between - (groups - 1) * within) / total)
+    return np.clip(found, 0.0, 1.0)

@@ -1,0 +1,428 @@
+"""Probability of flutter and what decides it: run, storage, and what can be read off a run or its file."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from ...case.parameters import PARAMETERS, Mu
+from ...errors import CaseError, SolveError
+from ...record.mesh import MeshData
+from ...record.record import GrowingRecord, Record
+from ...record.table import Column, TableSpec
+from ..case import Case
+from ..result import StudyResult
+from ..session import Session
+from ..stability.place import check_scan, describe_fixed, fixed_conditions
+from ..stability.verdict import DIVERGES, FLUTTERS, NOT_VALID, OUTCOMES, STABLE, UNDECIDED
+from ..stability.walk import StabilityWalk
+from ..study import Study, nothing_to_resume
+from ..workers import Lost, Work, Workers
+from . import figures
+from .sampler import Found, Plan, Sampler
+from .sampling import CONFIDENCE, Probability, Shifted, approach, counted, quasi_random, shares, weighted
+
+SAMPLES, NUMBERS, _WHY = "samples", "numbers", "undecided sample"
+_SAMPLES = (
+    Column("sample", "", "Number of the sample", "i8"),
+    Column("value", "SI", "Of the range"),
+    Column("outcome", "", f"Verdict: {', '.join(f'{i} {name}' for i, name in enumerate(OUTCOMES))}", "i8"),
+    Column("growth_rate", "1/s", "Of the leading oscillating mode"),
+    Column("frequency", "Hz", "Of that mode"),
+    Column("damping_ratio", "", "Of the least damped oscillating mode"),
+    Column("opening", "m^2", "Area between the lips"),
+    Column("flow", "m^3/s", "Volume flow"),
+)
+_NUMBERS = (
+    Column("sample", "", "Number of the sample", "i8"),
+    Column("input", "", "Number of the input", "i8"),
+    Column("value", "SI", "Of the input"),
+    Column("score", "", "Standard normal score of the input, correlated"),
+    Column("log_weight", "", "Logarithm of the weight of the sample"),
+    Column("stage", "", "0 of samples of the inputs as they are, then the step towards a rare event", "i8"),
+)
+_TABLES = TableSpec(SAMPLES, _SAMPLES, chunk=512), TableSpec(NUMBERS, _NUMBERS, chunk=512)
+#: Samples that a worker takes at a time: of valves that share their states, and of valves with their own.
+SHARED, OWN = 64, 4
+#: Samples of the final density of a rare event over all that may be used; the others lead there.
+FINAL = 0.4
+#: Quantities whose percentiles are told, and their units in lines.
+_SPREADS = {"damping_ratio": ("least damping ratio, %", 100.0), "frequency": ("frequency, Hz", 1.0)}
+_SPREADS |= {"opening": ("opening, cm2", 1e4), "flow": ("flow, L/s", 1e3)}
+
+
+def tables_of(_mesh: MeshData) -> tuple[TableSpec, ...]:
+    """Tables of a result: verdicts on the samples, and their inputs."""
+    return _TABLES
+
+
+def rows_to_keep(known: Record, _case: Case) -> dict[str, int]:
+    """Rows that a run goes on from: those of whole samples.
+
+    Raises
+    ------
+    CaseError
+        If the run is complete.
+    """
+    if known.complete:
+        raise nothing_to_resume("uncertainty", known.path)
+    return {name: known.rows(name) for name in (SAMPLES, NUMBERS)}
+
+
+def run(session: Session, record: GrowingRecord, workers: int | str | None = None) -> None:
+    """Samples of the inputs of `uncertainty` of the case, and the verdict on each at every value of its range.
+
+    Parameters
+    ----------
+    workers : int or str, optional
+        See `dbvfiv.studies.workers.Workers`; those of the case by default.
+
+    Raises
+    ------
+    CaseError
+        For inputs that cannot be used.
+    SolveError
+        If the valve of the case has no steady state at any value.
+    """
+    case, plan = session.case, Plan(session.case)
+    check_scan(case, plan.parameter)
+    if case.has_pump:
+        raise CaseError(
+            "Behind a pump every sampled valve has an operating point of its own, which is not asked yet; give "
+            "drive.pressure and no upstream.pump.",
+            key="upstream.pump",
+        )
+    if case.uncertainty.method == "rare" and len(plan.values) > 1:
+        raise CaseError(
+            f"uncertainty.method is 'rare' with {len(plan.values)} values of {plan.parameter}, and samples are drawn "
+            "about the flutter of one state; leave uncertainty.over out, or method.",
+            key="uncertainty.method",
+        )
+    plan.scores_of(np.zeros((1, len(plan.inputs))))  # correlations are checked before anything is solved
+    for one in plan.inputs:
+        record.progress(one.words())
+    walk = StabilityWalk(case, record, session.model)
+    states = _states_of_case(plan, walk, record)
+    count = case.uncertainty.workers if workers is None else workers
+    record.begin("uncertainty", case.uncertainty.samples)
+    with Workers(count, _start, (case.to_dict(), states), record.warn) as team:
+        sampling = _Sampling(plan, record, team, Sampler(plan, states, walk))
+        if case.uncertainty.method == "rare":
+            sampling.rare()
+        else:
+            independent = quasi_random(case.uncertainty.samples, len(plan.inputs), case.uncertainty.seed)
+            sampling.verdicts(independent, np.zeros(len(independent)), 0)
+
+
+def _states_of_case(plan: Plan, walk: StabilityWalk, record: GrowingRecord) -> list[np.ndarray | None]:
+    """Displacements of the case itself at the values of the range; what has none is said."""
+    states: list[np.ndarray | None] = []
+    for value in plan.values:
+        try:
+            states.append(walk.equilibrium(Mu.of(plan.case).at(**{plan.parameter: value})))
+        except SolveError as error:
+            record.fail(str(error))
+            states.append(None)
+    if all(state is None for state in states):
+        raise SolveError(f"The valve of the case has no steady state: {record.failures[0]}")
+    return states
+
+
+def _start(case: dict, states: list[np.ndarray | None]) -> Sampler:
+    return Sampler(Plan(Case.from_dict(case)), states)
+
+
+def _found(sampler: Sampler, first: int, numbers: np.ndarray) -> list[Found]:
+    return sampler.found(first, numbers)
+
+
+class _Sampling:
+    """Samples found so far, and those still wanted; what an earlier attempt kept is not computed again."""
+
+    def __init__(self, plan: Plan, record: GrowingRecord, team: Workers, sampler: Sampler):
+        self.plan, self.record, self.team, self.sampler = plan, record, team, sampler
+        self.asked = 0
+        known, values = record.table_rows(_TABLES[0]), len(plan.values)
+        counts = np.bincount([row["sample"] for row in known], minlength=1) if known else np.zeros(1, int)
+        self.known = {row["sample"]: -row["damping_ratio"] for row in known if counts[row["sample"]] == values}
+
+    def verdicts(self, independent: np.ndarray, log_weight: np.ndarray, stage: int) -> np.ndarray:
+        """Performance (m,) of samples, the least damping ratio with its sign turned, at the last value of the range."""
+        plan, first = self.plan, self.asked
+        self.asked += len(independent)
+        numbers, scores = plan.numbers(independent), plan.scores_of(independent)
+        size = SHARED if plan.is_surrounding else OWN
+        tasks = [
+            start
+            for start in range(0, len(independent), size)
+            if any(first + k not in self.known for k in range(start, min(start + size, len(independent))))
+        ]
+        for start, rows in self._results(tasks, first, numbers, size):
+            block = slice(start, start + size)
+            self._keep(first + start, rows, numbers[block], scores[block], log_weight[block], stage)
+        return np.array([self.known[first + k] for k in range(len(independent))])
+
+    def _results(self, tasks, first: int, numbers: np.ndarray, size: int) -> Iterator[tuple[int, list[Found]]]:
+        if self.team.is_here:
+            for start in tasks:
+                yield start, self.sampler.found(first + start, numbers[start : start + size])
+            return
+
+        def ask(start: int) -> Work:
+            return Work(_found, (first + start, numbers[start : start + size]))
+
+        for start, rows in self.team.share(tasks, ask):
+            if rows is Lost:
+                raise SolveError(f"Samples {first + start} and on could not be computed: {Lost.sentence}")
+            yield start, rows
+
+    def _keep(self, first: int, rows: list[Found], numbers, scores, log_weight, stage: int) -> None:
+        """Keep whole samples: their inputs before their verdicts, which vouch for them."""
+        fresh = [row for row in rows if row.sample not in self.known]
+        new = sorted({row.sample for row in fresh})
+        inputs = [
+            (sample, i, numbers[sample - first, i], scores[sample - first, i], log_weight[sample - first], stage)
+            for sample in new
+            for i in range(numbers.shape[1])
+        ]
+        self.record.extend(NUMBERS, dict(zip((c.name for c in _NUMBERS), map(list, zip(*inputs)))))
+        for row in fresh:
+            if row.why:
+                self.record.note(_WHY, sample=row.sample, value=row.value, reason=row.why)
+        self.record.extend(SAMPLES, {c.name: [getattr(row, c.name) for row in fresh] for c in _SAMPLES})
+        for row in fresh:
+            self.known[row.sample] = -row.damping_ratio if OUTCOMES[row.outcome] != UNDECIDED else np.nan
+        for sample in new:
+            self.record.item(sample)
+
+    def rare(self) -> None:
+        """Samples about a rare flutter: steps towards it, then those of its final density."""
+        asked, dimension = self.plan.case.uncertainty, len(self.plan.inputs)
+        stages = iter(range(1000))
+        each = max(32, round((1 - FINAL) * asked.samples / 5))
+
+        def evaluate(scores: np.ndarray, log_weight: np.ndarray) -> np.ndarray:
+            stage = next(stages)
+            self.record.progress(f"step {stage} towards flutter, {len(scores)} samples")
+            return self.verdicts(scores, log_weight, stage)
+
+        density: Shifted = approach(evaluate, dimension, each, asked.seed)
+        random = np.random.default_rng([asked.seed, 1])
+        scores = density.draw(max(32, round(FINAL * asked.samples)), random)
+        self.verdicts(scores, density.log_weight(scores), next(stages))
+
+
+class UncertaintyResult(StudyResult):
+    """Probability of each outcome over a range, and what decides it.
+
+    Attributes
+    ----------
+    parameter : str
+    points : list of dict
+        One for each value of the range, see `point`.
+
+    Examples
+    --------
+    >>> found = dbvfiv.load("cases/dbv12-in-line.toml").uncertainty("pressure=0.5 m:4 m:3")     # doctest: +SKIP
+    >>> [(point["value"], point["probability"], point["interval"]) for point in found.points]   # doctest: +SKIP
+    """
+
+    kind = "uncertainty"
+
+    @cached_property
+    def plan(self) -> Plan:
+        return Plan(self.case)
+
+    @property
+    def parameter(self) -> str:
+        return self.plan.parameter
+
+    @cached_property
+    def _rows(self) -> dict[str, np.ndarray]:
+        return {column.name: self.record.column(SAMPLES, column.name) for column in _SAMPLES}
+
+    @cached_property
+    def _inputs(self) -> dict[str, np.ndarray]:
+        """Values and scores (samples, d), weights and stages (samples,), by the number of the sample."""
+        kept = {column.name: self.record.column(NUMBERS, column.name) for column in _NUMBERS}
+        count, width = int(kept["sample"].max(initial=-1)) + 1, len(self.plan.inputs)
+        values, scores = np.full((count, width), np.nan), np.full((count, width), np.nan)
+        values[kept["sample"], kept["input"]], scores[kept["sample"], kept["input"]] = kept["value"], kept["score"]
+        weights, stages = np.zeros(count), np.zeros(count, int)
+        weights[kept["sample"]], stages[kept["sample"]] = np.exp(kept["log_weight"]), kept["stage"]
+        return {"values": values, "scores": scores, "weights": weights, "stages": stages}
+
+    def at(self, value: float) -> dict[str, np.ndarray]:
+        """Samples at one value of the range in their order: the columns of the table, with ``inputs`` and ``scores``
+        (n, d), ``weight`` and ``stage``.
+        """
+        rows, inputs = self._rows, self._inputs
+        here = np.flatnonzero(rows["value"] == value)
+        here = here[np.argsort(rows["sample"][here])]
+        number = rows["sample"][here]
+        found = {name: column[here] for name, column in rows.items()}
+        own = {"inputs": inputs["values"], "scores": inputs["scores"], "weight": inputs["weights"]}
+        return found | {name: table[number] for name, table in own.items()} | {"stage": inputs["stages"][number]}
+
+    def probability(self, value: float, outcome: str = FLUTTERS) -> Probability:
+        """Probability of an outcome at a value of the range."""
+        found = self.at(value)
+        number, undecided = OUTCOMES.index(outcome), found["outcome"] == OUTCOMES.index(UNDECIDED)
+        hits = found["outcome"] == number
+        if self.case.uncertainty.method == "plain":
+            return counted(int(hits.sum()), int(undecided.sum()), len(hits))
+        last = found["stage"] == found["stage"].max(initial=0)
+        return weighted(found["weight"][last], hits[last], undecided[last])
+
+    def point(self, value: float) -> dict[str, Any]:
+        """Numbers at a value of the range: ``probability`` of flutter among the decided samples with its ``interval``,
+        ``samples``, ``undecided``, ``outcomes`` by their names, ``percentiles`` (2.5, 50, 97.5) and ``decides``.
+        """
+        found, flutter = self.at(value), self.probability(value)
+        names = (FLUTTERS, DIVERGES, NOT_VALID, STABLE)
+        others = {name: self.probability(value, name) for name in names}
+        plain = found["stage"] == 0
+        spreads = {name: _percentiles(found[name][plain]) for name in _SPREADS}
+        return {
+            "value": float(value),
+            "probability": _plain(flutter.value),
+            "interval": [flutter.low, flutter.high],
+            "samples": len(found["outcome"]),
+            "undecided": int((found["outcome"] == OUTCOMES.index(UNDECIDED)).sum()),
+            "outcomes": {n: {"probability": _plain(p.value), "interval": [p.low, p.high]} for n, p in others.items()},
+            "percentiles": spreads,
+            "decides": self.decides(value),
+        }
+
+    def decides(self, value: float) -> list[dict[str, Any]]:
+        """Share of each input in the variance of the least damping ratio at a value, and in that of flutter or not,
+        the largest first; None where there are too few samples or nothing varies.
+        """
+        found = self.at(value)
+        plain = (found["stage"] == 0) & (found["outcome"] != OUTCOMES.index(UNDECIDED))
+        scores = found["scores"][plain]
+        margin = shares(scores, found["damping_ratio"][plain])
+        outcome = shares(scores, (found["outcome"][plain] == OUTCOMES.index(FLUTTERS)).astype(float))
+        rows = [
+            {"parameter": one.name, "share": _plain(m), "share_of_outcome": _plain(o)}
+            for one, m, o in zip(self.plan.inputs, margin, outcome)
+        ]
+        return sorted(rows, key=lambda row: -(row["share"] or 0.0))
+
+    def measured(self, value: float, name: str, accuracy: float) -> tuple[Any, Any] | None:
+        """Percentiles of the least damping ratio at a value now, and if an input were known to an accuracy (0.1 for
+        10 % at 95 %) and had its median; None where too few samples lie there.
+        """
+        found, number = self.at(value), [one.name for one in self.plan.inputs].index(name)
+        plain = (found["stage"] == 0) & np.isfinite(found["damping_ratio"])
+        median = self.plan.inputs[number].distribution.median
+        apart = (found["inputs"][plain, number] - median) / (accuracy * abs(median) / 1.96)
+        own = self.plan.inputs[number].distribution
+        # weights that turn the distribution of the input into a narrower normal one
+        scores = own.score(found["inputs"][plain, number])
+        log = -0.5 * apart**2 + 0.5 * scores**2 + np.log(_stretch(own, found["inputs"][plain, number]))
+        weights = np.exp(log - log.max(initial=-np.inf))
+        if not len(weights) or weights.sum() ** 2 / (weights**2).sum() < _ENOUGH:
+            return None
+        ratio = found["damping_ratio"][plain]
+        return _percentiles(ratio), _percentiles(ratio, weights)
+
+    @cached_property
+    def points(self) -> list[dict[str, Any]]:
+        there = set(self._rows["value"].tolist())
+        return [self.point(value) for value in self.plan.values if value in there]
+
+    @property
+    def deciding(self) -> dict[str, Any] | None:
+        """Point whose outcome is least certain: what decides there is what decides."""
+        known = [point for point in self.points if point["probability"] is not None]
+        return max(known, key=lambda p: p["probability"] * (1 - p["probability"]), default=None)
+
+    def summary(self) -> dict[str, Any]:
+        deciding = self.deciding
+        return {
+            "parameter": self.parameter,
+            "points": self.points,
+            "decides": [] if deciding is None else deciding["decides"],
+            "inputs": [one.summary() for one in self.plan.inputs],
+            "method": self.case.uncertainty.method,
+            "confidence": CONFIDENCE,
+            "fixed": fixed_conditions(self.case, self.parameter, *(one.name for one in self.plan.inputs)),
+        } | self.ending()
+
+    def drawers(self) -> Iterator[tuple[str, Callable[[], Figure]]]:
+        yield from figures.draw(self)
+
+    def lines(self) -> list[str]:
+        row = PARAMETERS[self.parameter]
+        fixed = describe_fixed(self.case, self.parameter, *(one.name for one in self.plan.inputs))
+        place = f"{self.parameter}, {row.shown_unit}".rstrip(", ")
+        head = f"{place:>16}{'flutters':>10}  {'95 % interval':<17}{'not valid':>10}{'undecided':>10}{'samples':>9}"
+        lines = [f"At {fixed}:", *(f"  {one.words()}" for one in self.plan.inputs), f"{head}  least damping ratio, %"]
+        return [*lines, *map(self._line, self.points), *self._deciding_lines()]
+
+    def _line(self, point: dict[str, Any]) -> str:
+        low, middle, high = point["percentiles"]["damping_ratio"]
+        flutters, invalid = (point["outcomes"][name]["probability"] for name in (FLUTTERS, NOT_VALID))
+        said, never = ("-" if one is None else f"{one:.3g}" for one in (flutters, invalid))
+        interval = "{:.2g} to {:.2g}".format(*point["interval"])
+        spread = "-" if middle is None else f"{100 * middle:.3g} ({100 * low:.3g} to {100 * high:.3g})"
+        value = point["value"] / PARAMETERS[self.parameter].scale
+        counts = f"{never:>10}{point['undecided']:10d}{point['samples']:9d}"
+        return f"{value:16.6g}{said:>10}  {interval:<17}{counts}  {spread}"
+
+    def _deciding_lines(self) -> list[str]:
+        point = self.deciding
+        if point is None or not point["decides"] or point["decides"][0]["share"] is None:
+            return []
+        row, first = PARAMETERS[self.parameter], point["decides"][0]["parameter"]
+        parts = [f"{d['parameter']} {100 * d['share']:.0f} %" for d in point["decides"] if (d["share"] or 0) >= 0.01]
+        where = f"{point['value'] / row.scale:.4g} {row.shown_unit}".rstrip()
+        lines = [f"Share of the variance of the least damping ratio at {where}: {', '.join(parts)}."]
+        known = self.measured(point["value"], first, 0.1)
+        if known is not None:
+            now, then = (f"{100 * spread[0]:.2g} to {100 * spread[2]:.2g} %" for spread in known)
+            lines.append(
+                f"Measure {first} to 10 %: the 95 % interval of the least damping ratio shrinks from {now} to {then} "
+                "(if it has its median)."
+            )
+        return lines
+
+    def shortfall(self) -> str | None:
+        missing = len(self.failures)
+        return f"{missing} of {len(self.plan.values)} values have no steady state" if missing else None
+
+
+#: Samples of equal weight that tell as much, below which nothing is said of percentiles.
+_ENOUGH = 30.0
+
+
+def _stretch(distribution, values: np.ndarray) -> np.ndarray:
+    """Change of an input with its score, up to a factor."""
+    step = 1e-4
+    scores = distribution.score(values)
+    return np.maximum(np.abs(distribution.at(scores + step) - distribution.at(scores - step)) / (2 * step), 1e-300)
+
+
+def _percentiles(values: np.ndarray, weights: np.ndarray | None = None) -> list[float | None]:
+    """2.5, 50 and 97.5 % of values, NaN left out; None where there are none."""
+    known = np.isfinite(values)
+    if not known.any():
+        return [None] * 3
+    values = values[known]
+    if weights is None:
+        return np.percentile(values, [2.5, 50, 97.5]).tolist()
+    order = np.argsort(values)
+    share = np.cumsum(weights[known][order]) / weights[known].sum()
+    return [float(values[order][np.searchsorted(share, q)]) for q in (0.025, 0.5, 0.975)]
+
+
+def _plain(value: float) -> float | None:
+    return float(value) if np.isfinite(value) else None
+
+
+STUDY = Study("uncertainty", tables_of, run, UncertaintyResult, rows_to_keep=rows_to_keep)

@@ -1,0 +1,69 @@
+"""Distributions as words: values against those of scipy, relative forms, shares outside of limits, refusals."""
+
+import numpy as np
+import pytest
+from scipy import stats
+from scipy.special import ndtri
+
+from dbvfiv.case.distribution import Distribution, with_full_names
+from dbvfiv.case.quantity import Quantity
+
+PLAIN, LENGTH = Quantity(""), Quantity("m", "mm")
+SHARES = np.array([0.001, 0.025, 0.3, 0.5, 0.84, 0.999])
+
+
+@pytest.mark.parametrize(
+    ("text", "own", "expected"),
+    [
+        ("normal(2, 0.5)", None, stats.norm(2, 0.5)),
+        ("normal(5 %)", 20.0, stats.norm(20, 1)),
+        ("lognormal(1.2)", 0.5, stats.lognorm(np.log(1.2), scale=0.5)),
+        ("lognormal(3, 1.5)", None, stats.lognorm(np.log(1.5), scale=3)),
+        ("uniform(-10 %, 20 %)", 5.0, stats.uniform(4.5, 1.5)),
+        ("uniform(1, 4)", None, stats.uniform(1, 3)),
+    ],
+)
+def test_values_are_those_of_their_probability(text, own, expected):
+    found = Distribution.parse(text, PLAIN, own)
+    np.testing.assert_allclose(found.at(ndtri(SHARES)), expected.ppf(SHARES), rtol=1e-12)
+    np.testing.assert_allclose(found.score(expected.ppf(SHARES)), ndtri(SHARES), rtol=1e-9)
+    low, high = expected.ppf(0.03), expected.ppf(0.9)
+    assert found.share_outside(low, high) == pytest.approx(0.13, rel=1e-9)
+    assert found.median == pytest.approx(expected.median(), rel=1e-12)
+
+
+def test_units_are_read():
+    found = Distribution.parse("normal(2 mm, 0.1 mm)", LENGTH)
+    assert found.numbers == (2e-3, 1e-4) and found.words(LENGTH) == "normal(0.002 m, 0.0001 m)"
+
+
+def test_samples_come_from_a_list_or_a_file(tmp_path):
+    listed = Distribution.parse("samples(3, 1, 2, 2)", PLAIN)
+    assert listed.at(ndtri(np.array([0.1, 0.3, 0.6, 0.9]))).tolist() == [1, 2, 2, 3]
+    (tmp_path / "gaps.txt").write_text("# mm\n1 mm\n3 mm\n")
+    text = with_full_names("samples(gaps.txt)", tmp_path)
+    assert Distribution.parse(text, LENGTH).numbers == (1e-3, 3e-3)
+    assert listed.share_outside(1.5, 3.0) == 0.25
+
+
+@pytest.mark.parametrize(
+    ("text", "own", "clause"),
+    [
+        ("gamma(1, 2)", 1.0, "no distribution"),
+        ("normal", 1.0, "no distribution"),
+        ("normal(1, -2)", 1.0, "not greater than 0"),
+        ("normal(5 %)", None, "relative to the value of the case"),
+        ("normal(1, 2, 3)", 1.0, "3 arguments"),
+        ("lognormal(0.8)", 1.0, "not greater than 1"),
+        ("lognormal(-1, 1.2)", 1.0, "not greater than 0"),
+        ("uniform(2, 1)", 1.0, "do not rise"),
+        ("uniform(2)", 1.0, "1 arguments"),
+        ("samples(missing.txt)", 1.0, "does not exist"),
+        ("samples(1,)", 1.0, "fewer than two"),
+        ("normal(1 kg, 2)", 1.0, "not"),
+        (7, 1.0, "no distribution"),
+    ],
+)
+def test_what_is_no_distribution_is_refused(text, own, clause):
+    with pytest.raises(ValueError, match=clause):
+        Distribution.parse(text, PLAIN, own)

@@ -1,0 +1,138 @@
+"""Samples of a small valve: outcomes are those of the full model asked for each, whoever works and however often the
+run is interrupted; what cannot be used is answered by a sentence.
+"""
+
+import json
+
+import numpy as np
+import pytest
+
+import dbvfiv
+from dbvfiv.errors import CaseError
+from dbvfiv.observer import Observer
+from dbvfiv.studies.session import load_result
+from dbvfiv.studies.stability.verdict import OUTCOMES
+from dbvfiv.studies.uncertainty.inputs import inputs_of
+from tests.small_valves import SMALL, load_small
+
+LINE = "cases/dbv12-in-line.toml"
+KEYS = {"uncertainty.samples": 16, "drive.pressure": 4e3, "fluid.density": 20.0, "damping.alpha": 0.0}
+OWN = {"thickness": "normal(4 %)", "materials.CR.stiffness_factor": "lognormal(1.2)", "beta": "lognormal(0.002, 2)"}
+
+
+def load(**changes):
+    return load_small(KEYS, changes)
+
+
+@pytest.fixture(scope="module")
+def valve():
+    return load()
+
+
+@pytest.fixture(scope="module")
+def found(valve):
+    return valve.uncertainty(inputs=OWN)
+
+
+def test_outcomes_are_those_of_modes(valve, found):
+    samples = found.at(found.plan.values[0])
+    names = [one.name for one in found.plan.inputs]
+    assert {"stable", "flutters"} <= {OUTCOMES[i] for i in samples["outcome"]}
+    for i in (0, 5, 11):
+        row = dict(zip(names, samples["inputs"][i]))
+        changes = {
+            "valve.thickness_factor": row["thickness"],
+            "materials.CR.stiffness_factor": row["materials.CR.stiffness_factor"],
+            "damping.beta": row["beta"],
+        }
+        modes = load(**changes).modes()
+        assert modes.verdict.outcome == OUTCOMES[samples["outcome"][i]]
+        assert modes.verdict.growth_rate == pytest.approx(samples["growth_rate"][i], rel=1e-6, abs=1e-6)
+        assert modes.state.outlet_area == pytest.approx(samples["opening"][i], rel=1e-6)
+
+
+def test_the_document_has_probability_interval_and_what_decides(found):
+    document = json.loads(json.dumps(found.summary()))
+    (point,) = document["points"]
+    hits = sum(OUTCOMES[i] == "flutters" for i in found.at(point["value"])["outcome"])
+    assert point["probability"] == hits / 16 and point["interval"][0] < hits / 16 < point["interval"][1]
+    assert point["samples"] == 16 and point["undecided"] == 0
+    assert {row["parameter"] for row in document["decides"]} == set(OWN)
+    assert {row["parameter"] for row in document["inputs"]} == set(OWN)
+
+
+def test_workers_and_interruptions_change_no_digit(valve, found, tmp_path):
+    class Interrupt(Observer):
+        def item(self, result):
+            if result == 7:
+                raise KeyboardInterrupt
+
+    path = tmp_path / "samples.h5"
+    partly = valve.uncertainty(inputs=OWN, output=path, observer=Interrupt())
+    assert partly.interrupted and 0 < len(partly.at(partly.plan.values[0])["outcome"]) < 16
+    whole = dbvfiv.resume(path, workers=2)
+    assert whole.complete and whole.summary() == found.summary() == load_result(path).summary()
+
+
+def test_surroundings_are_asked_side_by_side(valve):
+    """Inputs that leave the steady state alone share it and its reduced model."""
+    inputs = {"beta": "lognormal(0.002, 2)", "density": "uniform(10, 40)"}
+    found = valve.uncertainty(inputs=inputs, over="pressure=3000,6000")
+    assert found.plan.is_surrounding
+    for value in found.plan.values:
+        samples = found.at(value)
+        assert np.ptp(samples["opening"]) == 0 and len(samples["outcome"]) == 16
+        beta, density = samples["inputs"][3]
+        alone = valve.modes(value, beta=beta, density=density)
+        assert alone.verdict.outcome == OUTCOMES[samples["outcome"][3]]
+        assert alone.verdict.growth_rate == pytest.approx(samples["growth_rate"][3], rel=1e-5, abs=1e-5)
+
+
+@pytest.mark.slow
+def test_a_rare_flutter_is_found_with_few_samples(valve):
+    """Interval of weighted samples beside that of plain ones at a probability of a few per cent."""
+    inputs = OWN | {"beta": "lognormal(0.004, 1.6)"}
+    rare = valve.replace({"uncertainty.method": "rare"}).uncertainty(inputs=inputs, samples=250).points[0]
+    plain = valve.uncertainty(inputs=inputs, samples=1000).points[0]
+    low, high = (max if end == 0 else min for end in (0, 1))
+    assert low(rare["interval"][0], plain["interval"][0]) < high(rare["interval"][1], plain["interval"][1])
+
+
+def test_shipped_inputs_name_their_sources():
+    inputs = {one.name: one for one in inputs_of(dbvfiv.load(LINE, dict(SMALL)).case)}
+    assert inputs["materials.SBR.loss_factor"].distribution.numbers == (0.10, 0.25)
+    assert inputs["materials.CR.stiffness_factor"].distribution.form == "lognormal"
+    assert inputs["pipe_length"].distribution.numbers == (20.0, 0.4)
+    assert all(one.source for one in inputs.values())
+
+
+@pytest.mark.parametrize(
+    ("changes", "clause"),
+    [
+        ({"uncertainty.inputs": {"thickness": "normal(1, 0.5)"}}, "0.029 lies where thickness cannot be"),
+        ({"uncertainty.inputs": {"thicknes": "normal(5 %)"}}, "neither a parameter"),
+        ({"uncertainty.inputs": {"tail_length": "normal(5 %)"}}, "no tail_length to change"),
+        ({"uncertainty.inputs": {"thickness": "wide"}}, "no distribution; it must be such as"),
+        ({"uncertainty.inputs": {"valve.wall": "normal(5 %)"}}, "holds a number"),
+        ({"uncertainty.inputs": {"materials.CR.loss_factor": "uniform(0.1, 3)"}}, "cannot be"),
+        ({"uncertainty.correlation": [["thickness", "angle", 1.2]]}, "between -1 and 1"),
+        ({"uncertainty.correlation": [["thickness", "width", 0.5]]}, "'width', which is no input"),
+        (
+            {
+                "uncertainty.correlation": [
+                    ["thickness", "angle", 0.9],
+                    ["angle", "beta", 0.9],
+                    ["thickness", "beta", -0.9],
+                ]
+            },
+            "no numbers can be correlated so",
+        ),
+        ({"uncertainty.inputs": {"pressure": "normal(5 %)"}, "uncertainty.over": "pressure=0.1 m:1 m:3"}, "moves"),
+        ({"uncertainty.method": "rare", "uncertainty.over": "pressure=0.1 m:1 m:3"}, "one state"),
+        ({"uncertainty.workers": "few"}, "neither a number nor an address"),
+        ({"uncertainty.samples": 3}, "at least 16"),
+    ],
+)
+def test_what_cannot_be_used_is_answered_by_a_sentence(changes, clause):
+    with pytest.raises(CaseError, match=clause):
+        load(**changes).uncertainty()
