@@ -90,7 +90,7 @@ def examine() -> Report:
         python=platform.python_version(),
         executable=sys.executable,
         platform=platform.platform(),
-        cores=_cores(),
+        cores=processors(),
         packages=packages,
         petsc=_petsc(problems),
         cache=_cache(problems),
@@ -214,5 +214,6 @@ def _cache(problems: list[Problem]) -> dict[str, Any]:
     return {"folder": str(folder), "writable": writable, "bytes": size}
 
 
-def _cores() -> int:
+def processors() -> int:
+    """Number of processors that this process may use."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else (os.cpu_count() or 1)

@@ -255,6 +255,8 @@ SYNONYMS = {
     "nominal_size": "valve.scale",
     "bill_length": "valve.duckbill_length",
     "bill_width": "valve.lip_half_width",
+    "bill_height": "valve.wall_map",
+    "depth": "downstream.pressure",
     "heads": "steady.pressures",
 }
 

@@ -331,11 +331,14 @@ def _apply(model: type[Section], data: dict[str, Any], override: str) -> tuple[s
 
 
 def toml_value(text: str) -> Any:
-    """Value of a text that is TOML, such as "8" or "[1e3, 2e3]"; any other text as it is (``18 kPa``, ``storage``)."""
+    """Value of a text that is TOML, such as "8" or "[1e3, 2e3]"; any other text as it is (``18 kPa``, ``storage``), and
+    a list of such texts (``[1 m, 2 m]``) as a list.
+    """
     try:
         parsed = tomllib.loads(f"value = {text}")
     except (ValueError, RecursionError):
-        return text
+        plain = re.fullmatch(r"\s*\[([^][{}\"'=]*)\]\s*", text)
+        return [part.strip() for part in plain[1].split(",")] if plain else text
     return parsed["value"] if set(parsed) == {"value"} else text
 
 

@@ -144,7 +144,7 @@ class NeoHookean(Relaxing):
     kind: Literal["neo-hookean"] = key(..., "Incompressible neo-Hookean rubber.")
     shear_modulus: Annotated[Modulus, BeforeValidator(_by_hardness)] = key(
         ...,
-        'Shear modulus G, or the hardness of the rubber, "60 Shore A", 20 to 80, by Gent (1958): a reading that is 5 '
+        'Shear modulus G, or hardness = "60 Shore A" in its place, 20 to 80, by Gent (1958): a reading that is 5 '
         "points off changes G by a fifth.",
         gt=0,
         le=1e13,
@@ -310,9 +310,14 @@ class Materials(Section):
                 named[name] = before | value if change else value
             else:
                 known[name] = value  # not a table: refused as an unknown key
-        for name in BUILT_IN:
-            if isinstance(named.get(name), dict):
-                named[name] = {"kind": "built-in"} | named[name]
+        for name, value in named.items():
+            if isinstance(value, dict) and "hardness" in value and "shear_modulus" not in value:
+                given = value["hardness"]
+                modulus = f"{given} Shore A" if isinstance(given, (int, float)) else given
+                rest = {key: one for key, one in value.items() if key != "hardness"}
+                named[name] = {"kind": "neo-hookean", "shear_modulus": modulus} | rest
+            elif name in BUILT_IN and isinstance(value, dict):
+                named[name] = {"kind": "built-in"} | value
         return known | {"named": named}
 
     @model_validator(mode="after")

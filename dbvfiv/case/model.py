@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import difflib
 from collections.abc import Collection, Iterable, Mapping
 from typing import Any, Self
 
@@ -79,21 +80,29 @@ class Case(Section):
     @model_validator(mode="before")
     @classmethod
     def _keep_unit_of_pressure(cls, data: Any) -> Any:
-        """Let the unit in which drive.pressure is given be that in which results are read, where none is chosen."""
+        """Let the unit in which drive.pressure is given, or else report.heads, be that in which results are read, where
+        none is chosen.
+        """
         drive, project = (data.get(name, {}) if isinstance(data, Mapping) else None for name in ("drive", "project"))
         if not isinstance(drive, Mapping) or not isinstance(project, Mapping) or project.get("units"):
             return data
-        unit = "m" if drive.get("head") is not None else unit_of(drive.get("pressure"))
+        report = data.get("report")
+        heads = report.get("heads") if isinstance(report, Mapping) else None
+        given = drive.get("pressure", heads[0] if isinstance(heads, (list, tuple)) and heads else heads)
+        unit = "m" if drive.get("head") is not None else unit_of(given)
         return {**data, "project": {**project, "units": unit}} if unit not in ("", "kPa") else data
 
     @model_validator(mode="after")
     def _goes_together(self) -> Case:
         for i, layer in enumerate(self.layers):
             if layer.material not in self.materials.names:
+                near = difflib.get_close_matches(layer.material.upper(), self.materials.names, n=1)
+                meant = f", the nearest is {near[0]}" if near else ""
                 raise BrokenRule(
                     f"layers.{i}.material",
                     f"{layer.material!r}, which is no material of this case",
-                    f"it must be one of {', '.join(self.materials.names)} or a table [materials.NAME]",
+                    f"it must be one of {', '.join(self.materials.names)}{meant}, or a table [materials.NAME], of a "
+                    "rubber with its hardness and density",
                 )
         if self.damping.relaxes:
             for name in dict.fromkeys(layer.material for layer in self.layers):

@@ -64,7 +64,7 @@ def _factor(unit_text: str, si: str) -> float | None:
     try:
         registry = _registry()
         text = ("1" if unit_text.startswith("/") else "") + unit_text.replace("%", "percent")
-        text = re.sub(r"\bm3\b", "m^3", text)
+        text = re.sub(r"\b([cdm]?m|ft|in)([23])\b", r"\1^\2", text)
         source = registry.Quantity(1.0, registry.parse_units(text))
         target = "degree" if si == "deg" else (si or "dimensionless")
         return float(source.to(target).magnitude)

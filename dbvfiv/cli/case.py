@@ -86,19 +86,20 @@ def _check(case, name: str) -> None:
     CaseError
         With all that contradicts what.
     """
-    from ..model.equilibria import model_warnings
-    from ..model.sizes import ValveSizes
-    from ..studies.case import contradictions
-    from ..studies.session import Session
+    from ..studies.case import contradictions, oddities
 
     found = list(contradictions(case))
     if found:
         raise CaseError(" ".join(found))
+    from ..model.equilibria import model_warnings  # compilers, which a mistake need not wait for
+    from ..model.sizes import ValveSizes
+    from ..studies.session import Session
+
     model = Session(case).described
     print(f"{name} fits.")
     lines = [*ValveSizes.of(model).lines(), *_conditions(case)]
     print("\n".join(f"  {line}" for line in lines))
-    for sentence in model_warnings(model):
+    for sentence in (*oddities(case), *model_warnings(model)):
         print(f"Note: {sentence}")
     print("`dbvfiv case FILE --all` prints every key.")
 

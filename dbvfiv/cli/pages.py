@@ -24,7 +24,12 @@ def report(
         ),
     ] = None,
     pdf: Annotated[bool, typer.Option("--pdf", help="Also print it to a PDF beside the page.")] = False,
-    workers: Annotated[int, typer.Option("--workers", min=1, max=64, help="Processes that share the heads.")] = 1,
+    workers: Annotated[
+        int | None,
+        typer.Option(
+            "--workers", min=1, max=64, help="Processes that share the studies; one a processor, at most four."
+        ),
+    ] = None,
     without: Annotated[
         list[str] | None,
         typer.Option(
@@ -45,19 +50,26 @@ def report(
 
     dbvfiv report my.toml -o my.html --pdf
     """
-    from ..report import gather, write_page, write_pdf
+    from ..doctor import processors
+    from ..studies.case import load_case, require_consistent
+
+    if output is not None and output.suffix.lower() == ".pdf":
+        raise CaseError(
+            f"-o is given as {str(output)!r}, and the page is HTML; give -o {output.stem}.html --pdf for both."
+        )
+    case = load_case(case_file, overrides or ())
+    require_consistent(case)
+    from ..report import gather, write_page, write_pdf  # drawing libraries, which a mistake need not wait for
     from ..report.answers import answers
     from ..report.gather import PARTS
-    from ..studies.case import load_case
 
     for name in without or ():
         if name not in PARTS:
             raise CaseError(f"--without is given as {name!r}, which is none of {', '.join(PARTS)}.")
-    case = load_case(case_file, overrides or ())
     name = case_file.stem if case_file else "dbv12"
     page = output or Path(f"{name}-report.html")
     leave_out = (*(without or ()), *(() if cycle else ("cycle",)))
-    found = gather(case, name, runs or page.with_suffix(""), leave_out, workers, as_json)
+    found = gather(case, name, runs or page.with_suffix(""), leave_out, workers or min(4, processors()), as_json)
     write_page(found, page)
     written = [page, *([write_pdf(page, page.with_suffix(".pdf"))] if pdf else [])]
     answered = answers(found)

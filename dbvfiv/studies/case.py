@@ -12,11 +12,13 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any, Self
 
+import numpy as np
 from pydantic import create_model, model_validator
 
 from ..case.describe import page
 from ..case.load import key_path, read_case_file
 from ..case.model import Case as PhysicsCase
+from ..case.quantity import head_of
 from ..case.section import BrokenRule, Section, key
 from ..case.write import case_toml
 from ..errors import CaseError
@@ -172,7 +174,7 @@ _AT_DRIVE = ("modes", "sweep", "onset", "map", "cycle", "sensitivity")
 
 
 def contradictions(case: Case, kind: str | None = None) -> Iterator[str]:
-    """Sentences on what contradicts what, for a study or for any.
+    """Sentences on what contradicts what, for a study or for any, in the units of the case.
 
     Parameters
     ----------
@@ -180,6 +182,11 @@ def contradictions(case: Case, kind: str | None = None) -> Iterator[str]:
     kind : str, optional
         Study that is about to run; what does not concern it is left out.
     """
+    yield from _forgotten_units(case, kind)
+    yield from map(case.units.say, _contradictions(case, kind))
+
+
+def _contradictions(case: Case, kind: str | None) -> Iterator[str]:
     if case.drive.kind == "flow" and not case.seeks_operating_point:
         yield from _nothing_flows(case, kind)
     yield from _slivers(case)
@@ -187,8 +194,8 @@ def contradictions(case: Case, kind: str | None = None) -> Iterator[str]:
         yield from _unanswered_rating(case)
 
 
-def require_consistent(case: Case, kind: str) -> None:
-    """Refuse a case whose keys contradict each other for a study.
+def require_consistent(case: Case, kind: str | None = None) -> None:
+    """Refuse a case whose keys contradict each other, for a study or for any.
 
     Raises
     ------
@@ -214,6 +221,12 @@ def _nothing_flows(case: Case, kind: str | None) -> Iterator[str]:
         yield (
             f"steady.pressures end at {_pascal(max(asked))}, which is not above {behind}, so nothing flows at any of "
             "them."
+        )
+
+    if kind is None and case.report.heads and min(case.report.heads) <= back:
+        yield (
+            f"report.heads begin at {_pascal(min(case.report.heads))}, which is not above {behind}, so nothing flows "
+            "there; give heads of the flow."
         )
 
 
@@ -245,6 +258,46 @@ def _unanswered_rating(case: Case) -> Iterator[str]:
             f"closure.rated_pressure is {_pascal(rated)} and closure.pressures end at {_pascal(largest)}, so whether "
             f'the valve holds would stay open; give -p "{rated / 1e3:g} kPa" or closure.pressures up to it.'
         )
+
+
+#: Pressures of a liquid below which a number without its unit is meant, Pa: 5 mm of water, which crack no valve.
+_NO_PRESSURE, _LIQUID = 50.0, 300.0
+
+
+def _forgotten_units(case: Case, kind: str | None) -> Iterator[str]:
+    """Pressures of a liquid too small to be meant: a bare 5 is 5 Pa."""
+    if case.fluid.density < _LIQUID:
+        return
+    given = {}
+    if kind is None:
+        given["drive.pressure"] = case.drive.pressure
+        given["closure.rated_pressure"] = case.closure.rated_pressure or 0.0
+        given["report.heads"] = max(case.report.heads, default=0.0)
+    elif kind in ("sweep", "onset", "map", "cycle"):
+        axes = case.map.axes if kind == "map" else (getattr(case, kind).axis,)
+        given |= {f"{kind}, pressure": max(axis.values) for axis in axes if axis and axis.parameter == "pressure"}
+    for name, value in given.items():
+        if 0 < value < _NO_PRESSURE:
+            yield (
+                f"{name} is {value:g} Pa, {1e3 * head_of(value, case.fluid.density):.2g} mm of the fluid; a number "
+                f'alone is in Pa, give "{value:g} m" or "{value:g} kPa".'
+            )
+
+
+def oddities(case: Case) -> Iterator[str]:
+    """Sentences on keys that are allowed and seldom meant: half widths that are whole, degrees that are radians."""
+    flat, half = 0.5 * np.pi * case.valve.inlet_radius, case.valve.lip_half_width
+    if half > flat and not case.valve.key_points:
+        yield (
+            f"valve.lip_half_width is {1e3 * half:.4g} mm, while the pipe pressed flat is {2e3 * flat:.4g} mm wide in "
+            "all; it is half the width of the bill."
+        )
+    bore, pipe = 2.0 * case.valve.inlet_radius, case.upstream.diameter
+    if case.has_line and not case.upstream.pieces and pipe is not None and not 0.5 < pipe / bore < 2.0:
+        yield f"upstream.diameter is {1e3 * pipe:.4g} mm before a valve of {1e3 * bore:.4g} mm."
+    for i, layer in enumerate(case.layers):
+        if 0 < abs(layer.angle) <= np.pi and layer.angle % 1:
+            yield f'layers.{i}.angle is {layer.angle:g} degrees; radians are given as "{layer.angle:g} rad".'
 
 
 def _pascal(pressure: float) -> str:

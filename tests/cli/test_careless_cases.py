@@ -35,13 +35,19 @@ CARELESS = [
     (["layers.0.material=rubber"], "rubber"),
     (["damping.model=structural"], "damping.model"),
     (["materials.strain_level=200 %"], "strain_level"),
-    (["materials.CR.hardness=120 Shore A"], "hardness"),
+    (["materials.CR.hardness=120 Shore A"], "20 to 80 Shore A"),
+    (["materials.CR.hardness=60 Shore D"], "60 Shore D"),
     (["mesh.around=0"], "mesh.around"),
     (["upstream.length=-1 m"], "upstream.length"),
     (["upstream.length=30 m", "upstream.wave_speed=1000 m/s", "fluid.unsteady=false"], "wave_speed"),
     (["sweep.over=density=10:1:5"], "start is not below"),
     (["onset.over=pressure=1 kPa:2 kPa"], "not of that form"),
     (["steady.pressures=[]"], "steady.pressures"),
+    (["drive.pressure=2"], "a number alone is in Pa"),
+    (["closure.rated_pressure=5"], "a number alone is in Pa"),
+    (["drive.pressure=3 m", "downstream.pressure=2 m", "report.heads=1 m:3 m:3"], "report.heads begin at 1 m"),
+    (["layers.0.material=EPMD"], "the nearest is EPDM"),
+    (["outside.depth=3 m"], "downstream.pressure"),
 ]
 
 
@@ -60,12 +66,39 @@ def test_one_sentence_for_a_careless_case(command_line, one_sentence, changes, w
         ("modes", "--set", "downstream.pressure=30 kPa"),
         ("steady", "-p", "1 m", "--set", "downstream.pressure=2 m"),
         ("map", "--x", "density=1:100:3:log", "--y", "alpha=1:2:2", "--set", "downstream.pressure=30 kPa"),
+        ("map", "--x", "pressure=1:4:3", "--y", "density=1:1000:3:log"),
+        ("report", "--set", "drive.pressure=1 m", "--set", "downstream.pressure=2 m"),
+        ("report", "-o", "my.pdf"),
     ],
 )
 def test_studies_refuse_contradictions_before_they_solve(command_line, one_sentence, monkeypatch, arguments):
     monkeypatch.setattr(Session, "settle", lambda *_: pytest.fail("levels were settled"))
     outcome = command_line(*arguments)
     assert outcome.status == 2 and one_sentence(outcome.err.replace("; ", ", ")), outcome
+
+
+@pytest.mark.parametrize(
+    "changes, word",
+    [
+        (["valve.lip_half_width=250 mm"], "half the width of the bill"),
+        (["layers.2.angle=0.785"], "0.785 rad"),
+        (["upstream.length=30 m", "upstream.diameter=45 mm"], "45 mm before a valve of 278"),
+    ],
+)
+def test_what_is_seldom_meant_is_noted(command_line, changes, word):
+    outcome = command_line("case", *(f"--set={change}" for change in changes))
+    assert outcome.status == 0 and word in outcome.out
+
+
+def test_a_rubber_by_its_hardness():
+    keys = [
+        'layers=[{material="tube", thickness=0.01}]',
+        "materials.tube.density=1200",
+        "materials.tube.loss_factor=0.1",
+    ]
+    cards = [load_case(None, [*keys, f"materials.tube.hardness={given}"]) for given in ("60", "60 Shore A")]
+    cards += [load_case(None, [*keys, "materials.tube.kind=neo-hookean", 'materials.tube.shear_modulus="60 Shore A"'])]
+    assert cards[0] == cards[1] == cards[2]
 
 
 def test_a_case_that_fits(command_line):
