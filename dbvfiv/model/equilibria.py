@@ -138,11 +138,11 @@ class LoadPath(LoadSteps):
     @property
     def follows_curve(self) -> bool:
         """True where one pressure may have several equilibria: of a bill that is moulded shut, whose faces part, and
-        of a wall that is pressed from outside, which may snap.
+        of a wall that is pressed from outside, which may snap, unless load steps refuse its jumps.
         """
         drive = self.model.case.drive
         outside = drive.kind == "uniform" and drive.side == "outside" and self.model.weight is None
-        return self.model.case.valve.is_preset or outside
+        return self.model.case.valve.is_preset or (outside and not np.isfinite(self.options.largest_jump))
 
     @property
     def curve(self) -> LoadCurve:

@@ -12,6 +12,9 @@ from ..errors import SolveError
 from ..observer import Observer
 from .newton import EquilibriumSolver, NewtonOptions, NewtonResult
 
+#: Farthest that an equilibrium of a wall that may snap lies from its prediction, over the mean wall thickness.
+LARGEST_JUMP = 0.15
+
 
 @dataclass(frozen=True)
 class LoadStepOptions:

@@ -11,7 +11,7 @@ As Eq. 7.1 asks for the largest strain, the next level of a rubber is the peak o
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -21,6 +21,7 @@ from ..case.model import Case
 from ..errors import SolveError
 from ..observer import Observer
 from .equilibria import LoadPath, SteadyOptions, operating_pressure
+from .load_steps import LARGEST_JUMP
 from .material_stability import LayerLevel, layer_levels
 from .state import SteadyState
 from .valve import ValveModel
@@ -35,6 +36,8 @@ DIGITS = 3
 FIRST_LEVEL = 0.20
 #: Smallest load step over the target, and how often a target that is not reached is halved.
 SMALLEST_STEP, HALVINGS = 1 / 256, 4
+#: Load steps to a back pressure at least; as many again in the first of them.
+CLOSED_STEPS = 20
 #: A valve under back pressure, its inner faces in contact. On the 12-inch valve at 28 kPa its strains are within
 #: 0.3 % of those of the closure study, which brings the penetration of this penalty to nothing.
 CLOSED = {
@@ -218,7 +221,7 @@ class _Load:
         model = ValveModel(case.replace(self.changes) if self.changes else case)
         start, self.state = self.path if self.state is not None else None, None
         while self.state is None and self.halved <= self.lower:
-            self.path = LoadPath(model, SteadyOptions.of(model.case), observer=self.observer)
+            self.path = LoadPath(model, self._options(model), observer=self.observer)
             try:
                 if start is not None:
                     self.path.q, self.path.pressure = start.q, start.pressure
@@ -229,6 +232,14 @@ class _Load:
                     self.missed, self.halved = self.missed or error, self.halved + 1
                 start = None
         return list(layer_levels(model, model.rest() if self.state is None else self.state.q, levels))
+
+    def _options(self, model: ValveModel) -> SteadyOptions:
+        """Load steps that end where a closed wall snaps: what lies beyond strains it, and no study goes there."""
+        options = SteadyOptions.of(model.case)
+        if not self.changes:
+            return options
+        largest, jump = self._target(model) / CLOSED_STEPS, LARGEST_JUMP * float(np.mean(model.mesh.thickness))
+        return replace(options, first_step=largest / CLOSED_STEPS, max_step=largest, largest_jump=jump)
 
     def _target(self, model: ValveModel) -> float:
         """Pressure of this round, Pa: halves of what is above that at rest."""

@@ -368,8 +368,10 @@ def follow_past_limits(
     target: float,
     tolerance: float = 1e-8,
     observer: Observer | None = None,
+    past_limits: bool = True,
 ) -> LimitPath:
-    """Follow equilibria from a state by pseudo-arclength until the pressure is `target`, or falls to zero.
+    """Follow equilibria from a state by pseudo-arclength until the pressure is `target`, or falls to zero, or to the
+    first limit point alone.
 
     Raises
     ------
@@ -388,6 +390,7 @@ def follow_past_limits(
         branch_points=False,
         newton=ContinuationNewton(tolerance=tolerance),
         max_angle=0.5,
+        stop_at=frozenset() if past_limits else frozenset({"fold"}),
     )
 
     def report(branch, *rest):

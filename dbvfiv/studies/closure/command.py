@@ -75,7 +75,9 @@ class Keys(Section):
         le=1,
     )
     arclength: StrictBool = key(
-        True, "Go on along the equilibrium path by arclength when load steps end at a limit point."
+        True,
+        "Go on along the equilibrium path by arclength when load steps end at a limit point; false ends there, with "
+        "that point located.",
     )
     measured: Annotated[tuple[Path, ...], MEASURED_FILES] = key(
         (),

@@ -88,7 +88,7 @@ def find_safety(result: StudyResult) -> SafetyFactor | None:
     else:
         crossed = np.array([point.overlap > CROSSED * closure.penetration for point in rising])
         limits += [(at, CROSSING) for at in _last_before(rising, crossed)]
-    if result.walk_failure is not None:
+    if result.walk_failure is not None and not result.buckling:
         limits.append((followed, END))
     if not limits:
         return SafetyFactor(followed / rated, True, None, None, rated, followed, held)
@@ -127,6 +127,11 @@ def rated_sentence(result: StudyResult) -> str | None:
     if told is None:
         return None
     begin = f"Rated back pressure {told['pressure'] / 1e3:.6g} kPa:"
+    at = told["buckles_at"]
+    if not told["examined"] and at is not None and at < told["pressure"]:
+        return (
+            f"{begin} not reached, as the wall buckles at {at / 1e3:.6g} kPa, {at / told['pressure']:.2g} times that."
+        )
     if not told["examined"]:
         return f"{begin} not examined; {result.walk_failure or 'it is not among closure.pressures.'}"
     seal = "sealing not examined, as the supports hold the lips shut"
@@ -135,7 +140,6 @@ def rated_sentence(result: StudyResult) -> str | None:
         still = " at most, as fluid.viscosity is none" if ideal else ""
         seal = f"{'shut' if told['shut'] else 'open'}, leak {told['leak'] * 3.6e6:.3g} L/h{still}"
         seal = "sealed, leak 0 L/h" if told["sealed"] else seal
-    at = told["buckles_at"]
     buckles = (
         f"no buckling up to {told['examined_to'] / 1e3:.6g} kPa" if at is None else f"buckles at {at / 1e3:.6g} kPa"
     )

@@ -17,7 +17,7 @@ from continuation import NotConverged
 
 from ...errors import SolveError
 from ...model.equilibria import model_warnings, state_warnings
-from ...model.load_steps import LoadStepOptions, LoadSteps
+from ...model.load_steps import LARGEST_JUMP, LoadStepOptions, LoadSteps
 from ...model.newton import NewtonOptions, NewtonResult
 from ...model.symmetry import ALL, symmetries_of, symmetry_named
 from ...record.record import GrowingRecord, Record
@@ -39,14 +39,15 @@ STATES, PATH, BUCKLING, COMPARED = "states", "path", "buckling", "compared_"
 LOWEST, BUCKLED_CLASS = "class stiffness", "class buckling"
 #: Most stiffness eigenvalues that are followed; the largest value of closure.eigenvalues.
 MOST_EIGENVALUES = 100
-#: Farthest that an equilibrium may lie from its prediction, over the mean wall thickness.
-LARGEST_JUMP = 0.15
 #: Renewals of the multipliers before giving up.
 MOST_UPDATES = 40
 #: Overlap of the inner faces over the penetration that is left, from which on the faces count as crossed.
 CROSSED = 10.0
-#: Smallest load step over the target pressure, and largest load step over the first from rest, where the lips meet.
-MIN_STEP, FIRST_SHARE = 1e-5, 20
+#: Smallest load step over the target pressure, and of a walk that ends at its limit point, which arclength locates from
+#: there: each halving beside a limit point costs two Newton runs that fail.
+MIN_STEP, MIN_STEP_TO_LIMIT = 1e-5, 1e-3
+#: Largest load step over the first from rest, where the lips meet.
+FIRST_SHARE = 20
 
 
 def void_rows(record: GrowingRecord, table: str, first: int) -> None:
@@ -86,7 +87,8 @@ class ClosureWalk:
         closure, steady, pressed = model.case.closure, model.case.steady, model.pressed
         jump = LARGEST_JUMP * float(np.mean(model.mesh.thickness))
         newton = NewtonOptions(steady.tolerance, steady.max_iterations)
-        options = LoadStepOptions(newton, MIN_STEP, closure.max_step / FIRST_SHARE, closure.max_step, jump)
+        smallest = MIN_STEP if closure.arclength else MIN_STEP_TO_LIMIT
+        options = LoadStepOptions(newton, smallest, closure.max_step / FIRST_SHARE, closure.max_step, jump)
         self.steps = LoadSteps(pressed, options, observer=record, accepted=self._accept)
         self.watches = {name: BucklingWatch(pressed, options, watch) for name, watch in self._spectra().items()}
         self.own = next(iter(self.watches.values()))
@@ -148,9 +150,6 @@ class ClosureWalk:
             way = steps.reach(target)
             last, iterations, count = way.result, way.iterations, way.steps
         except SolveError as error:
-            if not self.model.case.closure.arclength:
-                self._keep_before_limit(steps.pressure, steps.q)
-                raise
             self._go_past_limit(target, error)
             last = steps.settle()
         updates = 0
@@ -188,17 +187,27 @@ class ClosureWalk:
         return spectrum
 
     def _go_past_limit(self, target: float, error: SolveError) -> None:
-        """Arclength from the last equilibrium to the target pressure."""
-        steps, pressed = self.steps, self.model.pressed
+        """Arclength from the last equilibrium to the target pressure, or to the first limit point where it is to end.
+
+        Raises
+        ------
+        SolveError
+        """
+        steps, pressed, goes_on = self.steps, self.model.pressed, self.model.case.closure.arclength
         start, q = steps.pressure, steps.q
         self.record.progress(f"arclength from {start:.6g} Pa")
         try:
-            path = follow_past_limits(pressed, q, start, target, steps.options.newton.tolerance, self.record)
+            path = follow_past_limits(pressed, q, start, target, steps.options.newton.tolerance, self.record, goes_on)
         except NotConverged as reason:
             self._keep_before_limit(start, q)
             raise SolveError(f"{error} Arclength did not get under way either: {reason}") from reason
-        for pressure, place in path.points[1:]:
-            self._keep_point(pressure, place, np.nan, arclength=True)
+        rising = path.limits and not goes_on
+        for pressure, place in path.points[1:-1] if rising else path.points[1:]:
+            if rising:
+                self._watch(pressure, place, point=True)
+                start, q = pressure, place
+            else:
+                self._keep_point(pressure, place, np.nan, arclength=True)
             self.energy.add(place, pressure, refine=False)
         self.own.found.extend(path.limits)
         self._keep_buckling()
@@ -209,6 +218,10 @@ class ClosureWalk:
             watch.forget()
         steps.pressure, steps.q = path.points[-1]
         steps.slope = None
+        if rising:
+            raise SolveError(
+                f"The wall has a limit point at {path.limits[0].pressure:.6g} Pa: beyond it no equilibrium is near."
+            )
         if not path.reached:
             raise SolveError(
                 f"{error} Arclength ended at {steps.pressure:.6g} Pa after {len(path.points)} points ({path.reason})."

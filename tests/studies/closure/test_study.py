@@ -150,17 +150,19 @@ def test_stiffness_is_followed_at_every_step(pressed):
 
 
 @pytest.mark.slow
-def test_a_pressure_that_is_not_reached_ends_the_list(case):
-    """Without arclength a thin wall ends at its limit point, and says where."""
-    thin = case.replace({"valve.thickness_factor": 0.25, "closure.arclength": False, "closure.max_step": "0.5 kPa"})
-    result = closure(thin, [200.0, 28e3, 29e3])
-    assert len(result.failures) == 1 and "No equilibrium was found between" in result.failures[0]
+def test_without_arclength_a_walk_ends_at_its_limit_point(case):
+    """A thin wall ends where arclength finds its first limit point, and says where."""
+    thin = case.replace({"valve.thickness_factor": 0.25, "closure.max_step": "0.5 kPa"})
+    result = closure(thin.replace({"closure.arclength": False}), [200.0, 28e3, 29e3])
+    limit, last = result.buckling[0], result.before_limit
+    assert len(result.failures) == 1 and "limit point" in result.failures[0]
     assert [state.pressure for state in result.states] == [200.0]
     assert "1 of 3 back pressures were reached" in result.shortfall()
-    last = result.before_limit
-    assert last.pressure == result.walk[-1].pressure > 200.0 and last.converged
+    assert result.walk[-1].pressure == last.pressure and 200.0 < last.pressure < limit.pressure and last.converged
+    assert limit.kind == "limit point" and limit.pressure - last.pressure < 0.01 * limit.pressure
     assert any(line.endswith("last before the limit") for line in result.lines())
-    assert result.safety.limit == "end of the path" and result.safety.limit_pressure == last.pressure
+    assert (result.safety.limit, result.safety.limit_pressure) == ("buckling", limit.pressure)
+    assert abs(limit.eigenvalue) < 1e-3 * result.walk[0].lowest_eigenvalue
 
 
 def test_an_interrupt_keeps_what_was_found(case):
