@@ -100,10 +100,13 @@ class Parameter:
         """Limits of the case's key, as `section.key` takes them."""
         return {"ge" if self.low_included else "gt": self.low, "le": self.high}
 
+    def amount(self, value: float) -> str:
+        """A value with its unit, "6 kPa"."""
+        return f"{value / self.scale:g} {self.shown_unit}".strip()
+
     def text(self, value: float) -> str:
         """A value for people, "6 kPa" or "α = 5 1/s"."""
-        shown = f"{value / self.scale:g} {self.shown_unit}".strip()
-        return f"{self.symbol} = {shown}" if self.symbol else shown
+        return f"{self.symbol} = {self.amount(value)}" if self.symbol else self.amount(value)
 
 
 _PER_SECOND, _SECONDS, _METRES = Quantity("1/s", "1/s"), Quantity("s", "s"), Quantity("m", "m")

@@ -150,6 +150,14 @@ class Units:
         title = " ".join(name if word == unit else word for word in words)
         return replace(column, shown=replace(shown, unit=title, width=max(shown.width, len(title)), write=write))
 
+    def label(self, text: str) -> tuple[str, float]:
+        """Label of an axis, "Back pressure, kPa", in these units, and the factor on the numbers of that axis."""
+        name, comma, unit = text.rpartition(", ")
+        if not comma or unit not in self._changed or (unit == "m" and "head" not in name.lower()):  # of pipes
+            return text, 1.0
+        shown, ratio = self._changed[unit]
+        return f"{name}, {shown}", ratio
+
     def say(self, sentence: str) -> str:
         """A sentence with its numbers in these units, with one digit less than they had."""
         for unit, (name, ratio) in self._changed.items():

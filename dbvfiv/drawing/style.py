@@ -15,10 +15,12 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.colorbar import Colorbar
 from matplotlib.figure import Figure
 from matplotlib.patheffects import withStroke
-from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
+from matplotlib.text import Text
+from matplotlib.ticker import FuncFormatter, Locator, LogLocator, MaxNLocator, NullFormatter
 
 from ..case.model import Case
 from ..case.parameters import PARAMETERS
+from ..case.units import Units
 from ..errors import CaseError, as_path
 
 #: Colours of things that recur.
@@ -164,10 +166,39 @@ def limits(values: Sequence[float], log: bool = False) -> tuple[float, float]:
     return (0.5 * low, 2.0 * low) if log else (low - 0.5 * (abs(low) or 1.0), low + 0.5 * (abs(low) or 1.0))
 
 
+class _InUnit(Locator):
+    """Ticks at round numbers of another unit than that of the data, `ratio` of it to one of theirs."""
+
+    def __init__(self, ticks: Locator, ratio: float):
+        self._ticks, self._ratio = ticks, ratio
+
+    def __call__(self) -> np.ndarray:
+        return self.tick_values(*self.axis.get_view_interval())
+
+    def tick_values(self, vmin: float, vmax: float) -> np.ndarray:
+        return np.asarray(self._ticks.tick_values(vmin * self._ratio, vmax * self._ratio)) / self._ratio
+
+
+def put_in_units(figure: Figure, units: Units) -> Figure:
+    """Let the axes and words of a figure, drawn in the units of tables, speak those of a case."""
+    for text in figure.findobj(Text):
+        text.set_text(units.say(text.get_text()))
+    for axis in (axis for axes in figure.axes for axis in axes._axis_map.values()):
+        label, ratio = units.label(axis.get_label_text())
+        axis.set_label_text(label)
+        if ratio != 1.0 and not isinstance(axis.get_major_locator(), _InUnit):
+            ticks = MaxNLocator(6) if axis.get_scale() == "linear" else axis.get_major_locator()
+            axis.set_major_locator(_InUnit(ticks, ratio))
+            axis.set_major_formatter(lambda value, _, ratio=ratio: f"{value * ratio:.4g}")
+    return figure
+
+
 FORMATS = ("png", "svg")
 
 
-def draw_figures(drawers: Mapping[str, Callable[[], Figure]], only: Sequence[str], whose: str) -> dict[str, Figure]:
+def draw_figures(
+    drawers: Mapping[str, Callable[[], Figure]], only: Sequence[str], whose: str, units: Units | None = None
+) -> dict[str, Figure]:
     """Figures by name.
 
     Parameters
@@ -177,6 +208,8 @@ def draw_figures(drawers: Mapping[str, Callable[[], Figure]], only: Sequence[str
         Names of those wanted; all without it.
     whose : str
         For messages, "steady result of 'dbv12'".
+    units : Units, optional
+        That axes and words are to have.
 
     Raises
     ------
@@ -189,7 +222,8 @@ def draw_figures(drawers: Mapping[str, Callable[[], Figure]], only: Sequence[str
         if name not in drawers:
             raise CaseError(f"There is no figure {name!r} of this result; it has {', '.join(drawers)}.")
     with style():
-        return {name: drawer() for name, drawer in drawers.items() if not only or name in only}
+        drawn = {name: drawer() for name, drawer in drawers.items() if not only or name in only}
+        return drawn if units is None else {name: put_in_units(figure, units) for name, figure in drawn.items()}
 
 
 def write_figures(figures: Mapping[str, Figure], folder: str | Path = ".", format: str = "png") -> list[Path]:

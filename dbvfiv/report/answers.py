@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from ..materials.shipped import shipped_loss, shipped_loss_names
-from ..studies.closure.safety import rated_verdict
+from ..studies.closure.safety import BUCKLING, CROSSING, END, SEAL, rated_verdict
 from .gather import Gathered, second_mesh
 
 YES, NO, UNKNOWN = "yes", "no", "not examined"
@@ -190,7 +190,7 @@ def loss_range(case) -> tuple[float, float] | None:
 
 
 def closes(found: Gathered) -> Answer:
-    """Answer on closing: shut at every back pressure examined that is not beyond a limit."""
+    """Answer on closing: shut at every back pressure examined up to the rated one, or to where the wall gives way."""
     result, question, units = found.get("closure"), "Does it close under back pressure?", found.case.units
     if result is None or not result.states:
         return Answer(question, UNKNOWN, found.why("closure") if result is None else _first(result.failures))
@@ -199,10 +199,11 @@ def closes(found: Gathered) -> Answer:
     if not states:
         return Answer(question, UNKNOWN, _first(result.failures))
     shut = [s.pressure for s in states if s.closed]
-    text = f"Shut at {units.pressure(shut[0], 3)}" if shut else f"Open up to {units.pressure(states[-1].pressure, 3)}"
-    text += f" and at {len(shut) - 1} more back pressures up to {units.pressure(shut[-1], 3)}" if len(shut) > 1 else ""
+    text = f"Shut at {listed(units.pressure(p, 3) for p in shut)}" if shut else "Open"
+    collapse = _collapse(result, rated)
+    text += f"{'' if shut else ' up to ' + units.pressure(states[-1].pressure, 3)}; {collapse}" if collapse else ""
     answer = YES if shut and states[-1].closed else NO
-    return Answer(question, answer, text + ".", _margin(result, units), _closure_mesh(found))
+    return Answer(question, answer, text + ".", _margin(result), _closure_mesh(found))
 
 
 def seals(found: Gathered) -> Answer:
@@ -213,11 +214,9 @@ def seals(found: Gathered) -> Answer:
         return Answer("Does it seal?", UNKNOWN, "No rated back pressure is given: closure.rated_pressure.")
     question = f"Does it seal at its rated {case.units.pressure(rated, 3)}?"
     told = None if result is None else rated_verdict(result)
-    beyond = None if result is None else _limit_below(result, rated)
-    if beyond is not None:
-        at = case.units.pressure(beyond, 3)
-        text = f"The wall collapses at {at}, below the rated back pressure."
-        return Answer(question, NO, text, _margin(result, case.units), _closure_mesh(found))
+    collapse = None if result is None else _collapse(result, rated)
+    if collapse:
+        return Answer(question, NO, f"{collapse[0].upper()}{collapse[1:]}.", _margin(result), _closure_mesh(found))
     if told is None or told["sealed"] is None:
         why = (
             found.why("closure") if result is None else result.walk_failure or "The lips are held shut by the supports."
@@ -225,64 +224,59 @@ def seals(found: Gathered) -> Answer:
         return Answer(question, UNKNOWN, why)
     still = " at most, as fluid.viscosity is none" if told["leak"] and not case.fluid.dynamic_viscosity else ""
     text = f"{_seal(told).capitalize()}, leak {told['leak'] * 3.6e6:.3g} L/h{still}."
-    if told["buckles_at"] is not None:
-        text += f" It buckles at {case.units.pressure(told['buckles_at'], 3)}."
-    return Answer(question, YES if told["sealed"] else NO, text, _margin(result, case.units), _closure_mesh(found))
+    return Answer(question, YES if told["sealed"] else NO, text, _margin(result), _closure_mesh(found))
 
 
-#: Part of the stiffness at the start below which a path that ends has come to its limit point.
-_SPENT = 0.1
+def _collapse(result, rated: float) -> str:
+    """Clause on a wall that gives way below a back pressure, Pa; empty where it does not."""
+    at, units = result.critical_pressure, result.case.units
+    if at is None or at >= rated:
+        return ""
+    return f"{_gives_way(result)} at {units.pressure(at, 3)}, below the rated back pressure"
 
 
-def _limit_below(result, rated: float) -> float | None:
-    """Back pressure, Pa, below the rated one at which the wall buckles, or its path ends with its stiffness spent."""
-    buckles = result.critical_pressure
-    if buckles is not None and buckles < rated:
-        return buckles
-    walked = [point for point in result.walk if np.isfinite(point.lowest_eigenvalue)]
-    if result.walk_failure is None or not walked or walked[-1].pressure >= rated:
-        return None
-    spent = walked[-1].lowest_eigenvalue < _SPENT * walked[0].lowest_eigenvalue
-    return walked[-1].pressure if spent else None
+def _gives_way(result) -> str:
+    """Clause on a wall at its critical back pressure: at a limit point it snaps to a state far away."""
+    return "the wall collapses" if result.buckling[0].kind == "limit point" else "the wall buckles"
 
 
 def _seal(told: dict[str, Any]) -> str:
     return "sealed" if told["sealed"] else "shut" if told["shut"] else "open"
 
 
-def _margin(result, units) -> str:
-    safety = result.safety
+#: Limits of a valve under back pressure as a reader meets them.
+_LIMITS = {SEAL: "the seal is lost at", CROSSING: "faces cross at", END: "no state was found beyond"}
+
+
+def _margin(result) -> str:
+    """First limit of a valve under back pressure, in its units and over the rated one."""
+    safety, units = result.safety, result.case.units
     if safety is None:
         return ""
-    if result.case.closure.rated_pressure is None:
-        to = units.pressure(safety.followed_to if safety.at_least else safety.limit_pressure, 3)
-        return f"no limit up to {to}" if safety.at_least else f"{safety.limit} at {to}"
-    least = "at least " if safety.at_least else ""
-    limit = "" if safety.at_least else f", then {safety.limit}"
-    return f"{least}{safety.factor:.2f} times {units.pressure(safety.rated_pressure, 3)}{limit}"
+    times = f", {safety.factor:.2f} times the rated" if result.case.closure.rated_pressure is not None else ""
+    if safety.at_least:
+        return f"no limit up to {units.pressure(safety.followed_to, 3)}{times}"
+    limit = f"{_gives_way(result)} at" if safety.limit == BUCKLING else _LIMITS[safety.limit]
+    return f"{limit} {units.pressure(safety.limit_pressure, 3)}{times}"
 
 
 def _closure_mesh(found: Gathered) -> tuple[str, ...]:
-    other, rated = found.get("mesh-closure"), found.case.closure.rated_pressure
+    other = found.get("mesh-closure")
     if other is None or other.safety is None:
         return (_not_there(found, "mesh", "mesh"),)
     told = rated_verdict(other)
-    seal = "not examined there, " if rated is not None else ""
-    if told is not None and told["sealed"] is not None:
-        seal = f"{_seal(told)}, leak {told['leak'] * 3.6e6:.2g} L/h, "
-    return (f"second mesh ({_mesh(found)}): {seal}{_margin(other, found.case.units)}",)
+    seal = f"{_seal(told)}, leak {told['leak'] * 3.6e6:.2g} L/h, " if told and told["sealed"] is not None else ""
+    return (f"second mesh ({_mesh(found)}): {seal}{_margin(other)}",)
 
 
 def trade(found: Gathered) -> list[tuple[str, str]]:
     """Names and numbers that a buyer asks for, at the largest head."""
     units, case, rows = found.case.units, found.case, []
     state, steady = found.state(found.heads[-1]), found.get("steady")
-    if found.results:
-        mesh = next(iter(found.results.values())).mesh
-        width, height = (units.text_of("size", mesh.extent(0, axis), 4) for axis in (0, 1))
-        rows += [("bill, width x height at the lip", f"{width} x {height}")]
+    sizes = found.sizes
+    bill = " x ".join(units.text_of("size", size, 4) for size in (sizes.bill_width, sizes.bill_height))
     bore = 2 * (case.valve.inlet_radius - case.valve.flange_wall_deduction)
-    rows += [("bore", units.text_of("size", bore, 4))]
+    rows += [("bill, width x height", bill), ("bore", units.text_of("size", bore, 4))]
     if steady is not None and steady.cracking is not None and steady.cracking.pressure is not None:
         rows += [("cracking head", units.pressure(steady.cracking.pressure, 3))]
     if state is not None and state.hydraulics is not None:
@@ -312,7 +306,8 @@ def _verdict(verdict) -> str:
 
 
 def _apart(value: float, base: float) -> str:
-    return f"{100 * (value / base - 1):+.2g} %" if base else "not known"
+    apart = 100 * (value / base - 1) if base else np.nan
+    return "not known" if np.isnan(apart) else f"{apart:+.2g} %" if abs(apart) >= 0.01 else "less than 0.01 %"
 
 
 def _mesh(found: Gathered) -> str:

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import base64
 import io
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass
-from types import MappingProxyType
 
 from matplotlib.figure import Figure
 
-from ..drawing.style import style
+from ..case.units import Units
+from ..drawing.style import put_in_units, style
 
 
 @dataclass(frozen=True)
@@ -80,22 +80,22 @@ class Part:
     listing: tuple[str, ...] = ()
 
 
-def picture(name: str, caption: str, draw: Callable[[], Figure], live: str = "") -> Picture:
-    """A picture from a function that draws a figure in the program's style."""
+def picture(name: str, caption: str, draw: Callable[[], Figure], live: str = "", units: Units | None = None) -> Picture:
+    """A picture from a function that draws a figure in the program's style, in units of choice."""
     with style():
         figure = draw()
+        if units is not None:
+            put_in_units(figure, units)
         written = io.BytesIO()
         figure.savefig(written, format="png", dpi=110)
     return Picture(name, caption, written.getvalue(), live)
 
 
-def pictures_of(
-    result, captions: dict[str, str], live: Mapping[str, str] = MappingProxyType({}), **choices
-) -> tuple[Picture, ...]:
-    """Pictures of a result by the names of its figures; those that it does not have are left out."""
-    drawers = dict(result.drawers(**choices))
+def pictures_of(result, captions: dict[str, str]) -> tuple[Picture, ...]:
+    """Pictures of a result by the names of its figures, in its units; those that it does not have are left out."""
+    drawers = dict(result.drawers())
     return tuple(
-        picture(name, caption, drawers[name], live.get(name, ""))
+        picture(name, caption, drawers[name], units=result.case.units)
         for name, caption in captions.items()
         if name in drawers
     )

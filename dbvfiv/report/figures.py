@@ -1,4 +1,7 @@
-"""Figures of a report, in the units of its case: head loss and opening over flow, vibration over head and pipe."""
+"""Figures of a report: head loss and opening over flow, vibration over head and pipe, the wall under back pressure.
+
+They are drawn in the units of tables, and put into those of the case like every other figure.
+"""
 
 from __future__ import annotations
 
@@ -12,16 +15,14 @@ from .gather import Gathered
 
 def headloss_figure(found: Gathered) -> Figure:
     """Head loss and opening over the flow."""
-    units = found.case.units
     states = [s for s in sorted(found.get("steady").states, key=lambda s: s.pressure) if s.hydraulics is not None]
-    flow = [s.volume_flow / units.factor("flow") for s in states]
+    flow = [1e3 * s.volume_flow for s in states]
     figure = new_figure(8.4, 3.1)
     loss, opening = figure.subplots(1, 2)
-    loss.plot(flow, [s.hydraulics.head_loss / units.factor("head") for s in states], "o-", color=COMPUTED)
-    opening.plot(flow, [s.lip_opening / units.factor("size") for s in states], "o-", color=COMPUTED)
-    for axes, name, quantity in ((loss, "Head loss", "head"), (opening, "Opening", "size")):
-        axes.set_xlabel(f"Flow, {units.name('flow')}")
-        axes.set_ylabel(f"{name}, {units.name(quantity)}")
+    loss.plot(flow, [s.hydraulics.head_loss for s in states], "o-", color=COMPUTED)
+    opening.plot(flow, [1e3 * s.lip_opening for s in states], "o-", color=COMPUTED)
+    for axes, name in ((loss, "Head loss, m"), (opening, "Opening, mm")):
+        axes.set(xlabel="Flow, L/s", ylabel=name)
         axes.set_xlim(left=0)
         axes.set_ylim(bottom=0)
     return figure
@@ -29,8 +30,8 @@ def headloss_figure(found: Gathered) -> Figure:
 
 def vibration_figure(found: Gathered) -> Figure:
     """Least damping ratio over the head, and the factor on the damping of the wall at which chatter begins."""
-    row, verdicts = found.case.units.parameter("pressure"), {p: r.verdict for p, r in found.modes.items()}
-    head = np.array(list(verdicts)) / row.scale
+    verdicts = {p: r.verdict for p, r in found.modes.items()}
+    head = np.array(list(verdicts)) / 1e3
     figure = new_figure(8.4, 3.3)
     ratio, factor = figure.subplots(1, 2)
     damping = np.array([100 * v.damping_ratio for v in verdicts.values()])
@@ -42,7 +43,7 @@ def vibration_figure(found: Gathered) -> Figure:
     ratio.set_ylabel("Damping ratio of the least damped mode, %")
     _factors(found, factor, head, [v.critical_damping_factor for v in verdicts.values()])
     for axes in (ratio, factor):
-        axes.set_xlabel(f"Head, {row.shown_unit}" if found.case.units.heads else f"Inlet pressure, {row.shown_unit}")
+        axes.set_xlabel("Head, kPa" if found.case.units.heads else "Inlet pressure, kPa")
         axes.set_xlim(left=0)
     return figure
 
@@ -92,17 +93,16 @@ def pipe_figure(found: Gathered, sweeps: dict) -> Figure:
 
 def closure_figure(result) -> Figure:
     """Sealed length and largest displacement, and the lowest stiffness of the wall, over the back pressure."""
-    units, walk = result.case.units, [point for point in result.walk if not point.arclength]
-    at = np.array([point.pressure for point in walk]) / units.factor("pressure")
+    walk = [point for point in result.walk if not point.arclength]
+    at = np.array([point.pressure for point in walk]) / 1e3
     figure = new_figure(8.4, 3.1)
     shape, stiffness = figure.subplots(1, 2)
     for name, label, colour in (
         ("sealed_length", "sealed length", COMPUTED),
         ("max_displacement", "largest displacement", PUBLISHED),
     ):
-        values = [getattr(point, name) / units.factor("size") for point in walk]
-        shape.plot(at, values, color=colour, label=label)
-    shape.set_ylabel(f"Length, {units.name('size')}")
+        shape.plot(at, [1e3 * getattr(point, name) for point in walk], color=colour, label=label)
+    shape.set_ylabel("Length, mm")
     shape.legend(loc="best", fontsize=8)
     lowest = np.array([point.lowest_eigenvalue for point in walk])
     known = np.isfinite(lowest)
@@ -111,8 +111,8 @@ def closure_figure(result) -> Figure:
     stiffness.set_ylabel("Lowest stiffness of the wall\nover that at the start, %")
     rated = result.case.closure.rated_pressure
     for axes in (shape, stiffness):
-        axes.set_xlabel(f"Back pressure, {units.name('pressure')}")
+        axes.set_xlabel("Back pressure, kPa")
         axes.set_xlim(left=0)
         if rated is not None:
-            axes.axvline(rated / units.factor("pressure"), color="0.2", lw=1.0, ls="--")
+            axes.axvline(rated / 1e3, color="0.2", lw=1.0, ls="--")
     return figure

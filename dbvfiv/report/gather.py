@@ -7,7 +7,6 @@ and two strain levels on it, say how sure the answers are.
 from __future__ import annotations
 
 import os
-import re
 import sys
 import time
 from collections.abc import Callable, Iterator
@@ -21,11 +20,12 @@ from typing import Any
 import numpy as np
 
 from ..case.parameters import Mu
-from ..effects import with_effect
+from ..effects import with_effect, without_numbers
 from ..errors import CaseError, SolveError
+from ..model.sizes import ValveSizes
 from ..observer import Observer, is_watched
 from ..studies.case import Case
-from ..studies.session import Session, kept_run
+from ..studies.session import Session, kept_run, load_result
 from ..studies.stability.place import why_it_moves
 
 #: What a report can leave out.
@@ -79,6 +79,7 @@ class Gathered:
     name : str
     heads : tuple of float, Pa
         Pressures at which the valve was examined.
+    sizes : ValveSizes
     results : dict of StudyResult
     missing : dict of str
         Runs that gave no result, and why, in a sentence.
@@ -86,15 +87,19 @@ class Gathered:
         Those among them that were left out, or have nothing to say of this valve.
     seconds : float
         Processor time that it took.
+    levels : str
+        Strain levels that were settled, in a sentence.
     """
 
     case: Case
     name: str
     heads: tuple[float, ...]
+    sizes: ValveSizes
     results: dict[str, Any] = field(default_factory=dict)
     missing: dict[str, str] = field(default_factory=dict)
     not_asked: set[str] = field(default_factory=set)
     seconds: float = 0.0
+    levels: str = ""
 
     def get(self, name: str) -> Any:
         """A result by the name of its run; None without one."""
@@ -287,7 +292,8 @@ def gather(
         bar.expect([Run("settled", "levels", "strain levels", {}, 12)])
         session = session.settle(bar.of("settled"))
         bar.done("settled")
-    found = Gathered(session.case, name, heads_of(session.case))
+    sizes = ValveSizes.of(session.described)
+    found = Gathered(session.case, name, heads_of(session.case), sizes, levels=str(session.settled or ""))
     found.missing = dict.fromkeys(leave_out, "It was left out.")
     found.not_asked = set(leave_out)
     studies = _Studies(found, session, folder, workers, bar)
@@ -338,7 +344,8 @@ class _Studies:
 
     def _make(self, run: Run) -> None:
         try:
-            result = kept_run(run.kind, self._asked(run), self._path(run), self.bar.of(run.name))
+            kept_run(run.kind, self._asked(run), self._path(run), self.bar.of(run.name))
+            result = load_result(self._path(run))  # without the model, which holds as much memory as all results
             self.found.results[run.name] = result
             for sentence in result.warnings if is_on_own_mesh(run.name) else ():
                 self.bar.warn(sentence)
@@ -439,7 +446,7 @@ class Bar:
 
     def warn(self, sentence: str) -> None:
         """Print a warning, once a report."""
-        kind = re.sub(r"[\d.]+", "#", sentence)  # the same at another head is the same warning
+        kind = without_numbers(sentence)
         if kind not in self._warned:
             self._warned.add(kind)
             if self._bar is not None:

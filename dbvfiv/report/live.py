@@ -11,6 +11,7 @@ from plotly.offline import get_plotlyjs
 from ..drawing.views import ValveSkin
 
 if TYPE_CHECKING:
+    from ..case.units import Units
     from ..studies.state import State
 
 _LAYOUT = {
@@ -27,13 +28,14 @@ def library() -> str:
     return get_plotlyjs()
 
 
-def valve(state: State) -> str:
+def valve(state: State, units: Units) -> str:
     """The deformed valve in space, coloured by its displacement."""
+    mm, size = units.name("size"), 1.0 / units.factor("size")
     skin = ValveSkin.of(state.results.mesh)
-    points = skin.points(state.nodal)[:, [2, 0, 1]] * 1e3
+    points = skin.points(state.nodal)[:, [2, 0, 1]] * size
     quads = skin.quads
     triangles = np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]])
-    size = np.tile(np.linalg.norm(state.nodal[:, :3], axis=1)[skin.valve.node], 2) * 1e3
+    moved = np.tile(np.linalg.norm(state.nodal[:, :3], axis=1)[skin.valve.node], 2) * size
     figure = go.Figure(layout=_LAYOUT | {"height": 420})
     figure.add_mesh3d(
         x=_short(points[:, 0]),
@@ -42,13 +44,13 @@ def valve(state: State) -> str:
         i=triangles[:, 0],
         j=triangles[:, 1],
         k=triangles[:, 2],
-        intensity=_short(size),
+        intensity=_short(moved),
         colorscale="Cividis",
-        colorbar={"title": "Displacement, mm"},
+        colorbar={"title": f"Displacement, {mm}"},
         flatshading=True,
-        hovertemplate="z %{x:.0f} mm, x %{y:.0f} mm, y %{z:.0f} mm<br>displacement %{intensity:.2f} mm<extra></extra>",
+        hovertemplate="z %{x:.3g}, x %{y:.3g}, y %{z:.3g}<br>displacement %{intensity:.3g} " + f"{mm}<extra></extra>",
     )
-    axes = {"xaxis": {"title": "z, mm"}, "yaxis": {"title": "x, mm"}, "zaxis": {"title": "y, mm"}}
+    axes = {f"{axis}axis": {"title": f"{name}, {mm}"} for axis, name in zip("xyz", "zxy")}
     figure.update_scenes(aspectmode="data", camera={"eye": {"x": -1.8, "y": -1.9, "z": 1.1}}, **axes)
     return _html(figure, "valve-live")
 

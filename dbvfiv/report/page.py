@@ -14,9 +14,10 @@ from pathlib import Path
 from jinja2 import Environment, StrictUndefined
 
 from .. import __version__
+from ..case.parameters import OUTSIDE, PARAMETERS
 from ..case.write import case_toml
 from ..errors import CaseError
-from ..studies.stability.place import describe_fixed
+from ..studies.stability.place import fixed_conditions
 from . import live
 from .answers import UNKNOWN, Answer, answers, trade
 from .content import Part, Picture
@@ -120,11 +121,16 @@ def unanswered(found: Gathered) -> tuple[str, ...]:
 def setting(found: Gathered) -> str:
     """Conditions that the report's answers hold for, in a line."""
     case, mesh = found.case, found.case.mesh
-    words = [
-        describe_fixed(case, "pressure"),
-        f"{mesh.around * case.part.quarters} x {mesh.along} elements on a {case.part.name} of the valve",
+    given = fixed_conditions(case, "pressure")
+    flow, outside = (given.pop(name, "") for name in ("storage", OUTSIDE))
+    rows = [(PARAMETERS[name], value) for name, value in given.items() if value]
+    words = [f"{row.title.lower()} {row.amount(value)}" for row, value in rows] + [
+        f"flow model {flow}",
+        *([outside] if outside else []),
     ]
-    return f"At {', '.join(words)}."
+    words += [f"{mesh.around * case.part.quarters} x {mesh.along} elements on a {case.part.name} of the valve"]
+    said = ", ".join(words)
+    return f"{said[0].upper()}{said[1:]}."
 
 
 def _told_once(parts: list[Part]) -> list[Part]:

@@ -6,7 +6,7 @@ import numpy as np
 
 from ..case.parameters import Mu
 from ..drawing.views import deformed, layer_stress, valve_figure
-from ..effects import explained
+from ..effects import explained, without_numbers
 from ..errors import CaseError
 from ..fit.cards import law_from_case
 from ..fit.damping import describe_damping
@@ -27,16 +27,18 @@ def not_there(found: Gathered, part: str, title: str) -> Part:
 
 def first_pictures(found: Gathered) -> tuple[Picture, ...]:
     """Pictures of page one: the valve, and head loss and opening over the flow."""
-    state, pictures = found.state(found.heads[-1]), []
+    state, units, pictures = found.state(found.heads[-1]), found.case.units, []
     if state is not None:
-        caption = f"The valve at {found.case.units.pressure(state.pressure, 3)}, true to scale."
-        pictures.append(picture("valve", caption, lambda: deformed(state), live.valve(state)))
+        caption = f"The valve at {units.pressure(state.pressure, 3)}, true to scale."
+        pictures.append(picture("valve", caption, lambda: deformed(state), live.valve(state, units), units))
         if state.hydraulics is not None:
             caption = "Head loss and opening over the flow."
-            pictures.append(picture("head-loss", caption, lambda: headloss_figure(found)))
+            pictures.append(picture("head-loss", caption, lambda: headloss_figure(found), units=units))
     elif found.results:
         model = next(iter(found.results.values())).model
-        pictures.append(picture("valve", "The valve as the case describes it.", lambda: valve_figure(model)))
+        pictures.append(
+            picture("valve", "The valve as the case describes it.", lambda: valve_figure(model), units=units)
+        )
     return tuple(pictures)
 
 
@@ -60,7 +62,7 @@ def steady_part(found: Gathered) -> Part:
         values = [("pressure", s.pressure, 4), ("flow", s.volume_flow, 4), ("size", s.lip_opening, 3)]
         h = s.hydraulics
         values += [("velocity", s.outlet_velocity, 3), ("head", h.head_loss, 3)] if flowing else []
-        plain = (f"{h.loss_coefficient:.3g}", f"{h.kv:.3g}", f"{h.cv:.3g}") if flowing else ()
+        plain = tuple(map(_plain, (h.loss_coefficient, h.kv, h.cv))) if flowing else ()
         loss = (f"{h.line_loss / units.factor('head'):.3g}",) if flowing and found.case.has_line else ()
         return (*(f"{value / units.factor(name):.{n}g}" for name, value, n in values), *plain, *loss)
 
@@ -73,6 +75,11 @@ def steady_part(found: Gathered) -> Part:
     pictures = pictures_of(result, _MEASURED)
     sentences = () if result.cracking is None else (units.say(result.cracking.sentence(states[-1].pressure)),)
     return Part("steady", _STEADY, sentences, (Table(tuple(head), tuple(map(row, states))),), pictures, trust)
+
+
+def _plain(value: float) -> str:
+    """Three digits of a number, large ones without a power of ten."""
+    return f"{float(f'{value:.3g}'):.0f}" if 1e3 <= abs(value) < 1e9 else f"{value:.3g}"
 
 
 #: Figures of a study that are there where something was measured.
@@ -126,8 +133,7 @@ def heads_part(found: Gathered) -> Part:
     classes = ", ".join(f"{name} ({symmetry_named(name).words})" for name in first.certificates)
     factor = "loss factors" if found.case.damping.relaxes else "stiffness damping"
     sentences = (
-        f"Modes about the steady state at each head, {first.law or 'in vacuo'}, in the fluid of the case, "
-        f"{found.case.fluid.density:g} kg/m3; in all symmetry classes: {classes}.",
+        f"Modes about the steady state at each head, in all symmetry classes: {classes}.",
         f"The factor on the {factor} at which chatter begins is that of motions which open and close the lips; - where "
         "none between 0.05 and 1 makes the valve chatter.",
         *missing,
@@ -136,7 +142,7 @@ def heads_part(found: Gathered) -> Part:
         "Least damping ratio over the head, crosses where the valve chatters; and the factor on the damping of the "
         "wall below which it would."
     )
-    pictures = (picture("vibration", caption, lambda: vibration_figure(found)),)
+    pictures = (picture("vibration", caption, lambda: vibration_figure(found), units=found.case.units),)
     return Part("heads", _HEADS, sentences, (Table(head, tuple(rows)),), pictures, ())
 
 
@@ -168,14 +174,14 @@ def pipe_part(found: Gathered) -> Part | None:
         return not_there(found, "pipe", title) if found.case.has_line and "pipe" not in found.not_asked else None
     units = found.case.units
     lengths = list(next(iter(sweeps.values())).values)
-    head = (f"{_pressure_title(found)}", *(f"L = {length:.3g} m" for length in lengths))
+    head = (f"{_pressure_title(found)}", *(f"pipe of {length:.3g} m" for length in lengths))
     rows = tuple(
         (units.pressure(p, 3), *(f"{v.outcome}, {100 * v.damping_ratio:.2g} %" for v in r.verdicts))
         for p, r in sweeps.items()
     )
     caption = "Least damping ratio over the length of the pipe."
     said = "Verdict and least damping ratio, motions that open and close the lips."
-    pictures = (picture("pipe", caption, lambda: pipe_figure(found, sweeps)),)
+    pictures = (picture("pipe", caption, lambda: pipe_figure(found, sweeps), units=units),)
     return Part(
         "pipe", title, (said,), (Table(head, rows),), pictures, tuple(f for r in sweeps.values() for f in r.failures)
     )
@@ -242,7 +248,7 @@ def closure_part(found: Gathered) -> Part:
         f"largest displacement, {units.name('size')}",
     )
     caption = "Sealed length, largest displacement and stiffness of the wall over the back pressure."
-    curve = picture("closure", caption, lambda: closure_figure(result))
+    curve = picture("closure", caption, lambda: closure_figure(result), units=units)
     sentences = tuple(units.say(line) for line in result.remarks() if not line.startswith("Forces balance"))
     trust = tuple(
         units.say(line) for line in (*result.failures, *(l for l in result.remarks() if l.startswith("Forces")))
@@ -261,7 +267,7 @@ def valve_part(found: Gathered) -> Part | None:
     told = listed(f"{name} {100 * level:.3g} %" for name, level in levels.items())
     size = case.units.text_of("size", float(np.ptp(mesh.z)), 4)
     sentences = [f"{size} long; the wall is {_range(mesh.thickness * 1e3)} mm thick, layers from inside to outside."]
-    sentences += [f"Strain levels of the rubbers: {told}."] if levels else []
+    sentences += [case.units.say(found.levels) or f"Strain levels of the rubbers: {told}."] if levels else []
     tables = (_layers(mesh), *damping)
     caption = "As the case describes it: faces, measures, wall and layers."
     return Part(
@@ -269,7 +275,7 @@ def valve_part(found: Gathered) -> Part | None:
         "The valve",
         tuple(sentences),
         tables,
-        (picture("described", caption, lambda: valve_figure(result.model)),),
+        (picture("described", caption, lambda: valve_figure(result.model), units=found.case.units),),
     )
 
 
@@ -286,7 +292,9 @@ def _damping_table(found: Gathered) -> tuple[Table, ...]:
             f"{found.case.damping.beta:g}",
             *(f"{x:.3g}" for x in report.rayleigh(at)),
         )
-        return (Table(("alpha, 1/s", "beta, s", *(f"damping ratio at {f:g} Hz" for f in at)), (shown,)),)
+        return (
+            Table(("mass damping, 1/s", "stiffness damping, s", *(f"damping ratio at {f:g} Hz" for f in at)), (shown,)),
+        )
     rows = tuple((m.name, *(f"{x:.3g}" for x in report.series(m).loss_factor(at)), m.source) for m in report.materials)
     spread = loss_range(found.case)
     words = "source" if spread is None else f"source; shipped ones range from {spread[0]:.2g} to {spread[1]:.2g} times"
@@ -308,10 +316,11 @@ def _layers(mesh: MeshData) -> Table:
 
 def warnings_part(found: Gathered) -> Part | None:
     """Every warning once, with its effect and the key that mends it."""
-    said = dict.fromkeys(w for name, r in found.results.items() if is_on_own_mesh(name) for w in r.warnings)
+    own = [w for name, result in found.results.items() if is_on_own_mesh(name) for w in result.warnings]
+    said = {without_numbers(w): w for w in reversed(own)}
     if not said:
         return None
-    rows = tuple((found.case.units.say(w), *explained(w)) for w in said)
+    rows = tuple((found.case.units.say(w), *explained(w)) for w in reversed(said.values()))
     return Part("warnings", "Warnings", (), (Table(("warning", "effect", "key that mends it"), rows),))
 
 
@@ -360,7 +369,14 @@ def strains_part(found: Gathered) -> Part | None:
     at = found.case.units.pressure(state.pressure, 3)
     head = ("layer", "material", "stretch in its plane", "von Mises stress, MPa", "stable stretch, uniaxial")
     said = f"At {at}; the last column says between which stretches the constants describe a stable material."
-    pictures = (picture("layer-stress", f"Von Mises stress of the layers at {at}.", lambda: layer_stress(state)),)
+    pictures = (
+        picture(
+            "layer-stress",
+            f"Von Mises stress of the layers at {at}.",
+            lambda: layer_stress(state),
+            units=found.case.units,
+        ),
+    )
     return Part("strains", _STRAINS, (said,), (Table(head, tuple(rows)),), pictures)
 
 

@@ -176,7 +176,9 @@ class StudyResult:
         CaseError
             For a name that the result has no figure of, or a result without anything to draw.
         """
-        return draw_figures(self._drawers(choices), only, f"{self.kind} result of {self.header.name!r}")
+        return draw_figures(
+            self._drawers(choices), only, f"{self.kind} result of {self.header.name!r}", self.case.units
+        )
 
     def plot(
         self, folder: str | Path = ".", format: str = "png", only: Sequence[str] = (), **choices: Any
