@@ -180,56 +180,6 @@ def test_torus_of_langford():
     assert tracer.points[0].exponents.unstable == 0 and tracer.points[-1].exponents.unstable == 2
 
 
-def test_fold_of_the_bautin_system():
-    """z' = (mu + i) z + z|z|^2 - z|z|^4: cycles mu = r^4 - r^2, fold at -1/4, exponent r d(mu)/dr."""
-
-    def rate(u, mu):
-        r2 = u[0] ** 2 + u[1] ** 2
-        gain = mu["mu"] + r2 - r2**2
-        return jnp.stack([gain * u[0] - u[1], u[0] + gain * u[1]])
-
-    system = periodic.of_first_order(rate, 2)
-    guess = periodic.guess_of(0.4 * CIRCLE, 3, 1.0)
-    tracer, reason = trace(
-        system, guess, {"mu": 0.4**4 - 0.4**2}, 0.41**4 - 0.41**2, "mu", step=0.05, max_step=0.1, limits=(-1.0, 0.3)
-    )
-    assert reason.startswith("ended on the limit mu")
-    (fold,) = tracer.special
-    assert fold.kind == FOLD and abs(fold.value + 0.25) < 1e-7
-    for point in tracer.points:
-        r = point.motion.at([0.0])
-        r = float(np.linalg.norm(r))
-        assert np.isclose(point.value, r**4 - r**2, atol=1e-9)
-        assert np.isclose(point.exponents.values[0].real, 2 * r**2 - 4 * r**4, atol=1e-6)
-
-
-def test_period_doubling_of_a_twisted_band():
-    """A cycle on a half-twisted band: multiplier -exp(-2 pi (a - mu)), doubling at mu = a."""
-    a = 0.3
-
-    def rate(u, mu):
-        x, y, p, q = u
-        r2 = x**2 + y**2
-        c, s = x / jnp.sqrt(r2), y / jnp.sqrt(r2)
-        g = mu["mu"] - a
-        m, d = 0.5 * (g - 1.0), 0.5 * (g + 1.0)
-        return jnp.stack(
-            [
-                x - y - r2 * x,
-                x + y - r2 * y,
-                (m + d * c) * p + (d * s - 0.5) * q - p**3,
-                (d * s + 0.5) * p + (m - d * c) * q - q**3,
-            ]
-        )
-
-    system = periodic.of_first_order(rate, 4)
-    guess = periodic.guess_of(np.hstack([CIRCLE, 0 * CIRCLE]), 8, 1.0)
-    tracer, _ = trace(system, guess, {"mu": 0.0}, 0.05, "mu", step=0.1, max_step=0.1, limits=(-0.1, 0.6), located=1e-9)
-    (point,) = tracer.special
-    assert point.kind == DOUBLING and abs(point.value - a) < 1e-5
-    assert np.isclose(tracer.points[0].exponents.multipliers[0], -np.exp(-2 * np.pi * a), rtol=1e-5)
-
-
 def test_period_doubling_of_an_adaptive_control_system():
     """u' = v, v' = w, w' = -a w - b v - u + u^2, of the manual of MATCONT: at b = 1 doubling at a = 0.6303020, period
     6.364071. Volumes shrink by exp(-a T) over a period, so that the product of both multipliers is that.
