@@ -96,7 +96,7 @@ class CycleTracer:
         self.reason, self.next_step = Reason.RUNNING(), options.step
         self._origin: list[CyclePoint] = []
         self._doubtful: tuple[CyclePoint, CyclePoint] | None = None
-        self._weight = 1.0 / (np.asarray(solver.system.scales) * options.state_scale) ** 2
+        self._weight = 1.0 / (np.asarray(solver.system.scales) * (options.state_scale or 1.0)) ** 2
 
     # -- the branch
     # ----

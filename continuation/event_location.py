@@ -72,7 +72,7 @@ def solve_augmented(tracer, condition, z, frame, names=None, system=None, mu=Non
         mu or problem.fixed,
         names or problem.names,
         condition,
-        options.state_scale,
+        problem.state_scale,
         options.units(names or problem.names),
     )
     result = correct(augmented, z, frame, options.newton, None, options.location_tolerance)

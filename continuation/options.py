@@ -172,8 +172,9 @@ class ContinuationOptions:
         Sign of the first step in the parameter.
     max_angle : float
         Largest angle (rad, in the scaled metric) between tangents at consecutive points.
-    state_scale : float
-        Unit of the state in the arclength.
+    state_scale : float or None
+        Unit of the state in the arclength.  By default half the range of the state so far, the root of the mean square
+        over its unknowns; at first its change over the unit of the parameter.  1 for orbits and with own weights.
     parameter_scales : mapping of str to float
         Unit of each parameter in the arclength.  By default a fifth of the range of its limits, so that the
         first step goes over 1 % of the range and the longest over 10 %; 1 without limits and for orbits.
@@ -200,7 +201,7 @@ class ContinuationOptions:
     limits: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     direction: int = 1
     max_angle: float = 0.35
-    state_scale: float = 1.0
+    state_scale: float | None = None
     parameter_scales: Mapping[str, float] = field(default_factory=dict)
     folds: bool = True
     branch_points: bool = True
@@ -217,9 +218,7 @@ class ContinuationOptions:
         return {name: float(self.parameter_scales.get(name, own.get(name, 1.0))) for name in names}
 
     def __post_init__(self):
-        _require_numbers(
-            self, "step", "min_step", "max_step", "direction", "max_angle", "state_scale", "location_tolerance"
-        )
+        _require_numbers(self, "step", "min_step", "max_step", "direction", "max_angle", "location_tolerance")
         _require_numbers(self, "max_points", "eigenvalues", whole=True)
         for name in ("limits", "parameter_scales"):
             given = getattr(self, name)
@@ -237,7 +236,9 @@ class ContinuationOptions:
         require(self.max_points >= 1, "A branch needs room for at least one more point.")
         require(self.direction in (1, -1), f"The direction is +1 or -1, not {self.direction}.")
         require(0 < self.max_angle < 1.6, "The largest angle must lie between 0 and 1.6 rad.")
-        require(self.state_scale > 0, "The unit of the state must be positive.")
+        if self.state_scale is not None:
+            _require_numbers(self, "state_scale")
+            require(self.state_scale > 0, "The unit of the state must be positive.")
         for name, scale in self.parameter_scales.items():
             number = isinstance(scale, Real)
             require(number and scale > 0, f"The unit of the parameter {name!r} must be positive, not {scale!r}.")

@@ -240,7 +240,8 @@ class _Follower:
         require_names(options, mu, (parameter,))
         self.branch = Branch("orbits", 0, (parameter,), (), {name: float(value) for name, value in mu.items()})
         self.step_limits = options.min_step, options.max_step
-        kept = replace(options, state_scale=options.state_scale * np.sqrt(n), max_points=options.max_points + 1)
+        unit = (options.state_scale or 1.0) * np.sqrt(n)
+        kept = replace(options, state_scale=unit, max_points=options.max_points + 1)
         shape = replace(self.shape, exponents=min(self.shape.exponents, max(n - 1, 1)))
         self.parameter, self.tracer = parameter, CycleTracer(OrbitSolver(system, shape), parameter, kept, shape)
         self.observers: list = []

@@ -38,7 +38,7 @@ class Problem:
         Units of the arclength, see `ContinuationOptions`.
     """
 
-    def __init__(self, system, mu, names, condition=None, state_scale=1.0, parameter_scales=None):
+    def __init__(self, system, mu, names, condition=None, state_scale=None, parameter_scales=None):
         self.system = system
         self.fixed = {name: float(value) for name, value in mu.items()}
         self.names = tuple(names)
@@ -53,9 +53,16 @@ class Problem:
         weights = np.full(self.n, 1.0 / self.n) if own is None else np.asarray(own, float)
         scales = parameter_scales or {}
         parameter = [scales.get(name, 1.0) ** -2 for name in self.names]
-        self.state_scale = state_scale
+        #: True where the unit of the state follows the range that a curve goes through.
+        self.grows = state_scale is None and own is None
+        self.state_scale = state_scale = state_scale or 1.0
         self.parameter_scale = np.array([scales.get(name, 1.0) for name in self.names])
         self.weights = np.concatenate([weights / state_scale**2, parameter, np.ones(self.e)])
+
+    def rescale(self, state_scale: float) -> None:
+        """Measure the state in another unit."""
+        self.weights[: self.n] *= (self.state_scale / state_scale) ** 2
+        self.state_scale = state_scale
 
     def u(self, z):
         return z[: self.n]

@@ -25,8 +25,16 @@ GROWTH, SHRINK = 1.5, 0.5
 SUBDIVISIONS = 6
 #: Largest distance of the curve from a chord, in chord lengths: an arc whose ends turn by 1.6 rad reaches 0.4.
 FARTHEST = 0.5
+#: Unit of a state over the range that it has gone through; most of it at the start, over the size of the state.
+SHARE, MOST = 0.5, 10.0
+#: Unit of a state that may be the rounding of one at rest.
+STILL = 1e-8
 #: Distance in chord lengths within which two located points are one.
 KNOWN = 1e-6
+
+
+def _rms(values: np.ndarray) -> float:
+    return float(np.sqrt(np.mean(values**2))) if values.size else 0.0
 
 
 class Monitor:
@@ -225,6 +233,9 @@ class Tracer:
                 correction,
             )
         point = self.corrected_point(correction, direction)
+        self._origin = self.problem.u(point.z)
+        if self.problem.grows:
+            self.problem.rescale(self._first_unit(point))
         self.frame = self.problem.frame(point.local.basis)
         point.local = Local(self.problem, point.z, self.frame)
         point.tangent = point.local.tangent(point.tangent)
@@ -232,10 +243,32 @@ class Tracer:
             monitor.measure(self, point)
         return point
 
+    def _first_unit(self, point) -> float:
+        """Unit of the state at a start: its change over the unit of the parameters; 1 where that says nothing."""
+        problem = self.problem
+        size, change = _rms(problem.u(point.z)), _rms(problem.u(point.tangent))
+        along = float(np.linalg.norm(problem.p(point.tangent) / problem.parameter_scale))
+        unit = min(change / along if along else np.inf, MOST * size or np.inf)
+        return unit if STILL < unit < 1.0 / STILL else 1.0
+
+    def _grow(self, after, step: float) -> float:
+        """Let the unit of the state follow its range; the step in the new metric."""
+        problem = self.problem
+        unit = SHARE * _rms(problem.u(after.z) - self._origin)
+        if not problem.grows or unit <= problem.state_scale:
+            return step
+        problem.rescale(unit)
+        length = problem.norm(after.tangent)
+        after.tangent = after.tangent / length
+        return float(np.clip(step * length, self.options.min_step, self.options.max_step))
+
     def resume(self, branch: Branch) -> Branch:
         """Copy of a branch with the points that follow its last one."""
         options, last = self.options, branch.points[-1]
+        self.problem.rescale(float(branch.restart.get("state_scale", self.problem.state_scale)))
+        grows, self.problem.grows = self.problem.grows, False
         start = self.start(last.z, last.tangent, branch.restart.get("frame"))
+        self.problem.grows, self._origin = grows, self.problem.u(branch.points[0].z)
         step = float(np.clip(branch.next_step or options.step, options.min_step, options.max_step))
         return self.run(branch.reopen(), start, step)
 
@@ -262,6 +295,7 @@ class Tracer:
             if stopping:
                 after, found = self._stop_at(before, after, stopping[0], found)
                 ending = Reason.STOPPED(kind=stopping[0].kind)
+            step = self._grow(after, step)
             branch.points.append(after.record())
             branch.special += found
             self.frame = self.problem.frame(after.local.basis)
@@ -297,7 +331,7 @@ class Tracer:
 
     def _remember(self, branch, step):
         branch.next_step = float(step)
-        branch.restart = {"frame": self.frame}
+        branch.restart = {"frame": self.frame, "state_scale": self.problem.state_scale}
         condition = self.problem.condition
         if condition is not None:
             branch.restart.update(p=condition.p, q=condition.q)
@@ -451,7 +485,7 @@ class Tracer:
         if len(branch) < 6:
             return False
         s, away = self.fraction(before, after, first.z)
-        same_way = self.problem.dot(first.tangent, after.tangent) > 0.9
+        same_way = self.problem.dot(first.tangent, after.tangent) > 0.9 * self.problem.norm(first.tangent)
         return 0.0 < s <= 1.0 and away < 0.1 and same_way
 
     def _notify(self, hook, *arguments):

@@ -38,7 +38,7 @@ def circle():
 
 def s_curve(**options):
     """Branch whose arclength is that of the plane of ``x`` and ``a``."""
-    options = ContinuationOptions(limits=LIMITS, parameter_scales={"a": 1.0}, **options)
+    options = ContinuationOptions(limits=LIMITS, state_scale=1.0, parameter_scales={"a": 1.0}, **options)
     return continue_branch(cusp(), [-1.5], MU, "a", options)
 
 
@@ -247,8 +247,8 @@ continue_branch(cusp(), [-1.5], {MU}, "a", ContinuationOptions(limits={LIMITS}, 
     assert ended.returncode == -signal.SIGKILL, ended.stderr
     left = Branch.load(path)
     assert len(left) == 10 and left.reason.kind is Reason.RUNNING
-    whole = s_curve()
-    longer = resume(cusp(), left, ContinuationOptions(limits=LIMITS, parameter_scales={"a": 1.0}))
+    options = ContinuationOptions(limits=LIMITS, parameter_scales={"a": 1.0})
+    whole, longer = continue_branch(cusp(), [-1.5], MU, "a", options), resume(cusp(), left, options)
     assert len(longer) == len(whole)
     assert np.allclose(longer.values(), whole.values(), rtol=0, atol=1e-9)
 
@@ -296,6 +296,16 @@ def test_plot_draws_stability_and_special_points():
     assert branch.plot().get_ylabel() == "largest |u|" and branch.plot("fold").get_ylabel() == "fold"
     with pytest.raises(KeyError, match="no 'height'"):
         branch.plot("height")
+
+
+@pytest.mark.parametrize("unit", [1e-6, 1e-2, 1e3])
+def test_units_of_the_state_do_not_matter(unit):
+    """Both folds with the default options, and the same points but for rounding."""
+    system = JaxSystem(lambda u, mu: mu["a"] + u / unit - (u / unit) ** 3, 1)
+    plain = continue_branch(cusp(), [-1.5], MU, "a", ContinuationOptions(limits=LIMITS))
+    branch = continue_branch(system, [-1.5 * unit], {"a": -2.0}, "a", ContinuationOptions(limits=LIMITS))
+    assert np.allclose([s.mu["a"] for s in branch.special], [2 / np.sqrt(27), -2 / np.sqrt(27)], rtol=1e-8)
+    assert np.allclose(branch.values(), plain.values(), rtol=0, atol=1e-6)
 
 
 def test_scales_make_a_branch_in_other_units_the_same():
