@@ -140,6 +140,9 @@ _TABLE = (
               shown_unit="degrees", note="of the plies, degrees", **_DESIGNED),
     Parameter("strain", "materials.strain_level", Quantity("", "%"), "Strain level of the rubbers", (0.1, 0.6, 21),
               0.1, 0.6, note="level of the rubbers", **_DESIGNED),
+    Parameter("sealing", "valve.sealing_pressure", Quantity("Pa", "kPa", head=True), "Sealing pressure of the bill",
+              (200.0, 3000.0, 15), 0.0, 1e7, False, shown_unit="kPa", scale=1e3,
+              note="pressure of a bill that is moulded shut", **_DESIGNED),
 )
 # fmt: on
 

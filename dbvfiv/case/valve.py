@@ -10,6 +10,7 @@ from typing import Annotated, Any, Literal
 from pydantic import PrivateAttr, ValidationInfo, field_validator, model_serializer, model_validator
 
 from .key_points import has_whole_sections, key_point_inlet, read_key_points
+from .parameters import PARAMETERS
 from .quantity import Length, LineForce, Number, Pressure, Quantity
 from .section import BrokenRule, Section, key
 from .wall import WallPatch, WallStep, edges_of
@@ -379,8 +380,7 @@ class Valve(Section):
         "Even pressure with which the faces of a bill that is moulded shut press on each other at rest, on "
         "moulded_length: the wall then has no stress in a shape whose lips cross. The bill cracks at a little more. "
         'Needs supports.contact = "faces", which is taken where it is not given.',
-        gt=0,
-        le=1e7,
+        **PARAMETERS["sealing"].limits,
     )
     sealing_force: LineForce | None = key(
         None, "The same as a force per width of the lips: sealing_pressure times moulded_length.", gt=0, le=1e8

@@ -201,8 +201,9 @@ class PressedShell:
         return -self.pressure_force(self.nodal(q), 1.0)
 
     def force_scale(self, q: np.ndarray, pressure: float) -> float:
-        """Norm of the pressure forces, N: what residuals are measured against."""
-        return float(np.linalg.norm(self.pressure_force(self.nodal(q), pressure)))
+        """Norm of the pressure forces, N: what residuals are measured against; with that of a preset wall's closing."""
+        own = self.shell.closing_pressure if self.contact is not None else 0.0
+        return float(np.linalg.norm(self.pressure_force(self.nodal(q), abs(pressure) + own)))
 
     def mass(self, q: np.ndarray) -> np.ndarray:
         """Values (nnz,) of the mass matrix at a state."""

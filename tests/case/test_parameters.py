@@ -51,7 +51,7 @@ def test_ranges_end_where_the_key_does():
 def test_groups():
     lines = ("pipe_length", "tail_length", "wave_speed")
     assert SURROUNDINGS == ("density", "alpha", "beta", "loss_factor", "storage", *lines)
-    assert DESIGN == ("thickness", "angle", "strain")
+    assert DESIGN == ("thickness", "angle", "strain", "sealing")
     assert SWEPT == ("pressure", "density", "alpha", "beta", "loss_factor", *lines)
     assert SYSTEM_NAMES == ("inlet", *SURROUNDINGS)
 

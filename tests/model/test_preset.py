@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from scipy.integrate import cumulative_trapezoid
 
+from dbvfiv import load
 from dbvfiv.case.parameters import Mu
 from dbvfiv.contact import ContactLaw, PlaneContact, tributary_area
 from dbvfiv.errors import CaseError, SolveError
@@ -21,6 +22,8 @@ from dbvfiv.model.preset import stress_free_shape
 from dbvfiv.model.pressed_shell import PressedShell
 from dbvfiv.model.symmetry import SYMMETRIES
 from dbvfiv.studies.case import load_case, thesis_case
+from dbvfiv.studies.sensitivity.derivatives import parameters_of
+from dbvfiv.studies.stability.place import redesigned
 from eigen import SearchOptions, leading_modes
 from tests.verification.test_shell_large_displacement import cantilever
 
@@ -261,3 +264,15 @@ def test_random_presets_open_without_a_jump_in_flow_that_no_limit_point_explains
             mu = Mu.of(model.case).at(pressure=state.pressure, beta=1e-3)
             assert np.all(leading_modes(linear.pencil(mu), 3, SearchOptions()).eigenvalues.real < 0)
     assert flows and np.all(np.diff(flows) >= 0)
+
+
+def test_back_pressure_starts_from_the_faces_that_press_on_each_other():
+    """The work of the back pressure is what the wall and its contact store."""
+    valve = load(thesis_case(COARSE | {"valve.sealing_pressure": PRESSURE, "closure.rated_pressure": "2 kPa"}))
+    (state,) = valve.closure(pressure=2e3).states
+    assert state.closed and state.energy_balance < 1e-3
+
+
+def test_sealing_pressure_is_a_parameter_of_a_bill_that_is_moulded_shut_alone(model):
+    assert "sealing" in parameters_of(model) and "sealing" not in parameters_of(ValveModel(thesis_case(COARSE)))
+    assert redesigned(model.case, {"sealing": 5e2}).valve.sealing_pressure == 5e2

@@ -92,6 +92,8 @@ class ClosureWalk:
         self.steps = LoadSteps(pressed, options, observer=record, accepted=self._accept)
         self.watches = {name: BucklingWatch(pressed, options, watch) for name, watch in self._spectra().items()}
         self.own = next(iter(self.watches.values()))
+        if pressed.shell.stress_free is not None:  # the faces press on each other at rest
+            self.steps.settle()
         self.energy = EnergyLedger(pressed, closure.balance_tolerance)
         self.energy.begin(self.steps.q, 0.0)
         self.beyond_limit = self._limit_met = False

@@ -197,6 +197,8 @@ def _value(model, pressure, mu, name) -> float:
         return max(abs(layer.angle) for layer in model.case.layers)
     if name == "strain":
         return max(_levels(model).values())  # of all rubbers: see `_has`
+    if name == "sealing":
+        return model.case.valve.sealing_pressure
     i, quantity = _layer(name)
     layer = model.shell.section.layers[i]
     return float(getattr(layer if quantity in ("thickness", "angle") else layer.law, quantity))

@@ -123,6 +123,11 @@ def require_parameter(case: Case, name: str) -> None:
             "upstream.wave_speed.",
             key=PARAMETERS[name].key,
         )
+    if name == "sealing" and not case.valve.sealing_pressure:
+        raise CaseError(
+            "There is no sealing pressure to change: the bill is not moulded shut; give valve.sealing_pressure.",
+            key=PARAMETERS[name].key,
+        )
     lacking = case.damping.lacks(name)
     if lacking:
         raise CaseError(f"There is no {name} to change: {lacking}.", key=PARAMETERS[name].key)
