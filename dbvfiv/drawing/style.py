@@ -187,7 +187,8 @@ def put_in_units(figure: Figure, units: Units) -> Figure:
         label, ratio = units.label(axis.get_label_text())
         axis.set_label_text(label)
         if ratio != 1.0 and not isinstance(axis.get_major_locator(), _InUnit):
-            ticks = MaxNLocator(6) if axis.get_scale() == "linear" else axis.get_major_locator()
+            even = MaxNLocator(7, steps=[1, 2, 2.5, 5, 10])
+            ticks = even if axis.get_scale() == "linear" else axis.get_major_locator()
             axis.set_major_locator(_InUnit(ticks, ratio))
             axis.set_major_formatter(lambda value, _, ratio=ratio: f"{value * ratio:.4g}")
     return figure
