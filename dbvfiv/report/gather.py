@@ -298,7 +298,8 @@ def gather(
     found.not_asked = set(leave_out)
     studies = _Studies(found, session, folder, workers, bar)
     for runs in (planned, following, cycle_run):
-        studies.make([run for run in runs(found.case if runs is planned else found) if run.part not in leave_out])
+        asked = runs(found.case if runs is planned else found)
+        studies.make([run for run in asked if not {*run.name.split("-")} & {*leave_out}])
     bar.close()
     found.seconds = _processor_time() - started
     return found
