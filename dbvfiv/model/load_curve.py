@@ -31,6 +31,8 @@ _CURVES: WeakKeyDictionary[Any, LoadCurve] = WeakKeyDictionary()
 LOAD = "pressure"
 #: First, smallest and largest step, in wall thicknesses of mean displacement, and most points of a curve.
 _STEP, _SMALLEST, _LARGEST, _MOST = 0.05, 1e-6, 100.0, 600
+#: Residual to which points of the curve are found at best; the states that are asked for are settled from there.
+_POINTS = 1e-9
 #: Largest angles between tangents, rad, tried one after the other: where faces part, displacements of micrometres turn
 #: the curve, and one that turns right back has been missed.
 _ANGLES = 0.7, 1.4, 0.35
@@ -251,7 +253,7 @@ class LoadCurve:
             parameter_scales={LOAD: self._unit},
             folds=False,
             branch_points=False,
-            newton=ContinuationNewton(self.newton.tolerance, 12),
+            newton=ContinuationNewton(max(self.newton.tolerance, _POINTS), 12),
             max_angle=self._angle,
         )
         return branch_tracer(self._system, {LOAD: self._start}, LOAD, options, observers=_Told(self.observer))

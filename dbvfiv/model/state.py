@@ -147,7 +147,6 @@ def describe_state(model: ValveModel, q: np.ndarray, pressure: float, **solution
     displacement = np.linalg.norm(nodal[:, :3], axis=1)
     where = int(np.argmax(displacement))
     lip = LipCentre(model.mesh, model.shell)
-    shut = lip.opening(model.rest()) if model.case.valve.is_preset else 0.0
     mass_flow = model.mass_flow(area, pressure)
     station_pressure = model.flow.steady_pressure(area, pressure)
     line = model.line
@@ -171,7 +170,7 @@ def describe_state(model: ValveModel, q: np.ndarray, pressure: float, **solution
         outlet_velocity=float(speeds[0]),
         max_displacement=float(displacement[where]),
         max_displacement_position=tuple(float(value) for value in model.mesh.nodes[where]),
-        lip_opening=max(0.0, lip.opening(q) - shut) if share else 0.0,
+        lip_opening=lip.opening(q) if share else 0.0,
         lip_displacement=lip.displacement(q),
         station_area=area,
         station_velocity=speeds,
@@ -252,6 +251,8 @@ class LipCentre:
         self._height = float(surface.nodes[node, 1])
         self._director, self._frame = surface.directors[node], surface.frames[node]
         self._unknowns = shell.dofs.index[node]
+        drawn = 2.0 * (self._height - self.half_wall * float(self._director[1]))
+        self._shut = 0.0 if shell.stress_free is None else drawn  # the faces touch in the shape that is drawn
 
     def displacement(self, q: np.ndarray) -> float:
         """Displacement in y, m, of the mid-surface of one lip, from the free unknowns (n,); below zero where the lip
@@ -266,12 +267,12 @@ class LipCentre:
         mid-surface at rest and its displacement v the opening is 2 (Y + v - h/2 d_y). At rest it is what the shape
         leaves between the faces, 2 (Y - h/2): 0.38 mm in the 12-inch valve, whose mid-surface is 6.19 mm high and whose
         wall is 12 mm thick; none where the lip radius is half the wall. `valve.initial_gap`, which keeps the flow
-        section open at rest, is no part of it.
+        section open at rest, is no part of it. Of a bill that is moulded shut by how much it is more than that.
         """
         local = self._local(q)
         turn = float(np.hypot(*local[3:]))
         across = np.cos(turn) * self._director[1] + np.sinc(turn / np.pi) * float(local[3:] @ self._frame[:, 1])
-        return max(0.0, 2.0 * (self._height + float(local[1]) - self.half_wall * float(across)))
+        return max(0.0, 2.0 * (self._height + float(local[1]) - self.half_wall * float(across)) - self._shut)
 
     def _local(self, q: np.ndarray) -> np.ndarray:
         """Displacements and rotations (5,) of the node."""

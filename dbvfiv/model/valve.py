@@ -34,8 +34,6 @@ from .outside import OutsideFluid
 from .relaxing import WallRelaxation
 from .supports import FaceContact, face_contact, lip_stops
 
-#: Section that counts as shut over what rough faces in contact leave.
-_SHUT = 1.5
 #: Faces that meet change the residual from one step to the next: its norm has to fall.
 _AT_REST = NewtonOptions(1e-10, 200, "l2")
 
@@ -357,16 +355,28 @@ class ValveModel:
         """Areas (m,), m2, that rough faces in contact leave, of a bill that is moulded shut: those at rest; else 0."""
         return 0.0 if self.shell.stress_free is None else self.rows.areas(self.nodal(self.rest()))
 
+    @property
+    def parting(self) -> float:
+        """Section in which the faces of a bill that is moulded shut just part, over that at rest, where they press on
+        each other; 1 without a preset.
+        """
+        if self.shell.stress_free is None:
+            return 1.0
+        law = self.contact.plane.law
+        return 1.0 + (law.rounding - law.gap_at(self.shell.closing_pressure)) / self.case.valve.initial_gap
+
     def open_share(self, area: np.ndarray) -> float:
         """Share of the narrowest of sections (m,), m2, that is open: what faces in contact leave carries no flow."""
         narrowest = int(np.argmin(area))
-        return float(np.clip(1.0 - np.broadcast_to(self._film, area.shape)[narrowest] / area[narrowest], 0.0, 1.0))
+        film = self.parting * float(np.broadcast_to(self._film, area.shape)[narrowest])
+        return float(np.clip(1.0 - film / area[narrowest], 0.0, 1.0))
 
     def seal(self, area: np.ndarray) -> int | None:
         """Last station, from the outlet on, of sections (m,), m2, that faces in contact shut; None where none is."""
         if self.shell.stress_free is None or self.open_share(area) > 0.0:
             return None
-        return int(np.flatnonzero(area <= _SHUT * self._film.min())[-1])
+        moulded = self._film <= self.parting * self._film.min()
+        return int(max(np.argmin(area), np.flatnonzero(moulded & (area <= self.parting * self._film)).max(initial=0)))
 
     def mass_flow(self, area: np.ndarray, pressure: float, density: float | None = None) -> float:
         """Steady mass flow of the whole valve, kg/s; none where its faces shut a section."""

@@ -126,7 +126,7 @@ def test_an_overlap_of_zero_is_no_preset():
 
 
 def test_sealed_below_cracking_and_open_above_whatever_the_order(model, path):
-    pressures = (0.6 * PRESSURE, 3.0 * PRESSURE, 1.6 * PRESSURE)
+    pressures = (0.6 * PRESSURE, 3.0 * PRESSURE, 2.0 * PRESSURE)
     rising = {p: path.go_to(p) for p in sorted(pressures)}
     other = LoadPath(ValveModel(model.case), SteadyOptions.of(model.case))
     for pressure in (pressures[1], pressures[0], pressures[2]):
@@ -276,3 +276,10 @@ def test_back_pressure_starts_from_the_faces_that_press_on_each_other():
 def test_sealing_pressure_is_a_parameter_of_a_bill_that_is_moulded_shut_alone(model):
     assert "sealing" in parameters_of(model) and "sealing" not in parameters_of(ValveModel(thesis_case(COARSE)))
     assert redesigned(model.case, {"sealing": 5e2}).valve.sealing_pressure == 5e2
+
+
+def test_a_sealed_bill_is_closed_in_time_and_moves_no_further():
+    keys = {"transient.start": "steady", "transient.duration": 0.04, "transient.step": 2e-3, "drive.pressure": 300.0}
+    result = load(thesis_case(COARSE | keys | {"valve.sealing_pressure": PRESSURE})).transient()
+    assert result.summary()["verdict"] == "closed"
+    assert np.ptp(result.history["lip_displacement"]) < 1e-7

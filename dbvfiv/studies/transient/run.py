@@ -31,7 +31,7 @@ from .history import HISTORY, STATES, Keeper, Progress, Reader, tables_of
 #: Columns of a history by name.
 Columns = Mapping[str, np.ndarray]
 #: Smallest area over that of the lip gap at rest up to which a valve is closed: where the pressure drives fluid out,
-#: and where nothing does.
+#: and where nothing does; of a bill that is moulded shut, where its faces part.
 SHUT, UNOPENED = 0.5, 2.0
 #: Pascal; no fluid's pressure falls further below that of the surroundings.
 ATMOSPHERE = 101_325.0
@@ -128,7 +128,8 @@ def assess(
     signals = ("mass_flow", "lip_displacement", "lip_opening")
     found = [judge(time[chosen], history[name][chosen], options, residual=known) for name in signals]
     driven = history["inlet_pressure"] > model.case.rest_pressure
-    area = history["smallest_area"] / (np.where(driven, SHUT, UNOPENED) * lip_gap(model))
+    shut = model.parting if model.case.valve.is_preset else SHUT
+    area = history["smallest_area"] / (np.where(driven, shut, UNOPENED) * lip_gap(model))
     if judge(time[chosen], area[chosen], options, closed_below=1.0).name == "closed":
         reason = "The lips shut the gap that they have at rest, or nothing drives fluid out and they do not open."
         found = [Verdict(**{**vars(v), "name": "closed", "decided": True, "reason": reason}) for v in found]
