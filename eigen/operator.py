@@ -335,9 +335,10 @@ class CoupledPencil(FluidParts):
         F[u, q] = -self.R0 @ J
         F[u, v] = -self.R1 @ J
         F[u, u] = -self.S0
+        parts = [matrix.toarray() for matrix in self.relaxing]
         for j in range(self.branches):
             z = slice(2 * n + b + j * n, 2 * n + b + (j + 1) * n)
-            part = sum(x * m for x, m in zip(self.relaxation.strengths[:, j], self.relaxing)).toarray()
+            part = sum(x * m for x, m in zip(self.relaxation.strengths[:, j], parts))
             F[v, q] -= part
             F[v, z] = part
             F[z, q] = np.eye(n)
