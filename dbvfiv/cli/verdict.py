@@ -49,6 +49,12 @@ def verdict(
     since: Annotated[
         float | None, typer.Option("--since", metavar="T", help="Leave out what comes before this time, s.")
     ] = None,
+    until: Annotated[
+        float | None, typer.Option("--until", metavar="T", help="Leave out what comes after this time, s.")
+    ] = None,
+    detrend: Annotated[
+        bool, typer.Option("--detrend/--no-detrend", help="Take a drifting level off a measured record.")
+    ] = True,
     steady: Annotated[
         float, typer.Option("--steady", metavar="X", help="Relative change below which a signal is steady.")
     ] = 1e-4,
@@ -63,11 +69,14 @@ def verdict(
     as_json: AsJson = False,
 ) -> None:
     """Judge any time series: steady, decaying, limit cycle, growing, closed or irregular, with period, amplitude,
-    harmonics, RMS, extremes, spectrum. Times are seconds unless the header says otherwise, as in "time [ms]".
+    harmonics, RMS, extremes, spectrum. Times are seconds unless the header says otherwise, as in "time [ms]", or dates.
+
+    Of a measured record oscillations are told from noise, drift and mains: rings that decayed, several lines,
+    modulation; frequency, amplitude and damping ratio with 95 % intervals.
 
     dbvfiv verdict pressure.csv --column 2 --plots figures
     """
-    reading = Reading(columns or (), time, rate, time_unit, skip_bad, since)
+    reading = Reading(columns or (), time, rate, time_unit, skip_bad, since, until, detrend)
     judged = _judge_file(file, reading, steady, closed_below)
     figures = [each.draw(plots) for each in judged] if plots is not None else []
     if as_json:
@@ -95,8 +104,10 @@ class Reading:
         Unit of the times; else as the header says.
     skip_bad : bool
         Leave out rows that hold no number.
-    since : float, optional, s
-        Time before which samples are left out.
+    since, until : float, optional, s
+        Times before and after which samples are left out.
+    detrend : bool
+        Take the level off a measured record.
     """
 
     columns: Sequence[str] = ()
@@ -105,6 +116,8 @@ class Reading:
     unit: str | None = None
     skip_bad: bool = False
     since: float | None = None
+    until: float | None = None
+    detrend: bool = True
 
 
 @dataclass(frozen=True)
@@ -115,6 +128,7 @@ class Signal:
     time: np.ndarray
     values: np.ndarray
     skipped: int = 0
+    measured: bool = True
 
     def between(self, start: float, end: float) -> Signal:
         """The part within two times, s."""
@@ -155,6 +169,10 @@ class JudgedSignal:
         for label, value in _numbers(verdict):
             if value == value:
                 lines.append(f"  {label:<20}{value:.7g}")
+        lines += [_line_of(one) for one in verdict.lines]
+        if verdict.modulation:
+            frequency, half = verdict.modulation["frequency"], verdict.modulation["frequency_interval"]
+            lines.append(f"  {'modulated at':<20}{frequency:.6g} +- {half:.2g} Hz")
         if verdict.cycles:
             lines.append(f"  {'cycles':<20}{verdict.cycles}")
         if len(verdict.harmonics):
@@ -166,6 +184,19 @@ class JudgedSignal:
         return lines
 
 
+def _line_of(line: dict[str, Any]) -> str:
+    """One oscillation with its 95 % intervals."""
+
+    def spread(name: str, unit: str, scale: float = 1.0) -> str:
+        half = line[f"{name}_interval"]
+        return f"{scale * line[name]:.6g}" + ("" if half is None else f" +- {scale * half:.2g}") + f" {unit}".rstrip()
+
+    said = [spread("frequency", "Hz"), f"amplitude {spread('amplitude', '')}"]
+    if "damping_ratio" in line:
+        said.append(f"damping ratio {spread('damping_ratio', '%', 100.0)}")
+    return f"  {line['called'] or 'oscillation':<20}{', '.join(said)}"
+
+
 def _judge_file(file: Path, reading: Reading, steady: float, closed_below: float | None = None) -> list[JudgedSignal]:
     """Judge the columns of a text file or of a transient run."""
     from ..verdict import JudgeOptions
@@ -174,7 +205,7 @@ def _judge_file(file: Path, reading: Reading, steady: float, closed_below: float
         raise CaseError(f"--steady is {steady:g}; it must be greater than 0 and less than 1.")
     found = []
     for signal in _read_signals(file, reading):
-        verdict = _judged(file, signal, JudgeOptions(steady=steady), closed_below, reading.since)
+        verdict = _judged(file, signal, JudgeOptions(steady=steady), closed_below, reading)
         found.append(JudgedSignal(signal, verdict, _peaks(signal.between(*verdict.judged))))
     return found
 
@@ -199,7 +230,8 @@ def _read_signals(file: Path, reading: Reading) -> list[Signal]:
     except OSError as error:
         raise CaseError(f"{str(file)!r} cannot be read ({error.strerror or error}).") from None
     start = -math.inf if reading.since is None else reading.since
-    return [signal.between(start, math.inf) for signal in signals]
+    end = math.inf if reading.until is None else reading.until
+    return [signal.between(start, end) for signal in signals]
 
 
 def _signals_of_run(file: Path, reading: Reading) -> list[Signal]:
@@ -213,7 +245,11 @@ def _signals_of_run(file: Path, reading: Reading) -> list[Signal]:
         if name not in result.history or result.history[name].ndim != 1:
             known = ", ".join(k for k, v in result.history.items() if v.ndim == 1)
             raise CaseError(f"The run has no column {name!r}; it has {known}.")
-    return [Signal(name, result.history["time"], result.history[name]) for name in names]
+    return [Signal(name, result.history["time"], result.history[name], measured=False) for name in names]
+
+
+#: Names of columns that number samples, and seconds since 1970 that are those of a date: 1980.
+_NUMBERED, _DATES = ("sample", "samples", "index", "no", "no.", "nr", "#", "n"), 3.2e8
 
 
 def _signals_of_table(table: Table, reading: Reading) -> list[Signal]:
@@ -227,9 +263,13 @@ def _signals_of_table(table: Table, reading: Reading) -> list[Signal]:
         raise ValueError("it has a single column; give the sampling rate with --rate")
     if at is None:
         time = np.arange(len(table.values)) / reading.rate
+    elif reading.unit is None and table.names[at].strip().lower() in _NUMBERED:
+        raise ValueError(f"its first column {table.names[at]!r} numbers the samples; give their rate with --rate")
     else:
         factor = seconds_in(reading.unit) if reading.unit is not None else _seconds(table, at)
         time = factor * table.values[:, at]
+        if len(time) and np.nanmin(time) > _DATES:  # times of day, which start with the record
+            time = time - np.nanmin(time)
     found = []
     for i in wanted:
         needed = [i] if at is None else [at, i]
@@ -249,17 +289,18 @@ def _seconds(table: Table, column: int) -> float:
         ) from None
 
 
-def _judged(
-    file: Path, signal: Signal, options: JudgeOptions, closed_below: float | None, since: float | None
-) -> Verdict:
-    from ..verdict import judge
+def _judged(file: Path, signal: Signal, options: JudgeOptions, closed_below: float | None, reading: Reading) -> Verdict:
+    from ..verdict import judge, judge_record
 
     if len(signal.time) < 2:
         number = "no samples" if not len(signal.time) else "a single sample"
-        after = "" if since is None else f" from {since:g} s on"
+        after = "" if reading.since is None else f" from {reading.since:g} s on"
         raise CaseError(f"Column {signal.name!r} of {str(file)!r} has {number}{after}, and two are needed at least.")
     try:
-        return judge(signal.time, signal.values, options, closed_below=closed_below)
+        if not signal.measured:
+            return judge(signal.time, signal.values, options, closed_below=closed_below)
+        options = {"options": options, "closed_below": closed_below, "detrend": reading.detrend}
+        return judge_record(signal.time, signal.values, **options)
     except ValueError as error:
         text = str(error).rstrip(".")
         raise CaseError(

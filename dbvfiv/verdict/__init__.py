@@ -1,9 +1,11 @@
-"""Verdict on a time series: steady, decaying, limit cycle, growing, closed or irregular.
+"""Verdict on a time series: steady, decaying, limit cycle, growing, closed or irregular; of a measured record also its
+lines, with intervals.
 
 The package is independent of valves.
 """
 
-from .judge import NAMES, JudgeOptions, Verdict, judge
+from .judge import NAMES, RECORDED, JudgeOptions, Verdict, judge
+from .motion import judge_record
 from .series import Series, in_steps, spectrum
 
-__all__ = ["NAMES", "JudgeOptions", "Series", "Verdict", "in_steps", "judge", "spectrum"]
+__all__ = ["NAMES", "RECORDED", "JudgeOptions", "Series", "Verdict", "in_steps", "judge", "judge_record", "spectrum"]

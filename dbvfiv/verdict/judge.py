@@ -63,6 +63,8 @@ class JudgeOptions:
 
 
 NAMES = ("steady", "decaying", "limit cycle", "growing", "closed", "irregular", "undecided")
+#: Further ones of measured records.
+RECORDED = ("decayed", "modulated", "several lines", "mains")
 
 
 @dataclass(frozen=True)
@@ -72,7 +74,7 @@ class Verdict:
     Attributes
     ----------
     name : str
-        One of `NAMES`.
+        One of `NAMES`, of a measured record also of `RECORDED`.
     decided : bool
         True where a longer series would not change the verdict.
     reason : str
@@ -106,6 +108,10 @@ class Verdict:
         Beginning and end of the part that the verdict is about: the whole series, or its longest part between gaps.
     notes : tuple of str
         Sentences on the samples: gaps, uneven steps.
+    lines : tuple of dict
+        Oscillations of a measured record, with half their 95 % intervals, for JSON; the one of the verdict first.
+    modulation : dict
+        Frequency, Hz, of the modulation of a measured record, with half its interval; empty without.
     """
 
     name: str
@@ -125,6 +131,8 @@ class Verdict:
     noise: float = np.nan
     judged: tuple[float, float] = (np.nan, np.nan)
     notes: tuple[str, ...] = ()
+    lines: tuple[dict[str, Any], ...] = ()
+    modulation: dict[str, float] = field(default_factory=dict)
 
     @property
     def frequency(self) -> float:
@@ -134,16 +142,20 @@ class Verdict:
     def summary(self) -> dict[str, Any]:
         """Plain SI numbers for JSON; what is not a number is None."""
         numbers = {name: getattr(self, name) for name in _NUMBERS}
-        return {
-            "verdict": self.name,
-            "decided": bool(self.decided),
-            "reason": self.reason,
-            **{name: float(value) if np.isfinite(value) else None for name, value in numbers.items()},
-            "cycles_observed": self.cycles,
-            "judged": [float(t) if np.isfinite(t) else None for t in self.judged],
-            "notes": list(self.notes),
-            "harmonics": [{"amplitude": float(a), "phase": float(p)} for a, p in self.harmonics],
-        }
+        return (
+            {
+                "verdict": self.name,
+                "decided": bool(self.decided),
+                "reason": self.reason,
+                **{name: float(value) if np.isfinite(value) else None for name, value in numbers.items()},
+                "cycles_observed": self.cycles,
+                "judged": [float(t) if np.isfinite(t) else None for t in self.judged],
+                "notes": list(self.notes),
+                "harmonics": [{"amplitude": float(a), "phase": float(p)} for a, p in self.harmonics],
+            }
+            | ({"lines": list(self.lines)} if self.lines else {})
+            | ({"modulation": self.modulation} if self.modulation else {})
+        )
 
 
 #: Numbers of a verdict by their keys in JSON.

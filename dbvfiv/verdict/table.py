@@ -10,6 +10,7 @@ import csv
 import re
 from collections import Counter
 from dataclasses import dataclass, field
+from datetime import UTC, datetime
 from pathlib import Path
 
 import numpy as np
@@ -84,6 +85,10 @@ def is_unit_of_time(text: str) -> bool:
 
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eEdD][+-]?\d+)?")
 _MISSING = {"", "nan", "+nan", "-nan", "na", "n/a", "#n/a", "#na", "null", "none", "-", "--", "inf", "+inf", "-inf"}
+#: Dates with a time of day, as ISO 8601 and control systems write them.
+_DATE = re.compile(r"\d{1,4}[-./]\d{1,2}[-./]\d{1,4}[T ]\s*\d{1,2}:\d{2}")
+_DAYS = ("%Y-%m-%d", "%Y/%m/%d", "%d.%m.%Y", "%m/%d/%Y", "%d/%m/%Y", "%d-%m-%Y")
+_CLOCKS = ("%H:%M:%S.%f", "%H:%M:%S", "%H:%M", "%I:%M:%S %p", "%I:%M:%S.%f %p")
 #: Numbers beyond this are no measurement, and their squares would overflow.
 _LARGEST = 1e100
 #: Ways to read a line: separator (blanks: empty) and decimal sign.
@@ -244,13 +249,31 @@ def _number(cell: str, decimal: str) -> float | None:
     if text.lower() in _MISSING:
         return np.nan
     if decimal == ",":
-        if "." in text:
+        if "." in text and not _DATE.match(text):
             return None
         text = text.replace(",", ".")
     if not _NUMBER.fullmatch(text):
-        return None
+        return _moment(text)
     value = float(text.replace("d", "e").replace("D", "e"))
     return value if abs(value) < _LARGEST else None
+
+
+def _moment(text: str) -> float | None:
+    """Seconds since 1970 of a date with a time of day, None where the text is none."""
+    if not _DATE.match(text):
+        return None
+    try:
+        return datetime.fromisoformat(text).replace(tzinfo=UTC).timestamp()
+    except ValueError:
+        pass
+    day, _, clock = text.replace("T", " ").partition(" ")
+    for form in _DAYS:
+        for time in _CLOCKS:
+            try:
+                return datetime.strptime(f"{day} {clock.strip()}", f"{form} {time}").replace(tzinfo=UTC).timestamp()
+            except ValueError:
+                continue
+    return None
 
 
 def _is_data(row: list[float | None]) -> bool:

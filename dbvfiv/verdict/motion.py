@@ -1,0 +1,352 @@
+"""What moves in a record under noise: nothing, a line, several, a modulated one, growth, a ring-down, or no line."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+
+from .judge import JudgeOptions, Verdict, judge
+from .lines import LEVEL, Fit, Line, constant_lines, density, envelope, fit, mains_lines, ring, strongest, wave
+from .series import Series, check_samples, harmonics, longest_part
+
+#: Share of the energy of a ring-down that may be left about its frequency, as its damping depends on the amplitude.
+_LEFT = 0.01
+#: Most power about a line, beyond that of white noise, over that of the lines.
+_HELD = 0.3
+#: Smallest share of the band up to half the sampling rate that noise without memory fills.
+_FILLED = 0.3
+#: Cycles below which a level is not told from an oscillation.
+_FEW = 12
+#: Least of a ring-down, of its amplitude at the start, that is left where it has not died.
+_DIED = 0.02
+#: Cycles over which an amplitude is followed.
+_PARTS = 24
+
+
+@dataclass(frozen=True)
+class Motion:
+    """What moves.
+
+    Attributes
+    ----------
+    name, reason : str
+        As in a verdict.
+    lines : tuple of Line
+        The one that the verdict is about first.
+    modulation : (float, float), Hz
+        Frequency and half its 95 % interval.
+    start : float, s
+        Beginning of what was fitted.
+    noise : float
+        Root mean square of the noise.
+    left : float
+        Share of the power that neither lines nor level hold.
+    """
+
+    name: str
+    reason: str
+    lines: tuple[Line, ...] = ()
+    modulation: tuple[float, float] = (np.nan, np.nan)
+    start: float = np.nan
+    noise: float = np.nan
+    left: float = np.nan
+    notes: tuple[str, ...] = field(default=())
+
+
+#: Cycles a sample beyond which an oscillation is none.
+_FASTEST = 0.4
+#: Frequencies of the mains, Hz.
+MAINS = (50.0, 60.0)
+#: Samples without which no line is sought, and motions that are one.
+_FEWEST, _LINES = 64, ("decayed", "growing", "limit cycle", "modulated", "several lines", "mains")
+
+
+def judge_record(
+    time, values, options: JudgeOptions = JudgeOptions(), *, detrend: bool = True, closed_below: float | None = None
+) -> Verdict:
+    """Verdict on a measured record: what oscillates under its noise, on a level that may drift; of what has no line the
+    level, as `judge` has it.
+
+    Parameters
+    ----------
+    time, values, options, closed_below
+        As for `judge`.
+    detrend : bool
+        Take a polynomial level off.
+
+    Raises
+    ------
+    ValueError
+        If the samples are no series.
+    """
+    time, values = check_samples(time, values)
+    level = judge(time, values, options, closed_below=closed_below)
+    part, _ = longest_part(time)
+    if level.name == "closed" or len(time[part]) < _FEWEST or not np.ptp(values[part]):
+        return level
+    series = Series.of(time[part], values[part])
+    found = find_motion(series, detrend, MAINS)
+    mean, rms = float(series.values.mean()), float(series.values.std())
+    if found.name not in _LINES:
+        if found.name == "steady" and level.name != "steady":
+            words = "Nothing stands out of its noise."
+            return replace(level, name="steady", decided=True, reason=words, noise=found.noise, cycles=0, period=np.nan)
+        if level.name in ("steady", "decaying", "undecided"):
+            return level
+        return replace(level, name="irregular", decided=True, reason=found.reason)
+    line = found.lines[0]
+    if line.frequency * series.step > _FASTEST or line.amplitude > 2.0 * np.ptp(series.values):
+        return level  # a level that moves without noise is met by the fastest or the largest of oscillations
+    cycles = int(series.duration * line.frequency)
+    told = tuple(_summary(one) for one in found.lines)
+    shape = np.zeros((0, 2))
+    if found.name == "limit cycle" and cycles >= 3:
+        shape = harmonics(series, 1.0 / line.frequency, min(cycles, 200))
+    spacing = {}
+    if np.isfinite(found.modulation[0]):
+        spacing = dict(zip(("frequency", "frequency_interval"), map(float, found.modulation)))
+    return Verdict(
+        found.name,
+        True,
+        found.reason,
+        mean=mean,
+        amplitude=line.amplitude,
+        period=1.0 / line.frequency,
+        cycles=cycles,
+        amplitude_trend=float(np.expm1(line.rate / line.frequency)),
+        harmonics=shape,
+        rms=rms,
+        smallest=level.smallest,
+        largest=level.largest,
+        noise=found.noise,
+        judged=level.judged,
+        notes=(*level.notes, *found.notes),
+        lines=told,
+        modulation=spacing,
+    )
+
+
+def _summary(line: Line) -> dict[str, Any]:
+    """Numbers of an oscillation; intervals are half those of 95 %."""
+    frequency, rate, amplitude = (float(error) if np.isfinite(error) else None for error in line.errors)
+    moves = {"rate": line.rate, "rate_interval": rate, "damping_ratio": line.damping_ratio}
+    moves |= {"damping_ratio_interval": line.ratio_error}
+    return {
+        "frequency": float(line.frequency),
+        "frequency_interval": frequency,
+        "amplitude": float(line.amplitude),
+        "amplitude_interval": amplitude,
+        **({name: None if value is None else float(value) for name, value in moves.items()} if line.rate else {}),
+        "called": line.called,
+    }
+
+
+def find_motion(series: Series, detrend: bool = True, mains: Sequence[float] = ()) -> Motion:
+    """What moves in even samples.
+
+    Parameters
+    ----------
+    series : Series
+    detrend : bool
+        Take a polynomial level off.
+    mains : sequence of float, Hz
+        Frequencies that may be picked up.
+    """
+    level = LEVEL if detrend else 0
+    rails = clipped(series.values)
+    flat = fit(series, (), level)
+    picked = mains_lines(series, flat.left, mains)
+    base = fit(series, picked, level)
+    picked = tuple(replace(line, called="mains") for line in base.lines)
+    frequency, margin, _, cell = strongest(base.left, series.step, 1.5 / series.duration)
+    # slopes show what rings beside a level that moves
+    steep, above, _, beside = strongest(np.diff(base.left), series.step, 1.5 / series.duration)
+    if not max(margin, above) > 0:
+        return _without_lines(base, series, picked)
+    sought = [(f, c) for f, m, c in ((frequency, margin, cell), (steep, above, beside)) if m > 0]
+    for hum in dict.fromkeys((picked, ())) if rails is None else ():
+        freed = Series(series.start, series.step, series.values - sum(wave(line, series) for line in hum))
+        for found, cell in sought:
+            rung = _ringing(freed, found, cell, level)
+            if rung is not None:
+                return replace(rung, lines=rung.lines + hum)
+    fitted, whole = constant_lines(series, picked, level, rails)
+    found = _named(fitted, whole, series)
+    return found
+
+
+def clipped(values: np.ndarray) -> tuple[float, float] | None:
+    """Rails at which a record is clipped; None where it is not: more than a hundredth of it, and four in a row, at an
+    extreme value.
+    """
+    low, high = float(values.min()), float(values.max())
+    hits = []
+    for rail in (low, high):
+        at = values == rail
+        runs = np.convolve(at, np.ones(3), "valid").max() if len(values) > 3 else 0
+        hits.append(at.mean() > 0.01 and runs >= 3 and len(np.unique(values[:2000])) > 200)
+    if not any(hits):
+        return None
+    return (low if hits[0] else -np.inf, high if hits[1] else np.inf)
+
+
+def _ringing(series: Series, frequency: float, cell: tuple[int, int], level: int) -> Motion | None:
+    """Growth or a ring-down, if one oscillation whose rate is free leaves nothing about its frequency."""
+    period = 1.0 / frequency
+    width = max(period, cell[1] * series.step / 8.0)
+    slope = Series(series.start, series.step, np.gradient(series.values))
+    swing = envelope(slope, frequency, width)
+    at = int(np.argmax(swing))
+    start = 0
+    before = swing[: max(at - int(2 * width / series.step), 0)]
+    if len(before) * series.step > 2 * period and np.median(before) < 0.4 * swing[at]:
+        start = at
+    starts = dict.fromkeys([0] + [int(at + share * period / series.step) for share in (0, 0.5, 1, 2, 4)])
+    tolerable = None
+    for begin in starts:
+        if begin > 0.9 * len(series.values) or len(series.values) - begin < 32:
+            continue
+        part = Series(series.start + begin * series.step, series.step, series.values[begin:])
+        degree = (min(level, 3) if part.duration * frequency > _FEW else min(level, 1)) if level else 0
+        found = ring(part, frequency, degree)
+        line = found.lines[0]
+        if not 0.5 < line.frequency / frequency < 2.0:
+            continue
+        change = line.rate * part.duration
+        if abs(change) < max(2.0 * line.errors[1] * part.duration, 0.02):
+            if begin == 0 and start == 0:
+                return None
+            continue
+        if change > 0 and begin:
+            continue
+        energy = line.amplitude**2 * part.duration / 4.0 * np.expm1(2 * min(change, 300)) / (2 * change)
+        _, margin, left, _ = strongest(found.left, part.step, 0.0, 1.5 * line.frequency)
+        if begin * part.step > 8.0 / frequency:
+            early = series.values[: int(begin - 2.0 * width / part.step)]
+            _, before, rest, _ = strongest(early, part.step, 0.5 * frequency) if len(early) > 64 else (0, 0.0, 0.0, 0)
+            if before > 0 and rest > _LEFT * energy:
+                continue
+        if not margin > 0:
+            return _rung(line, part, found)
+        if left < _LEFT * energy and tolerable is None:
+            tolerable = _rung(line, part, found)
+    return tolerable
+
+
+def _rung(line: Line, part: Series, found: Fit) -> Motion:
+    _, floor = density(found.left, part.step)
+    noise = float(np.sqrt(floor.sum() / part.duration))
+    change = line.rate * part.duration
+    if change > 0:
+        words = f"The amplitude grows by {100 * line.rate / line.frequency:.2g} % a cycle."
+        return Motion("growing", words, (line,), start=part.start, noise=noise)
+    end = float(np.exp(change))
+    died = ", to its end" if end < _DIED or (end * line.amplitude < noise and end < 0.3) else ""
+    words = f"It rings down by {-100 * line.rate / line.frequency:.2g} % a cycle{died}."
+    return Motion("decayed", words, (line,), start=part.start, noise=noise)
+
+
+def _named(fitted: Fit, whole: bool, series: Series) -> Motion:
+    own = [line for line in fitted.lines if line.called != "mains" and line.amplitude > 3.0 * line.errors[2]]
+    mains = tuple(line for line in fitted.lines if line.called == "mains")
+    _, floor = density(fitted.left, series.step)
+    noise = float(np.sqrt(floor.sum() / series.duration))
+    facts = {"start": series.start, "noise": noise}
+    if not own:
+        return _without_lines(fitted, series, mains)
+    strong = own[0]
+    _, margin, rest, _ = strongest(fitted.left, series.step, 0.5 * strong.frequency)
+    bursts = margin > 0 and rest > 0.05 * strong.amplitude**2 * series.duration / 4.0
+    if not whole or bursts or _hump(fitted.left, series, strong, 0.5 * sum(line.amplitude**2 for line in own)):
+        return Motion("irregular", "Neither its phase nor its spectrum is a line.", fitted.lines, **facts)
+    resolution = 1.0 / series.duration
+    base = _fundamental(own, resolution)
+    if base:
+        lead = min(own, key=lambda line: abs(line.frequency - base))
+        lines = tuple(
+            replace(line, called="" if line is lead else f"{line.frequency / base:.0f} times the first")
+            for line in sorted(own, key=lambda line: line is not lead)
+        )
+        return Motion("limit cycle", "A line of constant amplitude and phase.", lines + mains, **facts)
+    modulated = _modulation(own, resolution)
+    if modulated is not None:
+        carrier, spacing = modulated
+        rest = tuple(replace(line, called="sideband") for line in own if line is not carrier)
+        return Motion(
+            "modulated", "Its amplitude or frequency is modulated.", (carrier, *rest, *mains), spacing, **facts
+        )
+    return Motion("several lines", "Several lines.", (*own, *mains), **facts)
+
+
+def _hump(left: np.ndarray, series: Series, line: Line, held: float) -> bool:
+    power, floor = density(left, series.step)
+    at = int(round(line.frequency * series.duration))
+    near = np.r_[max(1, at - 12) : max(1, at - 1), at + 2 : at + 13]
+    near = near[near < len(power)]
+    around = power[at // 2 : at + at // 2 + 1]
+    beyond = (around.sum() - len(around) * np.median(floor)) / series.duration
+    if beyond > _HELD * held:
+        return True
+    energy = line.amplitude**2 * series.duration / 4.0
+    return bool(
+        len(near)
+        and power[near].mean() > (1.0 + 4.0 * np.sqrt(2.0 / len(near))) * floor[min(at, len(floor) - 1)]
+        and power[near].sum() > 2.0 * _LEFT * energy
+    )
+
+
+def _fundamental(lines: Sequence[Line], resolution: float) -> float:
+    """Frequency of which all lines are multiples, that of the strongest or a fraction of it; zero without one."""
+    strong = lines[0]
+    for fraction in (1, 2, 3, 4):
+        base = strong.frequency / fraction
+        if base < 3.0 * resolution:
+            break
+        numbers = [max(1, round(line.frequency / base)) for line in lines]
+        if all(
+            line.within(n * base, 0.1 * resolution + n / fraction * 2 * strong.errors[0])
+            for n, line in zip(numbers, lines)
+        ):
+            return base
+    return 0.0
+
+
+def _modulation(lines: Sequence[Line], resolution: float):
+    for carrier in lines[:3]:
+        above = [line for line in lines if line.frequency > carrier.frequency]
+        for upper in above:
+            spacing = upper.frequency - carrier.frequency
+            if spacing > 0.5 * carrier.frequency:
+                continue
+            lower = [
+                line for line in lines if line.within(carrier.frequency - spacing, 0.2 * resolution + upper.errors[0])
+            ]
+            if not lower or not 0.3 < lower[0].amplitude / upper.amplitude < 3.0:
+                continue
+            orders = [
+                (line.frequency - carrier.frequency) / spacing for line in lines if line.frequency > 1.5 * spacing
+            ]
+            if all(
+                abs(n - round(n)) * spacing < 0.3 * resolution + 3 * max(l.errors[0] for l in lines) for n in orders
+            ):
+                half = 0.5 * (upper.frequency - lower[0].frequency)
+                return carrier, (half, 0.5 * float(np.hypot(upper.errors[0], lower[0].errors[0])))
+    return None
+
+
+def _without_lines(fitted: Fit, series: Series, mains: tuple[Line, ...]) -> Motion:
+    values = fitted.left
+    power, floor = density(values, series.step)
+    noise = float(values.std())
+    facts = {"lines": mains, "start": series.start, "noise": noise}
+    bands = np.array([band.mean() for band in np.array_split(power[2:], min(16, max(2, len(power) // 16)))])
+    filled = bands.sum() ** 2 / (len(bands) * (bands**2).sum()) if bands.min() > 0 else 0.0
+    parts = np.array([part.std() for part in np.array_split(values, 4)])
+    if filled < _FILLED or parts.max() > 1.5 * parts.min():
+        return Motion("irregular", "It moves without a line.", **facts)
+    if mains:
+        return Motion("mains", "Nothing but the mains.", **facts)
+    return Motion("steady", "It is noise.", **facts)

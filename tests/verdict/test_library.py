@@ -1,0 +1,90 @@
+"""Verdicts on records with known truths: right, with intervals that hold them, and the same for any length."""
+
+import numpy as np
+import pytest
+
+from dbvfiv.verdict import judge_record
+from tests.verdict.library import EACH, records
+
+#: Samples up to which a record is judged in `make test`.
+SHORT = 20_000
+
+
+def judged(record):
+    return judge_record(record.time, record.values)
+
+
+def marks(record, verdict):
+    """Distance of each known number from what was found, over half its 95 % interval."""
+    line = min(verdict.lines, key=lambda one: abs(one["frequency"] - record.truths.get("frequency", 0.0)), default=None)
+    found = []
+    for name, truth in record.truths.items():
+        source, key = (verdict.modulation, "frequency") if name == "modulation" else (line, name)
+        if source and source.get(key) is not None and source.get(f"{key}_interval"):
+            found.append(abs(source[key] - truth) / source[f"{key}_interval"])
+    return found
+
+
+def test_short_records_are_told_right():
+    chosen = [record for record in records(3, seed=1) if len(record.time) < SHORT]
+    assert len({record.kind for record in chosen}) >= 18
+    wrong = [r.kind for r in chosen if judged(r).name not in r.names]
+    assert len(wrong) <= 0.03 * len(chosen), wrong
+
+
+@pytest.mark.slow
+def test_the_library_is_told_right_and_intervals_hold_the_truth():
+    right, distances, count = 0, [], 0
+    for record in records(EACH):
+        verdict, count = judged(record), count + 1
+        if verdict.name in record.names:
+            right += 1
+            distances += marks(record, verdict)
+    print(f"\n{right} of {count} right, {np.mean(np.array(distances) <= 1):.3f} of {len(distances)} intervals hold")
+    assert right >= 0.97 * count
+    assert 0.90 <= np.mean(np.array(distances) <= 1) <= 0.99
+
+
+def ring(duration, noise=0.02):
+    time = np.arange(0.0, duration, 2e-3)
+    values = np.exp(-0.8 * time) * np.sin(2 * np.pi * 12 * time) + noise * np.random.default_rng(2).standard_normal(
+        len(time)
+    )
+    return judge_record(time, values)
+
+
+@pytest.mark.parametrize("duration", [2.0, 4.0, 10.0, 25.0])
+def test_a_ring_down_is_the_same_in_records_of_any_length(duration):
+    found = ring(duration)
+    (line,) = found.lines
+    assert found.name == "decayed" and abs(line["frequency"] - 12) < 1.5 * line["frequency_interval"]
+    ratio = 0.8 / np.hypot(0.8, 2 * np.pi * 12)
+    assert abs(line["damping_ratio"] - ratio) < 1.5 * line["damping_ratio_interval"] < 0.3 * ratio
+
+
+@pytest.mark.parametrize("drift", [0.0, 0.5])
+def test_a_line_under_noise_on_a_drifting_level_is_a_line(drift):
+    time = np.arange(0.0, 8.0, 2e-3)
+    values = np.sin(2 * np.pi * 38.3 * time) + drift * time + np.random.default_rng(4).standard_normal(len(time))
+    found = judge_record(time, values)
+    assert found.name == "limit cycle" and found.frequency == pytest.approx(38.3, abs=0.01)
+    assert found.lines[0]["amplitude"] == pytest.approx(1.0, abs=0.05) and found.noise == pytest.approx(1.0, rel=0.05)
+
+
+def test_a_level_without_noise_is_no_oscillation():
+    time = np.arange(0.0, 10.0, 2e-3)
+    assert judge_record(time, 5 - 3 * np.exp(-time / 2)).name == "decaying"
+    assert judge_record(time, np.full(len(time), 5.0)).name == "steady"
+
+
+def test_dates_and_numbered_samples_are_read(command_line, tmp_path):
+    time = np.arange(0.0, 6.0, 0.01)
+    values = np.sin(2 * np.pi * 5 * time)
+    moments = np.datetime64("2026-03-01T12:00:00.000") + (1000 * time).round().astype("timedelta64[ms]")
+    (tmp_path / "iso.csv").write_text("\n".join(["when,p", *(f"{m},{v:.8f}" for m, v in zip(moments, values))]))
+    (tmp_path / "numbered.csv").write_text("\n".join(["sample,p", *(f"{i},{v:.8f}" for i, v in enumerate(values))]))
+    told = command_line("verdict", tmp_path / "iso.csv")
+    assert told.status == 0 and "limit cycle" in told.out and "5 +- " in told.out
+    asked = command_line("verdict", tmp_path / "numbered.csv")
+    assert asked.status == 2 and "give their rate with --rate" in asked.err
+    assert "5 +- " in command_line("verdict", tmp_path / "numbered.csv", "-c", "p", "--rate", "100").out
