@@ -66,9 +66,10 @@ def test_a_parameter_of_a_flow_term_is_a_row(copy, tmp_path):
     (tmp_path / "dbvfiv/flow/terms/lip_loss.py").write_text(term)
     for name, place, line in (
         ("physics", "    unsteady: StrictBool = key(", key.split("\n", 1)[1]),
-        ("parameters", '    Parameter(\n        name="thickness",', row[1]),
+        ("parameters", '    Parameter("thickness",', row[1]),
     ):
         file = tmp_path / f"dbvfiv/case/{name}.py"
+        assert place in file.read_text()
         file.write_text(file.read_text().replace(place, line + place, 1))
     coarse = *THESIS_SET, "--set=mesh.around=6", "--set=mesh.along=8", "--set=fluid.density=10", "-p", "6 kPa", "--json"
     swept = json.loads(copy("sweep", "--over", "lip_loss=0:1:3", *coarse))
