@@ -132,7 +132,7 @@ Series = Annotated[
 
 
 class Relaxing(Section):
-    """What any material has besides the constants of its long-term (equilibrium) law: a factor on them, and its
+    """Keys of any material besides the constants of its long-term (equilibrium) law: a factor on them, and its
     viscoelasticity, given in one of several ways.
     """
 

@@ -1,4 +1,4 @@
-"""What moves in a record under noise: nothing, a line, several, a modulated one, growth, a ring-down, or no line."""
+"""Motions in a record under noise: nothing, a line, several, a modulated one, growth, a ring-down, or no line."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ _PARTS = 24
 
 @dataclass(frozen=True)
 class Motion:
-    """What moves.
+    """Motion in a record.
 
     Attributes
     ----------
@@ -145,7 +145,7 @@ def _summary(line: Line) -> dict[str, Any]:
 
 
 def find_motion(series: Series, detrend: bool = True, mains: Sequence[float] = ()) -> Motion:
-    """What moves in even samples.
+    """Motion in even samples.
 
     Parameters
     ----------

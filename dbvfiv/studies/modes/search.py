@@ -400,7 +400,7 @@ def run_modes(
 
 
 def _contact_notes(model, state: SteadyState, linear, modes: Sequence[ModeShape], symmetry: Symmetry) -> list[str]:
-    """What holds the modes of a bill that is moulded shut, and up to which amplitude."""
+    """Limits of the modes of a bill that is moulded shut, and up to which amplitude."""
     if not model.case.valve.is_preset:
         return []
     said = []
