@@ -6,13 +6,13 @@ valve of the thesis, ``cases/dbv12.toml``.
 
 from __future__ import annotations
 
+import math
 import sys
 from collections.abc import Collection, Iterable, Iterator, Mapping
 from importlib import import_module
 from pathlib import Path
 from typing import Any, Self
 
-import numpy as np
 from pydantic import create_model, model_validator
 
 from ..case.describe import page
@@ -286,7 +286,7 @@ def _forgotten_units(case: Case, kind: str | None) -> Iterator[str]:
 
 def oddities(case: Case) -> Iterator[str]:
     """Sentences on keys that are allowed and seldom meant: half widths that are whole, degrees that are radians."""
-    flat, half = 0.5 * np.pi * case.valve.inlet_radius, case.valve.lip_half_width
+    flat, half = 0.5 * math.pi * case.valve.inlet_radius, case.valve.lip_half_width
     if half > flat and not case.valve.key_points:
         yield (
             f"valve.lip_half_width is {1e3 * half:.4g} mm, while the pipe pressed flat is {2e3 * flat:.4g} mm wide in "
@@ -296,7 +296,7 @@ def oddities(case: Case) -> Iterator[str]:
     if case.has_line and not case.upstream.pieces and pipe is not None and not 0.5 < pipe / bore < 2.0:
         yield f"upstream.diameter is {1e3 * pipe:.4g} mm before a valve of {1e3 * bore:.4g} mm."
     for i, layer in enumerate(case.layers):
-        if 0 < abs(layer.angle) <= np.pi and layer.angle % 1:
+        if 0 < abs(layer.angle) <= math.pi and layer.angle % 1:
             yield f'layers.{i}.angle is {layer.angle:g} degrees; radians are given as "{layer.angle:g} rad".'
 
 

@@ -37,6 +37,9 @@ RUNS = {
     "sensitivity": lambda valve, path: valve.sensitivity(["pressure", "thickness"], output=path),
     "onset": lambda valve, path: valve.onset("alpha=0.1:30:3:log", output=path),
     "map": lambda valve, path: valve.map("density=1:100:3:log", "alpha=0.1:30:3:log", output=path),
+    "uncertainty": lambda valve, path: valve.uncertainty(
+        "pressure=1000,2000", samples=16, inputs={"thickness": "normal(4 %)"}, output=path
+    ),
     "transient": lambda valve, path: valve.transient("20 ms", output=path),
     "levels": lambda valve, path: valve.levels([1e3, 2e3], output=path),
     "cycle": lambda valve, path: valve.replace(OSCILLATING).cycle("density=236:260:2", output=path),
@@ -139,8 +142,7 @@ def last_rows(record: Record, table: str) -> list[int] | np.ndarray | slice:
     """Those of the attempt that went to its end; a restart point that was kept again at the same step once."""
     if table == "restart":
         return np.unique(record.column(table, "steps"), return_index=True)[1]
-    over = record.notes("over")
-    return slice(*over[-1]["rows"][table]) if over else valid_rows(record, table)
+    return valid_rows(record, table)
 
 
 def reference(kind: str, path: Path) -> dict:
