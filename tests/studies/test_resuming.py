@@ -93,7 +93,7 @@ def slow(*where):
     [
         ("modes", 0.5),
         ("sweep", 0.5),
-        ("onset", 0.1),
+        slow("onset", 0.1),
         slow("onset", 0.4),
         slow("onset", 0.7),
         slow("onset", 0.99),
