@@ -89,7 +89,6 @@ def judge_record(
         return level
     series = Series.of(time[part], values[part])
     found = find_motion(series, detrend, MAINS)
-    mean, rms = float(series.values.mean()), float(series.values.std())
     if found.name not in _LINES:
         if found.name == "steady" and level.name != "steady":
             words = "Nothing stands out of its noise."
@@ -101,6 +100,8 @@ def judge_record(
     if line.frequency * series.step > _FASTEST or line.amplitude > 2.0 * np.ptp(series.values):
         return level  # a level that moves without noise is met by the fastest or the largest of oscillations
     cycles = int(series.duration * line.frequency)
+    count = round(cycles / (line.frequency * series.step))  # samples of whole cycles
+    swung = series.values[-count:] if cycles else series.values
     told = tuple(_summary(one) for one in found.lines)
     shape = np.zeros((0, 2))
     if found.name == "limit cycle" and cycles >= 3:
@@ -112,13 +113,13 @@ def judge_record(
         found.name,
         True,
         found.reason,
-        mean=mean,
+        mean=float(swung.mean()),
         amplitude=line.amplitude,
         period=1.0 / line.frequency,
         cycles=cycles,
         amplitude_trend=float(np.expm1(line.rate / line.frequency)),
         harmonics=shape,
-        rms=rms,
+        rms=float(swung.std()),
         smallest=level.smallest,
         largest=level.largest,
         noise=found.noise,

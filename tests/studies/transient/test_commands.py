@@ -74,10 +74,10 @@ def test_verdict_of_csv(command_line, tmp_path):
     assert (lift["mean"], lift["amplitude"], lift["rms"]) == pytest.approx((2, 1, np.sqrt(0.5)), rel=1e-3)
     assert (lift["smallest"], lift["largest"]) == pytest.approx((1, 3), abs=1e-3)
     assert lift["peaks"][0]["frequency"] == pytest.approx(20 / (2 * np.pi), abs=0.1)
-    assert drag["verdict"] == "decaying"
+    assert drag["verdict"] == "decayed"
     assert {p.name for p in (tmp_path / "figures").iterdir()} == {"lift.png", "drag.png"}
     outcome = command_line("verdict", file, "-c", "drag")
-    assert outcome.out.startswith("drag: decaying")
+    assert outcome.out.startswith("drag: decayed")
 
 
 def test_verdict_without_times(command_line, tmp_path):
