@@ -297,10 +297,10 @@ def _judged(file: Path, signal: Signal, options: JudgeOptions, closed_below: flo
         after = "" if reading.since is None else f" from {reading.since:g} s on"
         raise CaseError(f"Column {signal.name!r} of {str(file)!r} has {number}{after}, and two are needed at least.")
     try:
-        if not signal.measured:
-            return judge(signal.time, signal.values, options, closed_below=closed_below)
-        options = {"options": options, "closed_below": closed_below, "detrend": reading.detrend}
-        return judge_record(signal.time, signal.values, **options)
+        given = signal.time, signal.values, options
+        if signal.measured:
+            return judge_record(*given, closed_below=closed_below, detrend=reading.detrend)
+        return judge(*given, closed_below=closed_below)
     except ValueError as error:
         text = str(error).rstrip(".")
         raise CaseError(

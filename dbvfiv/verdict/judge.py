@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from .lines import PEAK
 from .series import (
     Cycles,
     Series,
@@ -164,10 +165,7 @@ _NUMBERS += ("rms", "smallest", "largest", "noise")
 _SHARE, _FEWEST_OF_NOISE = 0.2, 64
 _BANDS = 16
 #: Smallest share of the band up to half the sampling rate that noise fills.
-_FILLED = 0.3
-#: Margin of a line over the largest of so many values of a noise's spectrum, which is the logarithm of their number in
-#: the mean; beyond it lies noise once in a thousand records.
-_LINE = 7.0
+FILLED = 0.3
 #: Standard errors by which the level may move.
 _LEVEL = 4.0
 
@@ -196,7 +194,7 @@ def noise_at_end(series: Series) -> tuple[float, float] | None:
     chance = rms * np.sqrt(2.0 / (filled * count / 3.0))
     halves = [half.std() for half in np.array_split(values, 2)]
     even = max(halves) <= 1.5 * min(halves)
-    if filled < _FILLED or line > np.log(len(power)) + _LINE or moved > _LEVEL * chance or not even:
+    if filled < FILLED or line > np.log(len(power)) + PEAK or moved > _LEVEL * chance or not even:
         return None
     return level, rms
 

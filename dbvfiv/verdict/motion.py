@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from .judge import JudgeOptions, Verdict, judge
+from .judge import FILLED, JudgeOptions, Verdict, judge
 from .lines import LEVEL, Fit, Line, constant_lines, density, envelope, fit, mains_lines, ring, strongest, wave
 from .series import Series, check_samples, harmonics, longest_part
 
@@ -16,8 +16,6 @@ from .series import Series, check_samples, harmonics, longest_part
 _LEFT = 0.01
 #: Most power about a line, beyond that of white noise, over that of the lines.
 _HELD = 0.3
-#: Smallest share of the band up to half the sampling rate that noise without memory fills.
-_FILLED = 0.3
 #: Cycles below which a level is not told from an oscillation.
 _FEW = 12
 #: Least of a ring-down, of its amplitude at the start, that is left where it has not died.
@@ -346,7 +344,7 @@ def _without_lines(fitted: Fit, series: Series, mains: tuple[Line, ...]) -> Moti
     bands = np.array([band.mean() for band in np.array_split(power[2:], min(16, max(2, len(power) // 16)))])
     filled = bands.sum() ** 2 / (len(bands) * (bands**2).sum()) if bands.min() > 0 else 0.0
     parts = np.array([part.std() for part in np.array_split(values, 4)])
-    if filled < _FILLED or parts.max() > 1.5 * parts.min():
+    if filled < FILLED or parts.max() > 1.5 * parts.min():
         return Motion("irregular", "It moves without a line.", **facts)
     if mains:
         return Motion("mains", "Nothing but the mains.", **facts)

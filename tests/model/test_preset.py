@@ -181,7 +181,7 @@ def test_presets_that_cannot_be_are_refused_in_a_sentence(keys, words):
 
 
 def test_still_fluid_behind_a_seal_is_the_mass_of_what_the_wall_displaces():
-    """Of a straight passage whose sections widen alike from the seal on: -rho/(2 a) [(l - s)^2 - (z - s)^2]."""
+    """Pressure where sections widen alike from the seal of a straight passage: -rho/(2 a) [(l - s)^2 - (z - s)^2]."""
     z, area, seal = np.linspace(0.0, 0.5, 11) ** 1.5, 2e-3, 3
     channel = Channel(z, 1e-9, storage=1.0)
     given = {"inlet": 1e3, "density": 900.0}

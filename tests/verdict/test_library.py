@@ -29,7 +29,7 @@ def test_short_records_are_told_right():
     chosen = [record for record in records(1, seed=1) if len(record.time) < SHORT]
     assert len({record.kind for record in chosen}) >= 12
     wrong = [r.kind for r in chosen if judged(r).name not in r.names]
-    assert len(wrong) <= 1, wrong
+    assert len(wrong) <= 0.03 * len(chosen), wrong
 
 
 @pytest.mark.slow

@@ -19,7 +19,7 @@ from ...case.parameters import DESIGN, PARAMETERS, SURROUNDINGS, Mu
 from ...errors import CaseError, SolveError
 from ...model import ValveModel, linearise
 from ...model.newton import EquilibriumSolver, NewtonOptions
-from ..stability.place import is_surrounding, redesigned, require_parameter
+from ..stability.place import design_value, is_surrounding, redesigned, require_parameter
 
 
 @dataclass(frozen=True)
@@ -77,20 +77,13 @@ def _has(model: ValveModel, name: str) -> bool:
     """True where a parameter of the table acts on the valve and has one value there."""
     if name in ("density", "storage"):
         return model.flow.has_fluid and model.flow.unsteady
-    if name == "angle":  # of all plies at once
-        return len({abs(layer.angle) for layer in model.case.layers if layer.angle}) == 1
-    if name == "strain":  # of all rubbers at once
-        return len(set(_levels(model).values())) == 1
+    if name in ("angle", "strain"):
+        return design_value(model.case, name) is not None
     try:
         require_parameter(model.case, name)
     except CaseError:
         return False
     return True
-
-
-def _levels(model: ValveModel) -> dict[str, float]:
-    """Strain levels of the rubbers in a wall."""
-    return model.case.materials.levels({layer.material for layer in model.case.layers})
 
 
 def unit_of(name: str) -> str:
@@ -191,14 +184,8 @@ def _value(model, pressure, mu, name) -> float:
         return pressure
     if name in SURROUNDINGS:
         return Mu.of(model.case).at(**mu)[name]
-    if name == "thickness":
-        return 1.0
-    if name == "angle":
-        return max(abs(layer.angle) for layer in model.case.layers)
-    if name == "strain":
-        return max(_levels(model).values())  # of all rubbers: see `_has`
-    if name == "sealing":
-        return model.case.valve.sealing_pressure
+    if name in DESIGN:
+        return design_value(model.case, name)
     i, quantity = _layer(name)
     layer = model.shell.section.layers[i]
     return float(getattr(layer if quantity in ("thickness", "angle") else layer.law, quantity))

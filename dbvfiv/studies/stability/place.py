@@ -141,6 +141,19 @@ def require_parameter(case: Case, name: str) -> None:
         raise CaseError("There is no fibre angle to change, because every layer lies at 0 degrees.")
 
 
+def design_value(case: Case, name: str) -> float | None:
+    """Value of a parameter of the design in a case, as `redesigned` takes it; None where there is no one value."""
+    if name == "thickness":
+        return 1.0
+    if name == "sealing":
+        return case.valve.sealing_pressure
+    if name == "angle":  # of all plies at once
+        values = {abs(layer.angle) for layer in case.layers if layer.angle}
+    else:  # strain, of all rubbers at once
+        values = set(case.materials.levels({layer.material for layer in case.layers}).values())
+    return values.pop() if len(values) == 1 else None
+
+
 def redesigned(case: Case, design: Mapping[str, float]) -> Case:
     """A case with design parameters changed: wall thickness factor, size of the angle of all plies (degrees), strain
     level (0.1 for 10 %); any other by its key, such as the length of the line where the steady state depends on it.

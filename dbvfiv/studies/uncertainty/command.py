@@ -14,7 +14,7 @@ from ...case.model import Case
 from ...case.parameters import listed
 from ...case.quantity import Number, number_or_text
 from ...case.section import Described, Section, key
-from ..request import DensityOption, LawOption, PressureOption, Request, WorkersOption, law_changes, refuse_moved
+from ..request import DensityOption, LawOption, PressureOption, Request, WorkersOption, refuse_moved
 from ..workers import WORKERS_HELP, WorkersKey
 
 ORDER = 31
@@ -115,6 +115,4 @@ def command(
         "uncertainty.workers": workers,
         "fluid.continuity": law,
     }
-    if law == "both":
-        changes["fluid.continuity"] = law_changes(law, "onset")["onset.continuity"]
     return Request(changes)

@@ -19,7 +19,8 @@ from ...case.section import Section
 from ...errors import CaseError
 from ...materials.shipped import shipped_loss, shipped_loss_names
 from ..case import Case
-from ..stability.place import is_surrounding, require_parameter
+from ..stability.place import design_value, is_surrounding, require_parameter
+from ..stability.verdict import lowered
 
 #: Hardness of a compound lies within 5 Shore A of what was ordered (trade practice with ISO 48-4), a fifth of its shear
 #: modulus (Gent, Rubber Chem. Technol. 31, 1958, 896); read as 95 %.
@@ -141,8 +142,9 @@ def _input(case: Case, name: str, text: str, source: str) -> Input:
         try:
             require_parameter(case, name)
         except CaseError as error:
-            raise CaseError(f"{key} is given, but {str(error)[0].lower()}{str(error)[1:]}", key=key) from None
-        quantity, own, limits = row.quantity, _own(case, name), (row.low, row.high)
+            raise CaseError(f"{key} is given, but {lowered(str(error))}", key=key) from None
+        own = design_value(case, name) if row.design else Mu.of(case)[name]
+        quantity, limits = row.quantity, (row.low, row.high)
     else:
         field, value = _located(case, name, key)
         quantity = quantity_of(field)
@@ -162,19 +164,6 @@ def _input(case: Case, name: str, text: str, source: str) -> Input:
             key=key,
         )
     return Input(name, distribution, quantity, source, name in PARAMETERS and is_surrounding(case, name))
-
-
-def _own(case: Case, name: str) -> float | None:
-    """Value of a parameter of the table in the case, SI, angles in degrees."""
-    if name == "thickness":
-        return 1.0
-    if name == "angle":
-        sizes = {abs(layer.angle) for layer in case.layers if layer.angle}
-        return sizes.pop() if len(sizes) == 1 else None
-    if name == "strain":
-        levels = set(case.materials.levels({layer.material for layer in case.layers}).values())
-        return levels.pop() if len(levels) == 1 else None
-    return Mu.of(case)[name]
 
 
 def _located(case: Case, name: str, key: str) -> tuple[FieldInfo, Any]:
@@ -236,8 +225,8 @@ def _shipped(case: Case) -> Iterator[tuple[str, str, str]]:
     spread = tolerance / wall / 1.96
     source = f"ISO 3302-1, class M3: +-{tolerance:.2g} mm across the closure of the mould on {wall:.3g} mm"
     yield "thickness", f"normal(1, {spread:.3g})", source
-    if len({abs(layer.angle) for layer in case.layers if layer.angle}) == 1:
-        yield "angle", f"normal({_own(case, 'angle'):g}, 2)", "an estimate: plies laid by hand"
+    if (angle := design_value(case, "angle")) is not None:
+        yield "angle", f"normal({angle:g}, 2)", "an estimate: plies laid by hand"
     if case.has_line and not case.upstream.pieces and case.upstream.length:
         yield "pipe_length", "normal(2 %)", "an estimate: drawings against the pipe as laid"
     if case.has_waves and not case.upstream.pieces:

@@ -15,7 +15,7 @@ from ...case.parameters import PARAMETERS, Mu
 from ...errors import CaseError, SolveError
 from ...observer import Observer
 from ..case import Case
-from ..stability.verdict import OUTCOMES, UNDECIDED, Verdict
+from ..stability.verdict import OUTCOMES, Verdict
 from ..stability.walk import StabilityWalk
 from .inputs import Input, correlation_of, inputs_of
 
@@ -174,8 +174,3 @@ class Sampler:
             except (SolveError, CaseError, ValueError) as error:
                 verdict = Verdict.undecided(str(error))
             yield Found.of(sample, value, verdict, state)
-
-
-def is_decided(outcome: np.ndarray) -> np.ndarray:
-    """True for outcomes, by their numbers, that say something of the state."""
-    return outcome != OUTCOMES.index(UNDECIDED)

@@ -140,6 +140,16 @@ def _found(sampler: Sampler, first: int, numbers: np.ndarray) -> list[Found]:
     return sampler.found(first, numbers)
 
 
+def _performance(outcome: int, damping_ratio: float) -> float:
+    """How far a sample is beyond flutter; NaN where it is undecided."""
+    return np.nan if OUTCOMES[outcome] == UNDECIDED else -damping_ratio
+
+
+def _are(found: dict[str, np.ndarray], outcome: str) -> np.ndarray:
+    """True for samples of an outcome."""
+    return found["outcome"] == OUTCOMES.index(outcome)
+
+
 class _Sampling:
     """Samples found so far, and those still wanted; what an earlier attempt kept is not computed again."""
 
@@ -148,7 +158,11 @@ class _Sampling:
         self.asked = 0
         known, values = record.table_rows(_TABLES[0]), len(plan.values)
         counts = np.bincount([row["sample"] for row in known], minlength=1) if known else np.zeros(1, int)
-        self.known = {row["sample"]: -row["damping_ratio"] for row in known if counts[row["sample"]] == values}
+        self.known = {
+            row["sample"]: _performance(row["outcome"], row["damping_ratio"])
+            for row in known
+            if counts[row["sample"]] == values
+        }
 
     def verdicts(self, independent: np.ndarray, log_weight: np.ndarray, stage: int) -> np.ndarray:
         """Performance (m,) of samples, the least damping ratio with its sign turned, at the last value of the range."""
@@ -195,7 +209,7 @@ class _Sampling:
                 self.record.note(_WHY, sample=row.sample, value=row.value, reason=row.why)
         self.record.extend(SAMPLES, {c.name: [getattr(row, c.name) for row in fresh] for c in _SAMPLES})
         for row in fresh:
-            self.known[row.sample] = -row.damping_ratio if OUTCOMES[row.outcome] != UNDECIDED else np.nan
+            self.known[row.sample] = _performance(row.outcome, row.damping_ratio)
         for sample in new:
             self.record.item(sample)
 
@@ -271,8 +285,7 @@ class UncertaintyResult(StudyResult):
     def probability(self, value: float, outcome: str = FLUTTERS) -> Probability:
         """Probability of an outcome at a value of the range."""
         found = self.at(value)
-        number, undecided = OUTCOMES.index(outcome), found["outcome"] == OUTCOMES.index(UNDECIDED)
-        hits = found["outcome"] == number
+        hits, undecided = _are(found, outcome), _are(found, UNDECIDED)
         if self.case.uncertainty.method == "plain":
             return counted(int(hits.sum()), int(undecided.sum()), len(hits))
         last = found["stage"] == found["stage"].max(initial=0)
@@ -292,7 +305,7 @@ class UncertaintyResult(StudyResult):
             "probability": _plain(flutter.value),
             "interval": [flutter.low, flutter.high],
             "samples": len(found["outcome"]),
-            "undecided": int((found["outcome"] == OUTCOMES.index(UNDECIDED)).sum()),
+            "undecided": int(_are(found, UNDECIDED).sum()),
             "outcomes": {n: {"probability": _plain(p.value), "interval": [p.low, p.high]} for n, p in others.items()},
             "percentiles": spreads,
             "decides": self.decides(value),
@@ -303,10 +316,10 @@ class UncertaintyResult(StudyResult):
         the largest first; None where there are too few samples or nothing varies.
         """
         found = self.at(value)
-        plain = (found["stage"] == 0) & (found["outcome"] != OUTCOMES.index(UNDECIDED))
+        plain = (found["stage"] == 0) & ~_are(found, UNDECIDED)
         scores = found["scores"][plain]
         margin = shares(scores, found["damping_ratio"][plain])
-        outcome = shares(scores, (found["outcome"][plain] == OUTCOMES.index(FLUTTERS)).astype(float))
+        outcome = shares(scores, _are(found, FLUTTERS)[plain].astype(float))
         rows = [
             {"parameter": one.name, "share": _plain(m), "share_of_outcome": _plain(o)}
             for one, m, o in zip(self.plan.inputs, margin, outcome)

@@ -106,6 +106,13 @@ def test_shipped_inputs_name_their_sources():
     assert all(one.source for one in inputs.values())
 
 
+def test_a_sealing_pressure_may_be_uncertain():
+    keys = {**SMALL, "uncertainty.inputs": {"sealing": "normal(5 %)"}}
+    case = dbvfiv.load("cases/dbv12-moulded.toml", keys).case
+    (one,) = inputs_of(case)
+    assert one.distribution.numbers == (case.valve.sealing_pressure, 0.05 * case.valve.sealing_pressure)
+
+
 @pytest.mark.parametrize(
     ("changes", "clause"),
     [
