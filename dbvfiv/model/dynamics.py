@@ -189,6 +189,7 @@ def linearise(
     inlet: float,
     mu: Mapping[str, float] | None = None,
     inner: np.ndarray | None = None,
+    added: AddedMass | None = None,
 ) -> LinearisedState:
     """Linearise a state at rest.
 
@@ -200,6 +201,8 @@ def linearise(
         Inlet pressure, Pa.
     mu, inner : mapping and (l,) array, optional
         Parameters of the flow law and its unknowns, where the flow is not that of an equilibrium at `inlet`.
+    added : AddedMass, optional
+        That of the fluid outside, where that of the state is not wanted.
     """
     nodal = model.nodal(q)
     area, matrix = model.rows.areas(nodal), model.shell.dofs.matrix
@@ -210,6 +213,7 @@ def linearise(
         pressure, _ = model.flow.evaluate(FlowMotion.still(area, inner), mu)
     _, values = model.structure(q)
     structure, stiffness = matrix(values), matrix(model.stiffness(q, pressure, values))
-    added = None if model.outside is None else model.outside.added_mass(q, structure)
+    if added is None and model.outside is not None:
+        added = model.outside.added_mass(q, structure)
     coupled = model.station_forces(nodal), model.rows.jacobian(nodal), area, added, inner
     return LinearisedState(model, q, inlet, matrix(model.mass(q)), structure, stiffness, *coupled)

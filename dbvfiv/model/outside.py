@@ -206,6 +206,11 @@ class OutsideFluid:
         """E (ne, n), m2, and S (ne, ne), 1/m, at a state."""
         return self.face.fluxes(self.shell.dofs.expand(q)), self.impedance(q)
 
+    def resistance(self, q: np.ndarray, motions: np.ndarray, frozen: Panels | None = None) -> np.ndarray:
+        """Forces (n, k) of a fluid of unit density on accelerations (n, k): the whole added mass times these."""
+        fluxes = self.face.fluxes(self.shell.dofs.expand(q))
+        return fluxes.T @ (self.impedance(q, frozen) @ (fluxes @ motions))
+
     def added_mass(
         self, q: np.ndarray, structure: sp.csr_matrix, symmetry: str | None = None, shell: Shell | None = None
     ) -> AddedMass:

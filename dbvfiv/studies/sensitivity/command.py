@@ -24,7 +24,7 @@ class Keys(Section):
         "'layer 3 angle', 'layer 1 thickness' or 'layer 2 mu_0'; all that the valve has where none is named.",
     )
     mode: StrictInt = key(1, "Number of the mode, by falling growth rate.", ge=1, le=1000)
-    step: Number = key(1e-4, "Relative step of the differences.", gt=1e-8, le=1e-2)
+    step: Number = key(2e-5, "Relative step of the differences.", gt=1e-8, le=1e-2)
 
 
 def command(

@@ -1,14 +1,22 @@
-"""Derivatives of an eigenvalue with respect to parameters of the load, the surroundings and the wall.
+"""Derivatives of what a steady state does, by parameters of the load, the surroundings and the wall.
 
-d lambda = - w^H dT x / (w^H T' x) with left and right vectors of the coupled pencil (`eigen.eigenvalue_derivative`).
-The change of the pencil is taken through the equilibrium: parameters that move it are stepped by a small amount to
-either side and the steady state is found anew. Left and right vectors are needed at the state itself only, so one mode
-costs two warm-started equilibria for each parameter and no further eigenvalue search.
+The state moves along q' = -K^-1 dr/dmu, with K the coupled tangent and dr/dmu a central difference of the residual at
+fixed displacements; flow, opening and loss are differences along that line. An eigenvalue changes by
+
+    d lambda = - w^H dT x / (w^H T' x)
+
+with left and right vectors of the coupled pencil (`eigen.eigenvalue_derivative`) and dT the difference of the pencil
+along the same line. Neither a further equilibrium nor a further eigenvalue search is needed: a parameter costs a
+back-substitution and two linearisations, whatever the number of modes and of other quantities.
+
+Of the fluid outside, the added mass of the motions in these vectors is all that dT x sees.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -16,61 +24,241 @@ from eigen import CoupledPencil, Mode, Relaxation
 from eigen.derivative import difference, eigenvalue_derivative
 
 from ...case.parameters import DESIGN, PARAMETERS, SURROUNDINGS, Mu
-from ...errors import CaseError, SolveError
+from ...errors import CaseError
 from ...model import ValveModel, linearise
-from ...model.newton import EquilibriumSolver, NewtonOptions
-from ..stability.place import design_value, is_surrounding, redesigned, require_parameter
+from ...model.sizes import ValveSizes
+from ...model.state import describe_state
+from ..case import Case
+from ..stability.place import design_value, is_surrounding, key_of, redesigned, require_parameter
+
+#: What a steady state does beside vibrating: names, units and words.
+PERFORMANCE = {
+    "flow": ("m^3/s", "Volume flow"),
+    "opening": ("m^2", "Area between the lips"),
+    "loss_coefficient": ("", "Head loss over the velocity head at the flange"),
+    "mass": ("kg", "Mass of the wall"),
+}
+#: Keys of the shape that every valve can be changed by.
+SHAPE = ("valve.duckbill_length", "valve.saddle_length", "valve.lip_half_width")
 
 
 @dataclass(frozen=True)
 class Sensitivity:
-    """Derivative of one eigenvalue.
+    """Derivatives by one parameter.
 
     Attributes
     ----------
     parameter : str
     value : float
         SI; angles in degrees.
-    derivative : complex
-        1/s per unit of the parameter: growth rate and angular frequency.
+    eigenvalues : tuple of complex
+        1/s per unit of the parameter, of each mode: growth rate and angular frequency.
+    performance : dict of float
+        Per unit of the parameter, by the names of `PERFORMANCE`.
     """
 
     parameter: str
     value: float
-    derivative: complex
+    eigenvalues: tuple[complex, ...]
+    performance: dict[str, float]
+
+    @property
+    def derivative(self) -> complex:
+        """Of the eigenvalue of the first mode, 1/s per unit."""
+        return self.eigenvalues[0]
 
     @property
     def growth_rate(self) -> float:
-        """Change of the growth rate, 1/s per unit."""
+        """Change of its growth rate, 1/s per unit."""
         return self.derivative.real
 
     @property
     def frequency(self) -> float:
-        """Change of the frequency, Hz per unit."""
+        """Change of its frequency, Hz per unit."""
         return self.derivative.imag / (2 * np.pi)
 
     @property
     def relative(self) -> complex:
-        """Change of the eigenvalue for a change of the parameter by its own size, 1/s."""
+        """Change of that eigenvalue for a change of the parameter by its own size, 1/s."""
         return self.derivative * self.value
 
     @property
     def per_percent(self) -> complex:
-        """Change of the eigenvalue for one percent more of the parameter, 1/s."""
+        """Change of that eigenvalue for one percent more of the parameter, 1/s."""
         return 0.01 * self.relative
+
+    def towards(self, far: Sensitivity) -> Sensitivity:
+        """Extrapolation of one-sided differences to step zero; `far` is that of twice the step."""
+        eigenvalues = tuple(2 * near - other for near, other in zip(self.eigenvalues, far.eigenvalues))
+        performance = {name: 2 * near - far.performance[name] for name, near in self.performance.items()}
+        return Sensitivity(self.parameter, self.value, eigenvalues, performance)
+
+
+class Neighbourhood:
+    """A steady state and those beside it.
+
+    Parameters
+    ----------
+    model : ValveModel
+    q : (n,) array
+        The steady state at the inlet pressure.
+    pressure : float, Pa
+    mu : Mu
+    modes : sequence of eigen.Mode, optional
+        With left vectors (`SearchOptions(left=True)`).
+    step : float
+        Relative size of the central differences; of a parameter that is zero, its absolute size.
+    """
+
+    def __init__(
+        self,
+        model: ValveModel,
+        q: np.ndarray,
+        pressure: float,
+        mu: Mu,
+        modes: Sequence[Mode] = (),
+        step: float = 2e-5,
+    ):
+        self.model, self.q, self.pressure, self.mu, self.modes, self.step = model, q, pressure, mu, tuple(modes), step
+
+    @cached_property
+    def performance(self) -> dict[str, float]:
+        """Values by the names of `PERFORMANCE`."""
+        return _performance(self.model, self.q, self.pressure)
+
+    @cached_property
+    def _factor(self):
+        factor = self.model.factor()
+        self.model.refactor(factor, self.model.tangent(self.q, self.pressure))
+        return factor
+
+    @cached_property
+    def _linear(self):
+        return linearise(self.model, self.q, self.pressure)
+
+    @cached_property
+    def _pencil(self) -> CoupledPencil:
+        return self._linear.pencil(self.mu)
+
+    @cached_property
+    def _motions(self) -> np.ndarray:
+        """Real and imaginary parts (n, 2 k) of the right vectors."""
+        vectors = np.column_stack([mode.q for mode in self.modes])
+        return np.hstack([vectors.real, vectors.imag])
+
+    def slope(self, name: str) -> Sensitivity:
+        """Derivatives by one parameter.
+
+        At an end of what a parameter may be, such as the strain level of 10 %, those towards its inside, to second
+        order as central ones are. Strain levels are interpolated linearly between the tests: at one of those, 20 or
+        40 %, the derivative is the mean of both sides.
+
+        Raises
+        ------
+        CaseError
+            If a parameter does not exist, or its value beside this one is refused.
+        SolveError
+            If there is no flow through the valve beside this one.
+        """
+        require_number(self.model, name)
+        value = _value(self.model, self.pressure, self.mu, name)
+        h = self.step * (abs(value) or 1.0)
+        inward = _inward(name, value, h)
+        if inward == 0:
+            return self._between(name, value, value - h, value + h)
+        reach = [sorted((value, value + inward * k * h)) for k in (1, 2)]
+        near, far = (self._between(name, value, *ends) for ends in reach)
+        return near.towards(far)
+
+    def _between(self, name: str, value: float, low: float, high: float) -> Sensitivity:
+        """Differences between two values of a parameter."""
+        ends = [changed(self.model, self.pressure, self.mu, name, end) for end in (low, high)]
+        places = [self.q, self.q]
+        if any(model is not self.model or pressure != self.pressure for model, pressure, _ in ends):
+            first, second = (model.residual(self.q, pressure) for model, pressure, _ in ends)
+            moved = -self._factor.solve((second - first) / (high - low))
+            places = [self.q + (end - value) * moved for end in (low, high)]
+        below, above = (_performance(model, q, pressure) for (model, pressure, _), q in zip(ends, places))
+        performance = {key: (above[key] - below[key]) / (high - low) for key in below}
+        return Sensitivity(name, value, self._eigenvalues(ends, places, high - low), performance)
+
+    def _eigenvalues(self, ends, places, apart: float) -> tuple[complex, ...]:
+        if not self.modes:
+            return ()
+        here, *pencils = _with_common_times(
+            self._pencil, *(self._linearised(end, q).pencil(end[2]) for end, q in zip(ends, places))
+        )
+        change = difference(*pencils, apart)
+        if self.model.outside is None or places[0] is places[1]:
+            return tuple(eigenvalue_derivative(here, mode, change) for mode in self.modes)
+        density = self.model.case.outside.density(self.mu["density"])
+        below, above = (self._resisting(model, q) for (model, _, _), q in zip(ends, places))
+        slope, count = density * (above - below) / apart, len(self.modes)
+        found = []
+        for i, mode in enumerate(self.modes):
+            outside = slope[:, i] + 1j * slope[:, count + i]
+            inertia = lambda x, outside=outside: change.M @ x + outside  # noqa: E731
+            found.append(eigenvalue_derivative(here, mode, replace(change, M=inertia)))
+        return tuple(found)
+
+    def _linearised(self, end, q: np.ndarray):
+        """Linearised state beside this one, with the added mass of this one."""
+        model, pressure, _ = end
+        if model is self.model and pressure == self.pressure:
+            return self._linear
+        return linearise(model, q, pressure, added=self._linear.added)
+
+    def _resisting(self, model: ValveModel, q: np.ndarray) -> np.ndarray:
+        """Forces (n, 2 k) of a fluid of unit density outside on the accelerations of the modes."""
+        return model.outside.resistance(q, self._motions, self._panels)
+
+    @cached_property
+    def _panels(self):
+        return self.model.outside.panels(self.q)
+
+
+def _performance(model: ValveModel, q: np.ndarray, pressure: float) -> dict[str, float]:
+    """Values by the names of `PERFORMANCE`; NaN for those of a flow where nothing flows."""
+    known = {"converged": True, "iterations": 0, "load_steps": 0, "residual": 0.0, "rounding": 0.0, "reason": ""}
+    state = describe_state(model, q, pressure, **known)
+    loss = state.hydraulics.loss_coefficient if state.hydraulics else np.nan
+    mass = ValveSizes.of(model).wall_mass
+    return dict(zip(PERFORMANCE, (state.volume_flow, state.outlet_area, loss, mass)))
 
 
 def parameters_of(model: ValveModel) -> tuple[str, ...]:
-    """Every parameter an eigenvalue of this valve can be differentiated by.
+    """Every parameter that derivatives are taken by unasked.
 
-    Those of `dbvfiv.case.parameters` that it has, and the layers, which count from 1, inside to outside: "layer 3
-    angle", "layer 1 thickness" (its share of the wall), "layer 1 mu_0" (a constant of its law).
+    Those of `dbvfiv.case.parameters` that the valve has, lengths of its shape, and the layers, which count from 1,
+    inside to outside: "layer 3 angle", "layer 1 thickness" (its share of the wall), "layer 1 mu_0" (a constant of its
+    law).
     """
     names = [name for name in PARAMETERS if _has(model, name)]
+    if model.case.valve.key_points is None:
+        names += SHAPE
     for i, layer in enumerate(model.shell.section.layers, 1):
         names += [f"layer {i} thickness", f"layer {i} angle"]
         names += [f"layer {i} {field.name}" for field in fields(layer.law)]
     return tuple(names)
+
+
+def require_number(model: ValveModel, name: str) -> None:
+    """Refuse what is neither of `parameters_of` nor a key of the case that holds one number.
+
+    Raises
+    ------
+    CaseError
+    """
+    known = parameters_of(model)
+    if name not in known:
+        try:
+            key_of(model.case, name, "sensitivity.of")
+        except CaseError:
+            raise CaseError(
+                f"sensitivity.of names {name!r}, by which nothing of this valve can be differentiated; it can by "
+                f"{', '.join(known)}, or a key of the case that has a number, such as valve.flange_length.",
+                key="sensitivity.of",
+            ) from None
 
 
 def _has(model: ValveModel, name: str) -> bool:
@@ -86,60 +274,16 @@ def _has(model: ValveModel, name: str) -> bool:
     return True
 
 
-def unit_of(name: str) -> str:
+def unit_of(case: Case, name: str) -> str:
     """Unit of the values of a parameter."""
     if name in PARAMETERS:
         return PARAMETERS[name].quantity.si
+    if not name.startswith("layer "):
+        return key_of(case, name, "sensitivity.of")[0].si
     _, quantity = _layer(name)
     if quantity.startswith(("nu", "poisson", "x_0")):
         return ""
     return {"thickness": "m", "angle": "deg", "density": "kg/m^3"}.get(quantity, "Pa")
-
-
-def differentiate(
-    model: ValveModel, q: np.ndarray, pressure: float, mu: Mu, mode: Mode, name: str, step: float = 1e-4
-) -> Sensitivity:
-    """Derivative of one eigenvalue of a steady state by one parameter.
-
-    At an end of what a parameter may be, such as the strain level of 10 %, that towards its inside, to second order as
-    central ones are. Strain levels are interpolated linearly between the tests: at one of those, 20 or 40 %, the
-    derivative is the mean of both sides.
-
-    Parameters
-    ----------
-    q : (n,) array
-        The steady state at the inlet pressure, Pa.
-    mode : eigen.Mode
-        With left vectors (`SearchOptions(left=True)`).
-    name : str
-        Of `parameters_of`.
-    step : float
-        Relative size of the central differences of the pencil; of a parameter that is zero, its absolute size.
-
-    Raises
-    ------
-    ValueError
-        If a parameter does not exist or the mode has no left vector.
-    SolveError
-        If the steady state is lost beside its place.
-    """
-    known = parameters_of(model)
-    if name not in known:
-        raise ValueError(f"An eigenvalue cannot be differentiated by '{name}'; it can by {', '.join(known)}.")
-    value = _value(model, pressure, mu, name)
-    h = step * (abs(value) or 1.0)
-    pencil = linearise(model, q, pressure).pencil(mu)
-
-    def slope(low: float, high: float) -> complex:
-        ends = (_pencil(model, q, pressure, mu, name, v) for v in (low, high))
-        here, *ends = _with_common_times(pencil, *ends)
-        return eigenvalue_derivative(here, mode, difference(*ends, high - low))
-
-    inward = _inward(name, value, h)
-    if inward == 0:
-        return Sensitivity(name, value, slope(value - h, value + h))
-    near, far = (slope(*sorted((value, value + inward * reach))) for reach in (h, 2 * h))
-    return Sensitivity(name, value, 2 * near - far)
 
 
 def _with_common_times(*pencils: CoupledPencil) -> list[CoupledPencil]:
@@ -186,28 +330,32 @@ def _value(model, pressure, mu, name) -> float:
         return Mu.of(model.case).at(**mu)[name]
     if name in DESIGN:
         return design_value(model.case, name)
+    if not name.startswith("layer "):
+        return key_of(model.case, name, "sensitivity.of")[1]
     i, quantity = _layer(name)
     layer = model.shell.section.layers[i]
     return float(getattr(layer if quantity in ("thickness", "angle") else layer.law, quantity))
 
 
-def _pencil(model, q, pressure, mu, name, value):
-    """Pencil at the steady state with one parameter changed."""
+def changed(model: ValveModel, pressure: float, mu: Mu, name: str, value: float) -> tuple[ValveModel, float, Mu]:
+    """Valve, inlet pressure and parameter point with one parameter changed; the same model where that stays.
+
+    Raises
+    ------
+    CaseError
+        For a value that the case does not allow.
+    """
+    case = model.case
+    if name == "pressure":
+        return model, value, mu
     if name in SURROUNDINGS:
         mu = mu.at(**{name: value})
-        if is_surrounding(model.case, name):
-            return linearise(model, q, pressure).pencil(mu)
-    changed = model
-    if name == "pressure":
-        pressure = value
-    elif name in DESIGN or name in SURROUNDINGS:
-        changed = ValveModel(redesigned(model.case, {name: value}))
-    else:
-        changed = ValveModel(model.case, _section(model.shell.section, name, value))
-    result = EquilibriumSolver(changed, NewtonOptions(tolerance=1e-11)).solve(q, pressure)
-    if not result.converged:
-        raise SolveError(f"The steady state was lost with {name} at {value:.6g}: {result.reason}.")
-    return linearise(changed, result.q, pressure).pencil(mu)
+        return model if is_surrounding(case, name) else ValveModel(redesigned(case, {name: value})), pressure, mu
+    if name in DESIGN:
+        return ValveModel(redesigned(case, {name: value})), pressure, mu
+    if name.startswith("layer "):
+        return ValveModel(case, _section(model.shell.section, name, value)), pressure, mu
+    return ValveModel(redesigned(case, {name: value})), pressure, mu
 
 
 def _section(section, name, value):

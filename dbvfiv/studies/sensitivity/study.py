@@ -28,7 +28,7 @@ from ..stability.walk import ValveFamily, name_state_in_failures
 from ..state import State, states_of
 from ..study import Study
 from . import figures
-from .derivatives import Sensitivity, differentiate, parameters_of, unit_of
+from .derivatives import PERFORMANCE, Neighbourhood, Sensitivity, parameters_of, require_number, unit_of
 
 #: Modes searched for beyond the one asked for, so that its rank is certain.
 _MARGIN = 3
@@ -38,11 +38,17 @@ _VALUES = (
     Column("value", "SI", "Its value; angles in degrees"),
     Column("growth_rate", "1/s per unit", "Derivative of the growth rate"),
     Column("angular_frequency", "rad/s per unit", "Of the angular frequency", read=lambda found: found.derivative.imag),
+    *(
+        Column(name, f"{unit} per unit".strip(), words, read=lambda found, name=name: found.performance[name])
+        for name, (unit, words) in PERFORMANCE.items()
+    ),
 )
 _TABLE = TableSpec(VALUES, _VALUES)
 _HEAD = (
-    f"{'parameter':<24}{'value':>12} {'unit':<8}{'d growth':>12}{'d frequency':>13}{'d growth':>12}{'d frequency':>13}",
-    f"{'':<24}{'':>12} {'':<8}{'1/s a unit':>12}{'Hz a unit':>13}{'1/s a %':>12}{'Hz a %':>13}",
+    f"{'parameter':<24}{'value':>12} {'unit':<8}{'d growth':>12}{'d frequency':>13}{'d growth':>12}{'d frequency':>13}"
+    f"{'d flow':>9}{'d opening':>11}{'d loss':>9}{'d mass':>9}",
+    f"{'':<24}{'':>12} {'':<8}{'1/s a unit':>12}{'Hz a unit':>13}{'1/s a %':>12}{'Hz a %':>13}"
+    f"{'% a %':>9}{'% a %':>11}{'% a %':>9}{'% a %':>9}",
 )
 
 
@@ -60,17 +66,14 @@ def run(session: Session, record: GrowingRecord) -> None:
         lacking = session.case.damping.lacks(name)
         if lacking:
             raise CaseError(f"sensitivity.of names {name!r}, but {lacking}.", key="sensitivity.of")
-        if name not in known:
-            raise CaseError(
-                f"sensitivity.of names {name!r}, by which nothing of this valve can be differentiated; it can by "
-                f"{', '.join(known)}."
-            )
+        require_number(model, name)
     if not record.rows(STATE):
         record.append(STATE, state_row(model, session.equilibrium(record)))
     (state,) = read_states(record, STATE)
     mu = Mu.of(session.case)
     mode = _find_mode(session, state, mu)
-    record.note(MODE, number=asked.mode, eigenvalue=complex(mode.eigenvalue))
+    beside = Neighbourhood(model, state.q, state.pressure, mu, [mode], asked.step)
+    record.note(MODE, number=asked.mode, eigenvalue=complex(mode.eigenvalue), performance=beside.performance)
     record.begin("sensitivity", len(names))
     done = set(record.column(VALUES, "parameter"))
     for name in names:
@@ -78,8 +81,8 @@ def run(session: Session, record: GrowingRecord) -> None:
             continue
         record.progress(name)
         try:
-            found = differentiate(model, state.q, state.pressure, mu, mode, name, asked.step)
-        except SolveError as error:
+            found = beside.slope(name)
+        except (SolveError, CaseError) as error:
             record.fail(str(error))
             continue
         record.append(VALUES, _TABLE.row(found))
@@ -148,9 +151,22 @@ class SensitivityResult(StudyResult):
     @cached_property
     def sensitivities(self) -> tuple[Sensitivity, ...]:
         rows = (self.record.column(VALUES, column.name).tolist() for column in _VALUES)
-        found = {row[0]: Sensitivity(row[0], row[1], complex(*row[2:])) for row in zip(*rows)}
+        found = {
+            name: Sensitivity(name, value, (complex(*eigenvalue),), dict(zip(PERFORMANCE, performance)))
+            for name, value, *eigenvalue, performance in ((*row[:4], row[4:]) for row in zip(*rows))
+        }
         asked = self.case.sensitivity.of or tuple(found)
         return tuple(found[name] for name in dict.fromkeys(asked) if name in found)
+
+    @cached_property
+    def performance(self) -> dict[str, float]:
+        """Values of what `Sensitivity.performance` has the derivatives of, SI."""
+        return dict(self.record.notes(MODE)[-1]["performance"])
+
+    def elasticity(self, found: Sensitivity) -> dict[str, float | None]:
+        """Per cent of flow, opening, loss coefficient and mass for one per cent of a parameter."""
+        per_cent = {name: slope * found.value / self.performance[name] for name, slope in found.performance.items()}
+        return {name: value if np.isfinite(value) else None for name, value in per_cent.items()}
 
     def summary(self) -> dict[str, Any]:
         if not self.record.notes(MODE):
@@ -162,11 +178,12 @@ class SensitivityResult(StudyResult):
                 {
                     "parameter": found.parameter,
                     "value": found.value,
-                    "unit": unit_of(found.parameter),
+                    "unit": unit_of(self.case, found.parameter),
                     "growth_rate": found.growth_rate,
                     "frequency": found.frequency,
                     "growth_rate_per_percent": found.per_percent.real,
                     "frequency_per_percent": found.per_percent.imag / (2 * np.pi),
+                    "per_cent_per_cent": self.elasticity(found),
                 }
                 for found in self.sensitivities
             ],
@@ -190,19 +207,21 @@ class SensitivityResult(StudyResult):
         return [
             f"At {describe_fixed(self.case)}: {mode}.",
             *_HEAD,
-            *(_line(found) for found in self.sensitivities),
+            *(_line(self, found) for found in self.sensitivities),
         ]
 
 
-def _line(found: Sensitivity) -> str:
+def _line(result: SensitivityResult, found: Sensitivity) -> str:
     row = PARAMETERS.get(found.parameter)
-    value, unit = (found.value / row.scale, row.shown_unit) if row else (found.value, unit_of(found.parameter))
-    scale = row.scale if row else 1.0
+    scale, unit = (row.scale, row.shown_unit) if row else (1.0, unit_of(result.case, found.parameter))
+    value = found.value / scale
     percent = found.per_percent
     relative = f"{percent.real:12.4g}{percent.imag / (2 * np.pi):13.4g}" if found.value else f"{'-':>12}{'-':>13}"
+    widths = zip(result.elasticity(found).values(), (9, 11, 9, 9))
+    further = "".join("-".rjust(width) if value is None else f"{value:{width}.3g}" for value, width in widths)
     return (
         f"{found.parameter:<24}{value:>12.6g} {unit:<8}{found.growth_rate * scale:>12.4g}"
-        f"{found.frequency * scale:>13.4g}{relative}"
+        f"{found.frequency * scale:>13.4g}{relative}{further}"
     )
 
 

@@ -3,12 +3,25 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from typing import Any
 
-from ...case.materials import RUBBERS
+import numpy as np
+from pydantic.fields import FieldInfo
+
+from ...case.describe import quantity_of
+from ...case.materials import BUILT_IN, RUBBERS, BuiltIn, Materials
 from ...case.parameters import OUTSIDE, PARAMETERS, PIPES, Mu
+from ...case.quantity import Quantity
+from ...case.section import Section
+from ...case.valve import Valve
 from ...errors import CaseError, SolveError
 from ...model import ValveModel
 from ..case import Case
+
+#: Lengths of the parts of a valve, from the lip on.
+PARTS = ("duckbill_length", "saddle_length", "cuff_length", "flare_length", "flange_length")
+#: Sizes of a valve that follow from the others by rules that jump where it is no longer the 12-inch one.
+KEPT = ("lip_radius", "duckbill_wall_deduction", "flange_wall_deduction")
 
 
 def flow_law(mu: Mu) -> Mu:
@@ -156,7 +169,7 @@ def design_value(case: Case, name: str) -> float | None:
 
 def redesigned(case: Case, design: Mapping[str, float]) -> Case:
     """A case with design parameters changed: wall thickness factor, size of the angle of all plies (degrees), strain
-    level (0.1 for 10 %); any other by its key, such as the length of the line where the steady state depends on it.
+    level (0.1 for 10 %); any other by its key, such as the length of the saddle, with which steps of the wall move.
 
     Raises
     ------
@@ -176,9 +189,77 @@ def redesigned(case: Case, design: Mapping[str, float]) -> Case:
                 if layer["angle"]:
                     layer["angle"] = value if layer["angle"] > 0 else -value
             changes[PARAMETERS[name].key] = layers
-        else:
+        elif name in PARAMETERS:
             changes[PARAMETERS[name].key] = value
+        else:
+            changes |= {name: value} | _shape_beside(case, name, value)
     return case.replace(changes) if changes else case
+
+
+def number_of(case: Case, name: str, key: str) -> tuple[FieldInfo, Any]:
+    """Field and value of a key of the case that holds a number, such as "materials.CR.stiffness_factor"; None where it
+    has none. `key` is the one that names it.
+
+    Raises
+    ------
+    CaseError
+    """
+    target: Any = case
+    field = None
+    for part in name.split("."):
+        if isinstance(target, Materials) and part not in type(target).model_fields and part in target.names:
+            target, field = target.named.get(part) or _card(target, part), None
+        elif isinstance(target, tuple) and part.isdigit() and int(part) < len(target):
+            target, field = target[int(part)], None
+        elif isinstance(target, Section) and part in type(target).model_fields:
+            field, target = type(target).model_fields[part], getattr(target, part)
+        else:
+            field = None
+            break
+        if isinstance(target, Valve):  # sizes before its scale, as they are written
+            target = target.as_given
+    if field is None or quantity_of(field) is None:
+        raise CaseError(
+            f"{key} is given, and {name!r} is neither a parameter ({', '.join(PARAMETERS)}) nor a key of the case that "
+            "holds a number, such as materials.CR.stiffness_factor or valve.initial_gap.",
+            key=key,
+        )
+    return field, target
+
+
+def _card(materials: Materials, name: str) -> Section:
+    return materials.card(name) if name in BUILT_IN else BuiltIn()
+
+
+def key_of(case: Case, name: str, key: str) -> tuple[Quantity, float]:
+    """Quantity and value of a key of the case that holds one number.
+
+    Raises
+    ------
+    CaseError
+    """
+    field, value = number_of(case, name, key)
+    if isinstance(value, bool) or not isinstance(value, (int, float)):
+        raise CaseError(f"{key} names {name!r}, which has no value in this case; give it one.", key=key)
+    return quantity_of(field), float(value)
+
+
+def _shape_beside(case: Case, name: str, value: float) -> dict[str, object]:
+    """Keys that keep the rest of a valve's shape where one of its numbers changes: steps of a measured wall move with
+    its parts, and what follows from wall and shape by rules that jump stays.
+    """
+    part, valve = name.removeprefix("valve."), case.valve.as_given
+    if part == name:
+        return {}
+    found: dict[str, object] = {f"valve.{key}": getattr(valve, key) for key in KEPT if key in valve.following}
+    if part in PARTS and valve.wall_map:
+        lengths = [getattr(valve, each) for each in PARTS]
+        longer = [value if each == part else length for each, length in zip(PARTS, lengths)]
+        own, moved = (np.concatenate([[0.0], np.cumsum(each)]) for each in (lengths, longer))
+        steps = case.to_dict()["valve"]["wall_map"]
+        found["valve.wall_map"] = [step | {"to": float(np.interp(step["to"], own, moved))} for step in steps]
+    found.pop(name, None)
+    return found
 
 
 def rebuilder(case: Case) -> Callable[[Mapping[str, float]], ValveModel]:

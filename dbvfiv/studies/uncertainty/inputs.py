@@ -4,22 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
-from pydantic.fields import FieldInfo
 
 from ...case.damping import LARGEST_LOSS
 from ...case.describe import numeric_limits, quantity_of
 from ...case.distribution import ALLOWED, FORMS, Distribution
-from ...case.materials import BUILT_IN, BuiltIn, Materials
 from ...case.parameters import PARAMETERS, Mu
 from ...case.quantity import Quantity
-from ...case.section import Section
 from ...errors import CaseError
 from ...materials.shipped import shipped_loss, shipped_loss_names
 from ..case import Case
-from ..stability.place import design_value, is_surrounding, require_parameter
+from ..stability.place import design_value, is_surrounding, number_of, require_parameter
 from ..stability.verdict import lowered
 
 #: Hardness of a compound lies within 5 Shore A of what was ordered (trade practice with ISO 48-4), a fifth of its shear
@@ -146,7 +142,7 @@ def _input(case: Case, name: str, text: str, source: str) -> Input:
         own = design_value(case, name) if row.design else Mu.of(case)[name]
         quantity, limits = row.quantity, (row.low, row.high)
     else:
-        field, value = _located(case, name, key)
+        field, value = number_of(case, name, key)
         quantity = quantity_of(field)
         own = value if isinstance(value, (int, float)) and not isinstance(value, bool) else None
         own = _shipped_value(case, name) if own is None else own
@@ -164,38 +160,6 @@ def _input(case: Case, name: str, text: str, source: str) -> Input:
             key=key,
         )
     return Input(name, distribution, quantity, source, name in PARAMETERS and is_surrounding(case, name))
-
-
-def _located(case: Case, name: str, key: str) -> tuple[FieldInfo, Any]:
-    """Field and value of a key of the case that holds a number.
-
-    Raises
-    ------
-    CaseError
-    """
-    target: Any = case
-    field = None
-    for part in name.split("."):
-        if isinstance(target, Materials) and part not in type(target).model_fields and part in target.names:
-            target, field = target.named.get(part) or _card(target, part), None
-        elif isinstance(target, tuple) and part.isdigit() and int(part) < len(target):
-            target, field = target[int(part)], None
-        elif isinstance(target, Section) and part in type(target).model_fields:
-            field, target = type(target).model_fields[part], getattr(target, part)
-        else:
-            field = None
-            break
-    if field is None or quantity_of(field) is None:
-        raise CaseError(
-            f"{key} is given, and {name!r} is neither a parameter ({', '.join(PARAMETERS)}) nor a key of the case that "
-            "holds a number, such as materials.CR.stiffness_factor or valve.initial_gap.",
-            key=key,
-        )
-    return field, target
-
-
-def _card(materials: Materials, name: str) -> Section:
-    return materials.card(name) if name in BUILT_IN else BuiltIn()
 
 
 def _shipped_value(case: Case, name: str) -> float | None:
