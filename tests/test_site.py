@@ -20,6 +20,7 @@ def test_the_site_builds_without_a_warning(tmp_path):
     assert "duckbill valve vibrates" in (site / "index.html").read_text()
     assert (site / "assets/tex-svg.js").stat().st_size > 1e6
     assert not re.search(r'(src|stylesheet"[^>]*href)="https?://', (site / "theory.html").read_text())  # no network
+    assert "54 kg/m³" in (site / "findings.html").read_text()  # written kg/m3
     found = {entry["location"].split("#")[0] for entry in _index(site) if "Hopf" in entry["text"]}
     assert {"stability.html", "glossary.html", "api/continuation.html"} <= found
     for word in ("flutter", "chatter", "Shore", "Floquet"):

@@ -15,6 +15,7 @@ from mkdocs.structure.files import File, Files
 from pygments.formatters import HtmlFormatter
 
 ROOT = Path(__file__).resolve().parent.parent
+_RAISED = {"2": "²", "3": "³", "4": "⁴", "-": "⁻", "1": "¹"}
 MATHJAX = Path(mathjax.__path__[0]) / "static/mathjax/es5/tex-svg.js"
 
 
@@ -32,6 +33,38 @@ def on_files(files: Files, config) -> Files:
 def on_page_markdown(markdown: str, **_) -> str:
     """Replace `<!-- public names of PACKAGE -->` by a block of mkdocstrings for each name of its `__all__`."""
     return re.sub(r"<!-- public names of (\w+) -->", lambda found: public_names(found[1]), markdown)
+
+
+def on_post_page(output: str, **_) -> str:
+    """Typeset a page: powers and units in text, words of code that break where a reader would break them."""
+    parts = re.split(
+        r"(<pre.*?</pre>|<code.*?</code>|<script.*?</script>|<[^>]*arithmatex.*?</(?:span|div)>|<[^>]*>)",
+        output,
+        flags=re.S,
+    )
+    output = "".join(
+        _code(part) if part.startswith("<code") else part if part[:1] == "<" else _text(part) for part in parts
+    )
+    return re.sub(r"\s+–\s*(?:<div class=\"doc-md-description\">\s*</div>\s*)?(?=</li>)", "", output)
+
+
+def _text(part: str) -> str:
+    """kg/m3 and m^2 with powers raised; a value and its per cent sign on one line."""
+    part = re.sub(r"\b(c?m|mm|s|ft)([23])\b", lambda found: found[1] + _RAISED[found[2]], part)
+    part = re.sub(r"(?<=[\w)])\^(-1|[234])(?![\w.])", lambda found: "".join(_RAISED[c] for c in found[1]), part)
+    part = re.sub(r"(?<=[A-Z])\^T\b", "\N{MODIFIER LETTER CAPITAL T}", part)
+    return re.sub(r"(?<=\d) (?=%)", "\N{NO-BREAK SPACE}", part)
+
+
+def _code(part: str) -> str:
+    """Code in a line: it may break behind / _ . = and not within an option; shapes as docstrings write them."""
+    part = re.sub(r"\(([\w ]+), shape\(((?:<[^>]*>|[^()<])*)\)((?:, \w+)?)\)", r"\1, shape (\2)\3", part)
+    pieces = re.split(r"(<[^>]*>)", part)
+    for at, piece in enumerate(pieces):
+        if piece[:1] != "<":
+            piece = re.sub(r"(?<=[\w\]])([/_.=])(?=\w)", r"\1<wbr>", piece)
+            pieces[at] = re.sub(r"(?<![\w-])(--?[a-z][a-z-]*)", r'<span class="option">\1</span>', piece)
+    return "".join(pieces)
 
 
 def first_page(text: str) -> str:
