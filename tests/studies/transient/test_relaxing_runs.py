@@ -24,16 +24,18 @@ def test_a_loss_factor_of_zero_is_an_undamped_wall(valve):
 
 
 def test_energy_is_balanced_and_each_material_has_its_share(valve):
-    """A smooth run: the pressure rises in a tenth of a second."""
+    """A smooth run: the pressure rises in a tenth of a second. Corrections end where they no longer show; those that
+    the default tolerance leaves out do work of some 2e-7, as much as the error of a step of 0.4 ms.
+    """
     changes = LOSSY | {"fluid.density": 300.0, "transient.ramp": 0.1, "transient.duration": 0.1}
     off = []
-    for step in (2e-4, 1e-4):
-        run = Runner(valve(changes | {"transient.step": step})).start()
+    for step in (8e-4, 4e-4):
+        run = Runner(valve(changes | {"transient.step": step, "transient.tolerance": 1e-6})).start()
         h = run.history
         off.append(np.abs(h["balance"]).max() / np.abs(h["pressure_work"]).max())
     print(f"unexplained over the work of the pressure: {off}")
-    assert off[-1] < 1e-6
-    assert off[1] < 0.3 * off[0]
+    assert off[-1] < 4e-7
+    assert off[1] == pytest.approx(off[0] / 4, rel=0.02)
     stored, lost = h["branch_energy"][-1], h["branch_loss"][-1]
     assert (lost > 0).all() and (stored > 0).all()
     assert h["dissipation"][-1] == 0.0
