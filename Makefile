@@ -34,6 +34,7 @@ bench: setup
 
 demo: setup
 	@$(PYTHON) -m dbvfiv report cases/dbv12.toml --set report.heads="2 kPa:18 kPa:4" --workers $(JOBS) -o out/demo/dbv12.html
+	@echo "The valve in the browser: $(PYTHON) -m dbvfiv app cases/dbv12.toml"
 
 demo-full: setup
 	@PYTHON="$(PYTHON)" tools/demo

@@ -12,6 +12,7 @@ from .case.model import Changes, change_case
 from .drawing import views
 from .drawing.style import draw_figures, write_figures
 from .errors import SolveError, as_path
+from .explore import Explorer
 from .fit.damping import DampingReport, describe_damping
 from .model import ValveModel
 from .observer import Observer, Progress, is_watched
@@ -418,6 +419,16 @@ class Valve:
             If there is no first state. A step that is not found ends the run, which keeps what it has.
         """
         return self._ask({"transient.duration": duration}, changes).perform("transient", output, observer or bar())
+
+    def explore(self) -> Explorer:
+        """Answers at one parameter point after another in the time of a slider; see `dbvfiv.explore`.
+
+        Raises
+        ------
+        CaseError, SolveError
+            For a case without flow, or with a pump.
+        """
+        return Explorer(self.session)
 
     def _ask(self, keys: Mapping[str, Any], given: Mapping[str, Any]) -> Session:
         """The session with keys and named arguments put into its case; None stands for nothing given."""

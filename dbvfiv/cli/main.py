@@ -17,7 +17,7 @@ import typer
 
 from .. import __version__
 from ..errors import CaseError, DiskFull, SolveError
-from . import case, materials, pages, results, studies, verdict
+from . import app, case, materials, pages, results, studies, verdict
 
 # Typer brings its own Click in newer versions and uses the separate package in older ones.
 _UsageProblem = typer.BadParameter.__mro__[2]
@@ -32,6 +32,7 @@ _AFTER = (
     results.export,
     results.cfd,
     results.info,
+    app.app,
     case.doctor,
     pages.reproduce,
 )
@@ -57,14 +58,16 @@ def _root(
 
 def build() -> typer.Typer:
     """All commands, in the order of their help."""
-    app = typer.Typer(add_completion=True, no_args_is_help=True, rich_markup_mode=None, pretty_exceptions_enable=False)
-    app.callback()(_root)
+    commands_of = typer.Typer(
+        add_completion=True, no_args_is_help=True, rich_markup_mode=None, pretty_exceptions_enable=False
+    )
+    commands_of.callback()(_root)
     commands = [(command.__name__, command) for command in _BEFORE]
     commands += studies.study_commands()
     commands += [(command.__name__, command) for command in _AFTER]
     for name, command in commands:
-        app.command(name, no_args_is_help=False)(command)
-    return app
+        commands_of.command(name, no_args_is_help=False)(command)
+    return commands_of
 
 
 def run(arguments: Sequence[str]) -> int:

@@ -1,0 +1,238 @@
+"""Questions to a valve by sliders: the reduced operator answers, the full one confirms."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import time
+from pathlib import Path
+from typing import Any
+
+from nicegui import ui
+
+from ..errors import CaseError
+
+#: Steps of a slider.
+STEPS = 400
+#: Numbers that an answer shows: title, entry of the state, factor and unit.
+NUMBERS = (
+    ("Opening", "lip_opening", 1e3, "mm"),
+    ("Flow", "volume_flow", 1e3, "L/s"),
+    ("Jet", "outlet_velocity", 1.0, "m/s"),
+    ("Passage", "outlet_area", 1e4, "cm²"),
+)
+
+
+class AskPanel:
+    """Sliders and the answer beside.
+
+    Parameters
+    ----------
+    page : Page
+
+    Attributes
+    ----------
+    values : dict
+        Values of the sliders, SI.
+    seconds : list of float
+        Time from each move to its answer.
+    """
+
+    def __init__(self, page: Any):
+        self.page = page
+        self.values: dict[str, float] = {}
+        self.seconds: list[float] = []
+        self._file: Path | None = None
+        self._rows: dict[str, dict] = {}
+        self._boxes: dict[str, tuple[ui.slider, ui.number]] = {}
+        self._moved = asyncio.Event()
+        self._since = 0.0
+        self._task: asyncio.Task | None = None
+        self._confirming: asyncio.Task | None = None
+
+    def build(self) -> None:
+        """Draw the panel."""
+        with ui.element("div").classes("columns"):
+            with ui.column():
+                self._status = ui.label("").classes("note").props('data-at="status"')
+                self._sliders = ui.column().classes("full")
+            with ui.column() as self._card:
+                self._verdict = ui.label("").style("font-size: 1.2rem").props('data-at="verdict"')
+                self._mark = ui.label("").classes("note").props('data-at="mark"')
+                with ui.element("div").classes("numbers"):
+                    self._numbers = {name: self._number(title) for title, name, *_ in NUMBERS}
+                    self._margin = self._number("Least damping ratio")
+                    self._factor = self._number("Flutter begins at")
+                self._modes = ui.table(
+                    columns=[
+                        {"name": "growth", "label": "Growth rate, 1/s", "field": "growth"},
+                        {"name": "frequency", "label": "Frequency, Hz", "field": "frequency"},
+                    ],
+                    rows=[],
+                ).classes("full")
+                ui.button("Show the shape", on_click=self._shape).props("flat")
+                self._scene = ui.column().classes("full")
+
+    @staticmethod
+    def _number(title: str) -> ui.label:
+        with ui.element("div").classes("number"):
+            shown = ui.html("<b>–</b>", sanitize=False)
+            ui.label(title).classes("note")
+        return shown
+
+    def open(self, values: dict[str, float] | None = None) -> None:
+        """Open the valve of the page, unless it is open; values to ask it at."""
+        file = self.page.file
+        if file is None:
+            self._status.text = "The valve does not fit yet; see Describe."
+            return
+        if self._task is not None and not self._task.done() and file == self._file:
+            self.go(values or {})
+            return
+        if self._task is not None:
+            self._task.cancel()
+        self._file = file
+        self._task = asyncio.create_task(self._follow(file, values or {}))
+
+    def go(self, values: dict[str, float]) -> None:
+        """Move sliders to values, SI, as far as they reach."""
+        for name, value in values.items():
+            if name in self._boxes:
+                row, (slider, _) = self._rows[name], self._boxes[name]
+                self.values[name] = min(max(value, row["low"]), row["high"])
+                slider.value = self.values[name] / row["scale"]
+
+    async def _follow(self, file: Path, values: dict[str, float]) -> None:
+        """Answer moves of the sliders, the last one always, until another valve is opened."""
+        predictor, confirmer = self.page.site.workers.of(file)
+        self._status.text = "The valve is being built; the first answer takes longest."
+        try:
+            found = await predictor.about(file, "open")
+        except CaseError as error:
+            self._status.text = str(error)
+            return
+        self._rows = found["parameters"]
+        self._draw_sliders()
+        self.go(values)
+        self._status.text = ""
+        self._since = time.monotonic()
+        self._moved.set()
+        while True:
+            await self._moved.wait()
+            self._moved.clear()
+            try:
+                await self._answer(file, predictor, confirmer, dict(self.values))
+            except CaseError as error:
+                self._verdict.text = str(error)
+                self._mark.text = "no answer"
+
+    async def _answer(self, file: Path, predictor: Any, confirmer: Any, values: dict[str, float]) -> None:
+        """Predict, give the bound, and confirm, as far as no slider moves meanwhile."""
+        since = self._since
+        self._show(await predictor.about(file, "predict", values=values))
+        self.seconds = [*self.seconds[-999:], time.monotonic() - since]
+        self._status.text = f"answered in {self.seconds[-1]:.2f} s"
+        if self._moved.is_set():
+            return
+        self._show(await predictor.about(file, "bounded", values=values))
+        for step in ("confirm", "margin"):
+            if await self._is_moved_before(self._confirming):
+                return
+            question = {"values": values} if step == "confirm" else {}
+            self._confirming = asyncio.create_task(confirmer.about(file, step, **question))
+            if await self._is_moved_before(self._confirming):
+                return
+            self._show(self._confirming.result())
+
+    async def _is_moved_before(self, task: asyncio.Task | None) -> bool:
+        """Wait for a task; True where a slider moves before it is done."""
+        if task is not None and not task.done():
+            move = asyncio.create_task(self._moved.wait())
+            await asyncio.wait({task, move}, return_when=asyncio.FIRST_COMPLETED)
+            move.cancel()
+        return self._moved.is_set()
+
+    def _draw_sliders(self) -> None:
+        self._sliders.clear()
+        self.values = {name: row["own"] for name, row in self._rows.items()}
+        self._boxes = {}
+        with self._sliders:
+            for name, row in self._rows.items():
+                scale, step = row["scale"], (row["high"] - row["low"]) / row["scale"] / STEPS
+                low, high, own = row["low"] / scale, row["high"] / scale, row["own"] / scale
+                moves = ", moves the state" if row["moves"] else ""
+                ui.label(f"{row['title']}, {row['unit']}{moves}".rstrip(", ")).classes("note")
+                with ui.row().classes("full").style("flex-wrap: nowrap; align-items: center"):
+                    slider = ui.slider(min=low, max=high, step=step, value=own).props(f'data-at="slide {name}"')
+                    box = (
+                        ui.number(value=own, format="%.4g")
+                        .props("dense")
+                        .style("width: 90px")
+                        .props(f'data-at="set {name}"')
+                    )
+                slider.on_value_change(lambda event, name=name: self._slid(name, event.value))
+                box.on("change", lambda _, name=name, box=box: self._typed(name, box.value))
+                self._boxes[name] = slider, box
+
+    def _slid(self, name: str, value: float) -> None:
+        value *= self._rows[name]["scale"]
+        if abs(value - self.values[name]) > 1e-9 * abs(value):
+            self.values[name] = value
+        self._boxes[name][1].value = value / self._rows[name]["scale"]
+        self._since = time.monotonic()
+        self._moved.set()
+
+    def _typed(self, name: str, value: float | None) -> None:
+        if value is not None:
+            self.go({name: value * self._rows[name]["scale"]})
+
+    def _show(self, found: dict[str, Any]) -> None:
+        verdict, state = found["verdict"], found["state"]
+        for _, name, factor, unit in NUMBERS:
+            self._numbers[
+                name
+            ].content = f"<b data-name='{name}' data-si='{state[name]!r}'>{_short(state[name] * factor)} {unit}</b>"
+        ratio, margin = verdict["damping_ratio"], verdict["critical_damping_factor"]
+        self._margin.content = f"<b>{'–' if ratio is None else f'{100 * ratio:.3g} %'}</b>"
+        self._factor.content = f"<b>{'–' if margin is None else f'{margin:.3g} × damping'}</b>"
+        self._verdict.text = verdict["outcome"].capitalize()
+        bound = "" if found["bound"] is None else f", within {max(found['bound'], 1e-9):.0e} of an eigenvalue"
+        self._mark.text = "confirmed by the full model" if found["confirmed"] else f"predicted{bound}"
+        self._mark.tooltip(verdict["reason"]) if not found["confirmed"] and not self._mark.text else None
+        self._card.classes(
+            add="confirmed" if found["confirmed"] else "predicted",
+            remove="predicted" if found["confirmed"] else "confirmed",
+        )
+        self._modes.rows = [
+            {"growth": f"{real:.5g}", "frequency": f"{imaginary / 6.283185307179586:.5g}"}
+            for real, imaginary in found["eigenvalues"][:5]
+        ]
+
+    async def _shape(self) -> None:
+        """Draw the valve in space at the values of the sliders, coloured by its displacement."""
+        if self._file is None:
+            return
+        try:
+            found = await self.page.site.workers.of(self._file)[0].about(self._file, "shape", values=self.values)
+        except CaseError as error:
+            self.page.tell(str(error))
+            return
+        (x, y, z), (i, j, k) = zip(*found["points"]), zip(*found["triangles"])
+        mesh = {"type": "mesh3d", "x": z, "y": x, "z": y, "i": i, "j": j, "k": k, "colorscale": "Cividis"}
+        mesh |= {"intensity": [1e3 * value for value in found["moved"]], "flatshading": True}
+        layout = {"margin": {"l": 0, "r": 0, "t": 0, "b": 0}, "scene": {"aspectmode": "data"}, "height": 420}
+        self._scene.clear()
+        with self._scene:
+            colours = {"colorbar": {"title": {"text": "Displacement, mm"}}}
+            ui.plotly({"data": [mesh | colours], "layout": layout}).classes("full")
+
+    def close(self) -> None:
+        """Stop following."""
+        for task in (self._task, self._confirming):
+            if task is not None:
+                with contextlib.suppress(Exception):
+                    task.cancel()
+
+
+def _short(value: float) -> str:
+    return f"{value:.4g}"

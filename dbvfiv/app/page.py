@@ -1,0 +1,340 @@
+"""The page of one tab of a browser: describe a valve, ask it, see its curves, run its studies."""
+
+from __future__ import annotations
+
+import asyncio
+import hashlib
+import re
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from nicegui import events, ui
+
+from ..case.section import Section
+from ..errors import CaseError
+from ..studies.case import Case
+from .ask import AskPanel
+from .processes import Run
+from .see import RunsPanel, SeePanel
+from .sheet import FORM, Checked, change, check, given, read_sheet, write_sheet
+
+#: Valves to start from: those of the source tree, and of the folder that the server was started in.
+SHELVES = (Path(__file__).parents[2] / "cases", Path("cases").resolve())
+#: Largest data file, bytes, and how many a user may keep.
+DATA, FILES = 5 << 20, 30
+#: Time after the last key before the valve is drawn, s.
+PAUSE = 0.4
+STYLE = """
+body { font-family: 'DejaVu Sans', Arial, sans-serif; background: #f6f7f9 }
+.columns { display: flex; flex-wrap: wrap; gap: 16px; width: 100%; align-items: flex-start }
+.columns > * { flex: 1 1 340px; min-width: 0; max-width: 100% }
+.fields { display: grid; grid-template-columns: repeat(auto-fill, minmax(150px, 1fr)); gap: 4px 12px; width: 100% }
+.wrong { color: #b3261e; white-space: pre-line } .note { color: #5a5f66; white-space: pre-line }
+.drawing img { width: 100%; background: white; border-radius: 6px } .full { width: 100% }
+.numbers { display: grid; grid-template-columns: repeat(auto-fill, minmax(130px, 1fr)); gap: 8px; width: 100% }
+.number { background: white; border-radius: 6px; padding: 8px 10px } .number b { font-size: 1.25rem; display: block }
+.text { white-space: pre; overflow-x: auto; font: 12px 'DejaVu Sans Mono', monospace; max-width: 100%; width: 100% }
+.predicted { border-left: 4px solid #d98200 } .confirmed { border-left: 4px solid #2e7d32 }
+.q-tab-panel { padding: 12px } .nicegui-content { padding: 0 }
+"""
+
+
+def shelf() -> dict[str, Path]:
+    """Case files to start from, by name."""
+    return {path.stem: path for folder in SHELVES for path in sorted(folder.glob("*.toml"))}
+
+
+class Page:
+    """Page of one tab.
+
+    Parameters
+    ----------
+    site : Site
+    home : Path
+        Folder of the user.
+
+    Attributes
+    ----------
+    data : dict
+        Keys of the case that were given.
+    checked : Checked
+    """
+
+    def __init__(self, site: Any, home: Path):
+        self.site, self.home = site, home
+        self.data: dict[str, Any] = {}
+        self.checked = Checked(None)
+        self.name = "valve"
+        self._drawing: asyncio.Task | None = None
+        self._told: list[Callable[[], None]] = []
+
+    async def build(self) -> None:
+        """Draw the page, with the valve that the user left."""
+        ui.add_css(STYLE)
+        self.asking, self.seeing, self.running = AskPanel(self), SeePanel(self), RunsPanel(self)
+        with ui.header().style("padding: 4px 12px; align-items: center"):
+            ui.label("dbvfiv").style("font-weight: bold; font-size: 1.1rem")
+            with ui.tabs().props("dense") as self.tabs:
+                for name in ("Describe", "Ask", "See", "Run"):
+                    ui.tab(name).props(f'data-at="{name}"')
+        with ui.tab_panels(self.tabs, value="Describe", animated=False).classes("full").props("keep-alive") as panels:
+            self.panels = panels
+            with ui.tab_panel("Describe"):
+                self._describe()
+            with ui.tab_panel("Ask"):
+                self.asking.build()
+            with ui.tab_panel("See"):
+                self.seeing.build()
+            with ui.tab_panel("Run"):
+                self.running.build()
+        panels.on_value_change(lambda event: self.shown(event.value))
+        await self._begin()
+
+    async def _begin(self) -> None:
+        left = self.home / "valve.toml"
+        try:
+            if left.exists():
+                self.take(left.read_text(encoding="utf-8"), "valve")
+            elif self.site.start is not None and self.site.start.suffix == ".h5":
+                text = await self.site.workers.drawing.ask("case_of", path=str(self.site.start))
+                self.take(text, self.site.start.stem)
+            elif self.site.start is not None:
+                self.start_from(self.site.start)
+            else:
+                self.take("", "dbv12")
+        except (CaseError, OSError, UnicodeDecodeError) as error:
+            self.take("", "dbv12")
+            self.tell(str(error))
+
+    def shown(self, name: str) -> None:
+        """Bring a tab up to date that is looked at."""
+        if name == "Ask":
+            self.asking.open()
+        elif name == "See":
+            self.seeing.refresh()
+        elif name == "Run":
+            self.running.refresh()
+
+    def tell(self, sentence: str) -> None:
+        """Say something at the foot of the page."""
+        ui.notify(sentence, multi_line=True, timeout=8000, close_button="OK")
+
+    # -- the valve ----
+
+    def take(self, text: str, name: str) -> None:
+        """Take a case in place of that on the page.
+
+        Raises
+        ------
+        CaseError
+            For what is no TOML.
+        """
+        self.data, self.name = read_sheet(text), name
+        self._form.refresh()
+        self._parts.refresh()
+        self.changed(text)
+
+    def start_from(self, path: Path) -> None:
+        """Take a case file with the files beside it that it names."""
+        text = path.read_text(encoding="utf-8")
+        for name in re.findall(r'"([\w.-]+\.csv)"', text):
+            if (path.parent / name).is_file():
+                (self.home / name).write_bytes((path.parent / name).read_bytes())
+        self.take(text, path.stem)
+
+    def typed(self, key: str, text: str) -> None:
+        """Take what was typed for a key."""
+        try:
+            change(self.data, key, text)
+        except CaseError as error:
+            self._show(Checked(None, (str(error),), key=key))
+            return
+        self.changed()
+
+    def changed(self, text: str | None = None) -> None:
+        """Check the case, keep it, and draw it soon."""
+        text = write_sheet(self.data) if text is None else text
+        self._text.value = text
+        self._show(check(self.data, self.home, text))
+        (self.home / "valve.toml").write_text(text, encoding="utf-8")
+        if self._drawing is not None:
+            self._drawing.cancel()
+        if self.checked.case is not None:
+            self._drawing = asyncio.create_task(self._draw())
+
+    def _show(self, checked: Checked) -> None:
+        self.checked = checked
+        self._wrong.text = "\n".join(checked.problems)
+        self._noted.text = "\n".join(checked.notes)
+        self._fits.text = "It fits." if checked.case is not None else ""
+
+    @property
+    def file(self) -> Path | None:
+        """File of the case as it is now, for processes; None where it does not fit."""
+        if self.checked.case is None:
+            return None
+        text = write_sheet(self.data)
+        path = self.home / f"case-{hashlib.sha256(text.encode()).hexdigest()[:16]}.toml"
+        if not path.exists():
+            for old in sorted(self.home.glob("case-*.toml"), key=lambda file: file.stat().st_mtime)[:-20]:
+                old.unlink()
+            path.write_text(text, encoding="utf-8")
+        return path
+
+    def files(self) -> dict[str, bytes]:
+        """Case and data files of a run."""
+        found = {path.name: path.read_bytes() for path in self.home.glob("*.csv")}
+        return found | {"case.toml": write_sheet(self.data).encode()}
+
+    def run(self, kind: str, title: str, arguments: list[str]) -> Run | None:
+        """Put a run of the valve into the queue; None where that is refused, which is told."""
+        try:
+            if self.checked.case is None:
+                raise CaseError("The valve does not fit yet; see Describe.")
+            return self.site.runs.add(self.home, kind, title, self.files(), arguments)
+        except (CaseError, OSError) as error:
+            self.tell(str(error))
+            return None
+
+    async def _draw(self) -> None:
+        await asyncio.sleep(PAUSE)
+        try:
+            found = await self.site.workers.drawing.ask("describe", case=str(self.file))
+        except CaseError as error:
+            self._wrong.text = str(error)
+            return
+        self._picture.set_source(f"data:image/png;base64,{found['picture']}")
+        self._picture.props(f'alt="{self.name}: the valve with its measures"')
+        self._sizes.text = "\n".join(found["sizes"])
+        self._noted.text = "\n".join([*self.checked.notes, *found["notes"]])
+
+    # -- the form ----
+
+    def _describe(self) -> None:
+        with ui.row().style("align-items: center"):
+            names = shelf()
+            ui.select(
+                [*names], label="Start from", on_change=lambda e: self._attempt(self.start_from, names[e.value])
+            ).style("min-width: 170px").props('data-at="start"')
+            drop = ui.upload(
+                label="Drop a case, or data", auto_upload=True, max_file_size=DATA, on_upload=self._uploaded
+            )
+            drop.props("flat bordered").style("width: 230px; max-height: 56px")
+            ui.button("Save", on_click=self._save).props('data-at="save"')
+        with ui.element("div").classes("columns"):
+            with ui.column():
+                self._fits = ui.label().style("color: #2e7d32").props('data-at="fits"')
+                self._wrong = ui.label().classes("wrong").props('data-at="wrong"')
+                self._form()
+                self._parts()
+                with ui.expansion("All keys as text").classes("full"):
+                    self._text = ui.textarea().classes("full").props("autogrow").style("font-family: monospace")
+                    ui.button("Take this text", on_click=lambda: self._attempt(self.take, self._text.value, self.name))
+            with ui.column():
+                self._picture = ui.image().classes("drawing full")
+                self._sizes, self._noted = ui.label().classes("note"), ui.label().classes("note")
+
+    @ui.refreshable_method
+    def _form(self) -> None:
+        for heading, rows in FORM.items():
+            with ui.expansion(heading, value=heading == "Sizes").classes("full"), ui.element("div").classes("fields"):
+                for key, label in rows:
+                    self._field(key, label)
+
+    def _field(self, key: str, label: str) -> None:
+        section, name = key.split(".")
+        part = Case.model_fields[section].annotation
+        field = part.model_fields[name] if issubclass(part, Section) else None
+        default = getattr(getattr(_DEFAULT, section), name)
+        shown = "" if default is None else f"{default:g}" if isinstance(default, float) else str(default)
+        box = (
+            ui.input(label, value=given(self.data, key), placeholder=shown)
+            .props("dense stack-label")
+            .props(f'data-at="{key}"')
+        )
+        box.on_value_change(lambda event: self.typed(key, event.value or ""))
+        if field is not None and field.description:
+            box.tooltip(field.description)
+
+    @ui.refreshable_method
+    def _parts(self) -> None:
+        layers = self.data.get("layers")
+        rows = layers if isinstance(layers, list) else [layer.model_dump(mode="json") for layer in _DEFAULT.layers]
+        with ui.expansion("Layers, inside to outside").classes("full"):
+            for number, row in enumerate(rows):
+                with ui.row().style("align-items: center; gap: 8px"):
+                    for name in ("material", "thickness", "angle"):
+                        value = row.get(name, "") if isinstance(row, dict) else ""
+                        box = ui.input(name, value=str(value)).props("dense").style("width: 100px")
+                        box.on_value_change(
+                            lambda event, at=f"layers.{number}.{name}": self.typed(at, event.value or "")
+                        )
+                    ui.button(icon="remove", on_click=lambda _, n=number: self._layers(rows, n)).props("flat dense")
+            ui.button("Add a layer", on_click=lambda: self._layers(rows, None)).props("flat")
+        with ui.expansion("Rubbers").classes("full"):
+            own = self.data.get("materials", {})
+            cards = (
+                {name: card for name, card in own.items() if isinstance(card, dict)} if isinstance(own, dict) else {}
+            )
+            for name, card in cards.items():
+                ui.label(f"{name}: " + ", ".join(f"{key} {value}" for key, value in card.items())).classes("note")
+            with ui.row().style("align-items: center; gap: 8px"):
+                name = ui.input("Name").props("dense").style("width: 100px").props('data-at="rubber"')
+                shore = ui.input("Hardness, Shore A").props("dense").style("width: 120px").props('data-at="hardness"')
+                test = ui.select(["", *self._data_files()], label="or its test").style("width: 130px")
+                loss = ui.input("Loss factor").props("dense").style("width: 90px")
+                ui.button(
+                    "Add", on_click=lambda: self._add_rubber(name.value, shore.value, test.value, loss.value)
+                ).props("flat")
+
+    def _data_files(self) -> list[str]:
+        return sorted(path.name for path in self.home.glob("*.csv"))
+
+    def _layers(self, rows: list, removed: int | None) -> None:
+        kept = [row for number, row in enumerate(rows) if number != removed]
+        self.data["layers"] = kept if removed is not None else [*kept, dict(kept[-1]) if kept else {}]
+        self._parts.refresh()
+        self.changed()
+
+    def _add_rubber(self, name: str, shore: str, test: str | None, loss: str) -> None:
+        if not re.fullmatch(r"[A-Za-z][\w-]{0,30}", name or ""):
+            self.tell("A rubber needs a name of letters and digits.")
+            return
+        card: dict[str, Any] = {"density": "1150 kg/m^3"}
+        card |= {"kind": "fit", "path": test} if test else {"kind": "neo-hookean", "shear_modulus": f"{shore} Shore A"}
+        if loss:
+            card["loss_factor"] = float(loss) if re.fullmatch(r"[\d.]+", loss) else loss
+        self.data.setdefault("materials", {})[name] = card
+        self._parts.refresh()
+        self.changed()
+
+    def _attempt(self, act: Callable, *given: Any) -> None:
+        try:
+            act(*given)
+        except (CaseError, OSError, UnicodeDecodeError) as error:
+            self._show(Checked(None, (str(error),)))
+
+    async def _uploaded(self, event: events.UploadEventArguments) -> None:
+        """Take a case file, or keep a data file; a record becomes a run that judges it."""
+        content, name = await event.file.read(), Path(event.file.name.replace("\\", "/")).name
+        event.sender.reset()
+        if not re.fullmatch(r"[\w][\w. -]{0,60}\.(toml|csv)", name, re.IGNORECASE) or len(content) > DATA:
+            self.tell(f"{name[:60]!r} is not taken: a case ends in .toml, data in .csv, up to {DATA >> 20} MB.")
+            return
+        if name.lower().endswith(".toml"):
+            self._attempt(lambda: self.take(content.decode("utf-8-sig"), Path(name).stem))
+            return
+        if len(self._data_files()) >= FILES:
+            self.tell(f"{FILES} data files are kept already.")
+            return
+        (self.home / name.replace(" ", "_")).write_bytes(content)
+        self._parts.refresh()
+        self.changed()
+        self.tell(f"{name.replace(' ', '_')} is kept; the case may name it, and Rubbers offers it.")
+
+    def _save(self) -> None:
+        ui.download.content(write_sheet(self.data), f"{self.name}.toml", "application/toml")
+
+
+_DEFAULT = Case()

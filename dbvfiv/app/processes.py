@@ -1,0 +1,340 @@
+"""Worker processes of the valves that are asked, and the runs of the command line, with their queue."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import itertools
+import json
+import os
+import re
+import secrets
+import shutil
+import signal
+import sys
+import time
+from collections import OrderedDict
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from ..errors import CaseError
+
+#: Valves whose workers are kept; results of one user that are kept, and of them waiting; time of a run, s.
+VALVES, KEPT, WAITING, LONGEST = 3, 40, 8, 6 * 3600.0
+#: Time for an answer of a worker, s.
+PATIENCE = 300.0
+#: Largest line of an answer, bytes.
+LINE = 64 << 20
+
+
+def surroundings(**further: str) -> dict[str, str]:
+    """Environment of a process that finds this package."""
+    found = [str(Path(__file__).parents[2]), *filter(None, [os.environ.get("PYTHONPATH")])]
+    return os.environ | {"OMP_NUM_THREADS": "1", "PYTHONPATH": os.pathsep.join(found)} | further
+
+
+class Worker:
+    """One worker process; it is started with the first question, and again after it died."""
+
+    def __init__(self) -> None:
+        self._process: asyncio.subprocess.Process | None = None
+        self._waiting: dict[int, asyncio.Future] = {}
+        self._numbers = itertools.count()
+        self._opened = ""
+        self._lock = asyncio.Lock()
+
+    @property
+    def pid(self) -> int | None:
+        """Number of the process while it lives."""
+        return self._process.pid if self._process is not None and self._process.returncode is None else None
+
+    async def _start(self) -> None:
+        environment = surroundings()
+        command = (sys.executable, "-m", "dbvfiv.app.worker")
+        pipes = {"stdin": asyncio.subprocess.PIPE, "stdout": asyncio.subprocess.PIPE, "limit": LINE}
+        self._process = await asyncio.create_subprocess_exec(*command, env=environment, start_new_session=True, **pipes)
+        self._reader = asyncio.create_task(self._read(self._process))
+
+    async def _read(self, process: asyncio.subprocess.Process) -> None:
+        while line := await process.stdout.readline():
+            found = json.loads(line)
+            waiting = self._waiting.pop(found["id"], None)
+            if waiting is not None and not waiting.done():
+                waiting.set_result(found)
+        await process.wait()
+        self._opened = ""
+        for waiting in self._waiting.values():
+            if not waiting.done():
+                waiting.set_result({"error": "The process that computes ended; ask again, it is started anew."})
+        self._waiting.clear()
+
+    async def ask(self, do: str, **question: Any) -> Any:
+        """Answer to a question.
+
+        Raises
+        ------
+        CaseError
+            With the sentence of what went wrong.
+        """
+        if self.pid is None:
+            await self._start()
+        number = next(self._numbers)
+        self._waiting[number] = waiting = asyncio.get_running_loop().create_future()
+        try:
+            self._process.stdin.write(json.dumps({"id": number, "do": do, **question}).encode() + b"\n")
+            await self._process.stdin.drain()
+            found = await asyncio.wait_for(waiting, PATIENCE)
+        except (TimeoutError, ConnectionError):
+            self._waiting.pop(number, None)
+            self.end()
+            raise CaseError("The process that computes did not answer and was ended; ask again.") from None
+        if "error" in found:
+            raise CaseError(found["error"])
+        return found["answer"]
+
+    async def about(self, case: Path, do: str, **question: Any) -> Any:
+        """Answer to a question on a case file, which is opened before."""
+        async with self._lock:
+            if self.pid is None or self._opened != str(case):
+                self._parameters = await self.ask("open", case=str(case))
+                self._opened = str(case)
+        return self._parameters if do == "open" else await self.ask(do, **question)
+
+    def end(self) -> None:
+        """End the process."""
+        if self.pid is not None:
+            with contextlib.suppress(ProcessLookupError):
+                os.killpg(self.pid, signal.SIGKILL)
+
+
+class Workers:
+    """Workers of the valves that were asked last: one predicts, one confirms; and one that draws for all."""
+
+    def __init__(self) -> None:
+        self.drawing = Worker()
+        self._pairs: OrderedDict[Path, tuple[Worker, Worker]] = OrderedDict()
+
+    def of(self, case: Path) -> tuple[Worker, Worker]:
+        """Workers of a case file; those of the valve that was not asked for longest are ended where too many live."""
+        pair = self._pairs.pop(case, None) or (Worker(), Worker())
+        self._pairs[case] = pair
+        while len(self._pairs) > VALVES:
+            for worker in self._pairs.popitem(last=False)[1]:
+                worker.end()
+        return pair
+
+    def end(self) -> None:
+        """End all."""
+        for worker in (self.drawing, *itertools.chain(*self._pairs.values())):
+            worker.end()
+
+
+@dataclass(eq=False)
+class Run:
+    """A run of the command line in a folder of its own, which holds its case, journal, output and results.
+
+    Attributes
+    ----------
+    folder : Path
+    kind : str
+        Study, report, or verdict of a record.
+    title : str
+    arguments : list of str
+    state : str
+        waiting, running, done, failed, cancelled or interrupted.
+    made, started, ended : float, s
+        Since 1970.
+    """
+
+    folder: Path
+    kind: str
+    title: str
+    arguments: list[str] = field(default_factory=list)
+    state: str = "waiting"
+    made: float = 0.0
+    started: float = 0.0
+    ended: float = 0.0
+    process: asyncio.subprocess.Process | None = None
+
+    @property
+    def name(self) -> str:
+        """Name of its folder."""
+        return self.folder.name
+
+    @property
+    def page(self) -> Path:
+        """Page of a report, or the result file."""
+        return self.folder / ("report.html" if self.kind == "report" else "result.h5")
+
+    @property
+    def can_resume(self) -> bool:
+        """True where it was ended before its end."""
+        return self.state in ("cancelled", "interrupted") and self.process is None
+
+    def keep(self) -> None:
+        """Write the journal."""
+        kept = {name: value for name, value in vars(self).items() if name not in ("folder", "process")}
+        draft = self.folder / "run.json.new"
+        draft.write_text(json.dumps(kept))
+        draft.replace(self.folder / "run.json")
+
+    @classmethod
+    def read(cls, folder: Path) -> Run | None:
+        """Run of a folder; one that was running when the server ended is interrupted."""
+        try:
+            run = cls(folder, **json.loads((folder / "run.json").read_text()))
+        except (OSError, ValueError, TypeError):
+            return None
+        if run.state in ("running", "waiting"):
+            run.state = "interrupted"
+        return run
+
+    def progress(self) -> tuple[float, str]:
+        """Share that is done, and what the bar says, with the time that is left."""
+        try:
+            with open(self.folder / "errors.txt", "rb") as file:
+                file.seek(max(0, os.fstat(file.fileno()).st_size - 600))
+                line = re.split(r"[\r\n]+", file.read().decode("utf-8", "replace").strip())[-1]
+        except OSError:
+            return 0.0, ""
+        share = re.search(r"(\d+)\s?%", line)
+        left = re.search(r"<([\d:]+)", line)
+        said = re.sub(r"\s*\|.*?\|\s*", " ", line)
+        said = f"{said.split('[')[0].strip()}; {left[1]} left" if left else said.strip()
+        return (float(share[1]) / 100 if share else 0.0), said[:160]
+
+    def output(self) -> str:
+        """Text that it printed, and the sentence of its failure."""
+        said = []
+        for name in ("output.txt", "errors.txt"):
+            with contextlib.suppress(OSError):
+                text = (self.folder / name).read_bytes()[-20_000:].decode("utf-8", "replace")
+                said += [line.rsplit("\r", 1)[-1].rstrip() for line in text.split("\n")]
+        return "\n".join(line for line in said if line and not re.search(r"\d%\|", line))
+
+    def command(self) -> list[str]:
+        """Command line; one that was begun goes on in its file."""
+        base = [sys.executable, "-m", "dbvfiv"]
+        if self.kind == "report":
+            return [*base, "report", "case.toml", "-o", "report.html", "--workers", "1", *self.arguments]
+        if self.kind == "verdict":
+            return [*base, "verdict", *self.arguments]
+        if (self.folder / "result.h5").exists():
+            return [*base, "resume", "result.h5"]
+        return [*base, self.kind, "case.toml", "-o", "result.h5", *self.arguments]
+
+
+class Runs:
+    """Queue of the runs of all users, so many at once.
+
+    Parameters
+    ----------
+    at_once : int
+    """
+
+    def __init__(self, at_once: int = 1):
+        self.at_once = at_once
+        self._queue: list[Run] = []
+        self._running: set[Run] = set()
+        self._known: dict[Path, dict[str, Run]] = {}
+        self._tasks: set[asyncio.Task] = set()
+
+    def of(self, folder: Path) -> list[Run]:
+        """Runs of the folder of a user, the newest first."""
+        if folder not in self._known:
+            found = [Run.read(path) for path in sorted((folder / "runs").glob("*")) if path.is_dir()]
+            self._known[folder] = {run.name: run for run in found if run is not None}
+        return sorted(self._known[folder].values(), key=lambda run: -run.made)
+
+    def add(self, folder: Path, kind: str, title: str, files: dict[str, bytes], arguments: list[str]) -> Run:
+        """Put a run with its files into the queue.
+
+        Raises
+        ------
+        CaseError
+            Where a user has too many.
+        """
+        known = self.of(folder)
+        if sum(run.state in ("waiting", "running") for run in known) >= WAITING:
+            raise CaseError(f"{WAITING} runs are waiting already; cancel one or wait.")
+        if len(known) >= KEPT:
+            raise CaseError(f"{KEPT} results are kept already; delete some.")
+        own = folder / "runs" / f"{time.time_ns():x}-{secrets.token_hex(3)}"
+        own.mkdir(parents=True)
+        for name, content in files.items():
+            (own / name).write_bytes(content)
+        run = Run(own, kind, title, arguments, made=time.time())
+        self._known[folder][run.name] = run
+        self._enqueue(run)
+        return run
+
+    def resume(self, run: Run) -> None:
+        """Put a run that was ended into the queue again."""
+        if run.can_resume:
+            self._enqueue(run)
+
+    def _enqueue(self, run: Run) -> None:
+        run.state = "waiting"
+        run.keep()
+        self._queue.append(run)
+        self._next()
+
+    def cancel(self, run: Run) -> None:
+        """End a run, which keeps what it found."""
+        if run in self._queue:
+            self._queue.remove(run)
+        if run.state in ("waiting", "running"):
+            run.state = "cancelled"
+            run.keep()
+            _signal(run, signal.SIGTERM)
+
+    def delete(self, folder: Path, run: Run) -> None:
+        """End a run and delete its folder."""
+        self.cancel(run)
+        self._known[folder].pop(run.name, None)
+        shutil.rmtree(run.folder, ignore_errors=True)
+
+    def _next(self) -> None:
+        while self._queue and len(self._running) < self.at_once:
+            run = self._queue.pop(0)
+            self._running.add(run)
+            task = asyncio.create_task(self._perform(run))
+            self._tasks.add(task)
+            task.add_done_callback(self._tasks.discard)
+
+    async def _perform(self, run: Run) -> None:
+        try:
+            run.state, run.started = "running", time.time()
+            run.keep()
+            environment = surroundings(DBVFIV_BAR="1", COLUMNS="100")
+            with open(run.folder / "output.txt", "wb") as out, open(run.folder / "errors.txt", "wb") as errors:
+                run.process = await asyncio.create_subprocess_exec(
+                    *run.command(), cwd=run.folder, env=environment, stdout=out, stderr=errors, start_new_session=True
+                )
+                try:
+                    status = await asyncio.wait_for(run.process.wait(), LONGEST)
+                except TimeoutError:
+                    self.cancel(run)
+                    status = await run.process.wait()
+            if run.state == "running":
+                run.state = "done" if status == 0 else "interrupted" if status in (130, 143, -9, -15) else "failed"
+        except OSError:
+            run.state = "failed"
+        finally:
+            run.ended, run.process = time.time(), None
+            self._running.discard(run)
+            with contextlib.suppress(OSError):  # of one that was deleted
+                run.keep()
+            self._next()
+
+    def end(self) -> None:
+        """End all runs; those that ran are interrupted, and go on when they are resumed."""
+        for run in self._running:
+            _signal(run, signal.SIGTERM)
+
+
+def _signal(run: Run, number: signal.Signals) -> None:
+    if run.process is not None and run.process.returncode is None:
+        with contextlib.suppress(ProcessLookupError):
+            os.killpg(run.process.pid, number)

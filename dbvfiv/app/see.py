@@ -1,0 +1,243 @@
+"""Curves and maps of a valve, and its runs: both are results of the command line."""
+
+from __future__ import annotations
+
+import time
+from typing import Any
+
+from nicegui import events, ui
+
+from ..case.parameters import PARAMETERS
+from ..errors import CaseError
+from ..studies import KINDS
+from .processes import Run
+
+#: Time between two looks at the runs, s.
+LOOK = 1.0
+#: Pictures of a valve: title, study, and keys of the case that it is asked with; "{}" stands for the largest head, Pa.
+PICTURES = {
+    "Head-loss curve": ("steady", ('steady.pressures=["{:.6g} Pa:{:.6g} Pa:10"]',)),
+    "Root locus over head": ("sweep", ("sweep.over=pressure={:.6g}:{:.6g}:10",)),
+    "Stability map": ("map", ("map.x=pressure={:.6g}:{:.6g}:8", "map.y={}")),
+    "Closure": ("closure", ()),
+}
+
+
+class RunView:
+    """A run in a list: bar, buttons, output and results.
+
+    Parameters
+    ----------
+    page : Page
+    run : Run
+    """
+
+    def __init__(self, page: Any, run: Run):
+        self.page, self.run = page, run
+        with ui.card().classes("full").props(f'data-at="run {run.kind}"'):
+            with ui.row().classes("full").style("align-items: center"):
+                self._title = ui.label(run.title).style("font-weight: bold")
+                self._state = ui.label().classes("note").props('data-at="state"')
+                self._cancel = ui.button("Cancel", on_click=lambda: page.site.runs.cancel(run)).props("flat dense")
+                self._resume = ui.button("Resume", on_click=lambda: page.site.runs.resume(run)).props("flat dense")
+                self._open = ui.button("Open", on_click=self._show).props("flat dense")
+                ui.button("Delete", on_click=self._delete).props("flat dense")
+            self._bar = ui.linear_progress(0, show_value=False).classes("full")
+            self._body = ui.column().classes("full")
+        self.look()
+
+    def look(self) -> None:
+        """Bring bar and buttons up to date."""
+        run, live = self.run, self.run.state in ("running", "waiting")
+        share, said = run.progress() if run.state == "running" else (float(run.state == "done"), "")
+        took = f" in {run.ended - run.started:.0f} s" if run.state == "done" else ""
+        if run.state == "running" and not said:
+            said = f"{time.time() - run.started:.0f} s"
+        self._state.text = f"{run.state}{took}{': ' if said else ''}{said}"
+        self._bar.value = share
+        self._bar.visible, self._cancel.visible = live, live
+        self._resume.visible = run.can_resume
+        self._open.visible = run.state in ("done", "failed", "cancelled", "interrupted")
+
+    def _delete(self) -> None:
+        self.page.site.runs.delete(self.page.home, self.run)
+        self.page.running.refresh()
+
+    async def _show(self) -> None:
+        self._body.clear()
+        with self._body:
+            await show_result(self.page, self.run)
+
+
+async def show_result(page: Any, run: Run) -> None:
+    """Draw what a run printed and found."""
+    ui.label(run.output()).classes("text")
+    if run.kind == "report" and run.page.exists():
+        ui.link("Open the report", f"/files/{run.name}/report.html", new_tab=True)
+    if run.kind in KINDS and run.page.exists():
+        try:
+            found = await page.site.workers.drawing.ask(
+                "result", path=str(run.page), figures=str(run.folder / "figures")
+            )
+        except CaseError as error:
+            ui.label(str(error)).classes("wrong")
+            return
+        if run.kind == "map" and found["summary"].get("growth_rate"):
+            show_map(page, found["summary"])
+        with ui.row():
+            for name in found["tables"]:
+                ui.link(name, f"/files/{run.name}/figures/{name}").props("download")
+            ui.link("result.h5", f"/files/{run.name}/result.h5").props("download")
+        for name in found["figures"]:
+            address = f"/files/{run.name}/figures/{name}?{run.page.stat().st_mtime_ns}"
+            with ui.link(target=address).props(f'download="{name}" title="Save this figure"').classes("drawing full"):
+                ui.html(f'<img src="{address}" alt="{name}">', sanitize=False).classes("drawing full")
+
+
+def show_map(page: Any, found: dict[str, Any]) -> None:
+    """Draw a stability map with neutral curves and the star of the installation; a click goes to a cell."""
+    (x, y), grid = (found["x"], found["y"]), found["growth_rate"]
+    rows = [PARAMETERS[axis["parameter"]] for axis in (x, y)]
+    limit = max((abs(rate) for row in grid for rate in row if rate is not None), default=1.0)
+    cells = {
+        "type": "heatmap",
+        "x": [value / rows[0].scale for value in x["values"]],
+        "y": [value / rows[1].scale for value in y["values"]],
+        "z": grid,
+        "colorscale": "RdBu",
+        "reversescale": False,
+        "zmin": -limit,
+        "zmax": limit,
+        "colorbar": {"title": {"text": "Growth rate, 1/s"}},
+    }
+    curves = [
+        {"type": "scatter", "mode": "lines", "line": {"color": "black"}, "showlegend": False}
+        | {"x": [point[0] / rows[0].scale for point in curve], "y": [point[1] / rows[1].scale for point in curve]}
+        for curve in found["onset_curves"]
+    ]
+    asked = page.asking.values or {}
+    star = [asked.get(row.name) for row in rows]
+    if None not in star:
+        marker = {"symbol": "star", "size": 16, "color": "gold", "line": {"color": "black", "width": 1}}
+        star = [value / row.scale for value, row in zip(star, rows)]
+        curves.append({"type": "scatter", "mode": "markers", "x": star[:1], "y": star[1:], "marker": marker})
+        curves[-1] |= {"name": "this installation", "showlegend": False}
+    axes = {
+        f"{name}axis": {"title": {"text": row.label}, "type": "log" if axis.get("log") else "linear"}
+        for name, row, axis in zip("xy", rows, (x, y))
+    }
+    figure = {"data": [cells, *curves], "layout": {"height": 420, "margin": {"t": 10}} | axes}
+
+    def go(event: events.GenericEventArguments) -> None:
+        point = (event.args.get("points") or [{}])[0]
+        if point.get("x") is None:
+            return
+        values = {row.name: float(point[name]) * row.scale for row, name in zip(rows, "xy")}
+        page.panels.value = "Ask"
+        page.asking.open(values)
+
+    ui.plotly(figure).classes("full").props('data-at="map"').on("plotly_click", go)
+    ui.label("A click on a cell asks the valve there.").classes("note")
+
+
+class SeePanel:
+    """Pictures of the valve of the page, each computed when it is asked for.
+
+    Parameters
+    ----------
+    page : Page
+    """
+
+    def __init__(self, page: Any):
+        self.page = page
+
+    def build(self) -> None:
+        """Draw the panel."""
+        with ui.row():
+            for title in PICTURES:
+                ui.button(title, on_click=lambda _, title=title: self._ask(title)).props(f'data-at="see {title}"')
+        ui.label("Each is a run, which waits in its turn and is kept.").classes("note")
+        self._views: dict[str, RunView] = {}
+        self._list = ui.column().classes("full")
+        ui.timer(LOOK, self.refresh)
+
+    def _ask(self, title: str) -> None:
+        kind, keys = PICTURES[title]
+        case = self.page.checked.case
+        if case is None:
+            self.page.tell("The valve does not fit yet; see Describe.")
+            return
+        high = 1.5 * case.drive.pressure
+        damping = next((n for n in ("loss_factor", "beta", "alpha") if not case.damping.lacks(n)), "density")
+        own = getattr(case.damping, damping, 0.0) or 1.0
+        values = f"{damping}={0.25 * own:.6g}:{3 * own:.6g}:8"
+        arguments = []
+        for key in keys:
+            filled = key.format(values) if key.count("{") == 1 else key.format(0.1 * high, high)
+            arguments += ["--set", filled]
+        self.page.run(kind, title, arguments)
+        self.refresh()
+
+    def refresh(self) -> None:
+        """Bring the list up to date: the newest of each picture."""
+        newest: dict[str, Run] = {}
+        for run in self.page.site.runs.of(self.page.home):
+            if run.title in PICTURES:
+                newest.setdefault(run.title, run)
+        if {title: view.run for title, view in self._views.items()} != newest:
+            self._list.clear()
+            with self._list:
+                self._views = {title: RunView(self.page, run) for title, run in newest.items()}
+        for view in self._views.values():
+            view.look()
+
+
+class RunsPanel:
+    """Any study and the report, in a queue; results that are kept.
+
+    Parameters
+    ----------
+    page : Page
+    """
+
+    def __init__(self, page: Any):
+        self.page = page
+        self._views: dict[str, RunView] = {}
+
+    def build(self) -> None:
+        """Draw the panel."""
+        with ui.row().style("align-items: center"):
+            kinds = ["report", *KINDS]
+            self._kind = ui.select(kinds, value="report", label="Run").style("min-width: 140px").props('data-at="kind"')
+            ui.button("Add to the queue", on_click=self._add).props('data-at="add"')
+            drop = ui.upload(label="Drop a record", auto_upload=True, max_file_size=10 << 20, on_upload=self._judge)
+            drop.props("flat bordered").style("width: 230px; max-height: 56px")
+        ui.label("What a study takes stands in its section of the case: Describe, all keys as text.").classes("note")
+        self._list = ui.column().classes("full")
+        ui.timer(LOOK, self.refresh)
+
+    def _add(self) -> None:
+        self.page.run(self._kind.value, f"{self._kind.value} of {self.page.name}", [])
+        self.refresh()
+
+    async def _judge(self, event: events.UploadEventArguments) -> None:
+        content = await event.file.read()
+        event.sender.reset()
+        try:
+            files = {"record.csv": content}
+            self.page.site.runs.add(
+                self.page.home, "verdict", f"verdict of {event.file.name[:40]}", files, ["record.csv"]
+            )
+        except (CaseError, OSError) as error:
+            self.page.tell(str(error))
+        self.refresh()
+
+    def refresh(self) -> None:
+        """Bring the list up to date."""
+        runs = {run.name: run for run in self.page.site.runs.of(self.page.home)}
+        if [*self._views] != [*runs]:
+            self._list.clear()
+            with self._list:
+                self._views = {name: RunView(self.page, run) for name, run in runs.items()}
+        for view in self._views.values():
+            view.look()

@@ -1,0 +1,185 @@
+"""The case of a page: the keys that were given, as data and as TOML, checked in the words of ``dbvfiv case``."""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from ..case.load import make_case, parse_toml, put, toml_value
+from ..errors import CaseError
+from ..studies.case import Case, contradictions, oddities
+
+#: Sizes that bound what a page may ask for: bytes of a case, elements, processes of a run.
+LONGEST, ELEMENTS, WORKERS = 200_000, 4000, 2
+#: Keys of the form by heading: key and label; the rest is edited as text.
+FORM: dict[str, tuple[tuple[str, str], ...]] = {
+    "Sizes": (
+        ("valve.duckbill_length", "Bill length"),
+        ("valve.saddle_length", "Saddle length"),
+        ("valve.flange_length", "Flange or cuff length"),
+        ("valve.lip_half_width", "Half width of the bill"),
+        ("valve.lip_radius", "Radius of the side edge"),
+        ("valve.flange_radius", "Radius at the flange"),
+        ("valve.thickness_factor", "Wall thickness factor"),
+        ("valve.scale", "Scale"),
+    ),
+    "Installation": (
+        ("drive.pressure", "Head or static pressure"),
+        ("fluid.density", "Fluid density"),
+        ("fluid.continuity", "Flow model"),
+        ("upstream.length", "Length of the pipe in front"),
+        ("upstream.diameter", "Its diameter"),
+        ("upstream.roughness", "Its roughness"),
+        ("downstream.pipe_diameter", "Pipe behind: diameter"),
+        ("downstream.length", "Pipe behind: length"),
+        ("downstream.pressure", "Pressure downstream"),
+        ("outside.fluid", "Fluid outside the wall"),
+        ("closure.rated_pressure", "Rated back pressure"),
+    ),
+    "Damping and mesh": (
+        ("damping.model", "Damping model"),
+        ("damping.loss_factor", "Factor on the loss factors"),
+        ("damping.beta", "Stiffness damping"),
+        ("materials.strain_level", "Strain level of the rubbers"),
+        ("mesh.around", "Elements around"),
+        ("mesh.along", "Elements along"),
+    ),
+}
+
+
+@dataclass(frozen=True)
+class Checked:
+    """Outcome of a check.
+
+    Attributes
+    ----------
+    case : Case or None
+        None where the keys give no case.
+    problems, notes : tuple of str
+        Sentences on what is wrong, and on what is allowed and seldom meant.
+    key : str
+        Key to blame for the first problem.
+    """
+
+    case: Case | None
+    problems: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()
+    key: str = ""
+
+
+def read_sheet(text: str) -> dict[str, Any]:
+    """Data of a TOML text.
+
+    Raises
+    ------
+    CaseError
+        For a text that is too long, nested too deep, or no TOML.
+    """
+    if len(text) > LONGEST:
+        raise CaseError(f"The case file has {len(text)} characters; it may have {LONGEST}.")
+    try:
+        return parse_toml(text, "the case")
+    except RecursionError:
+        raise CaseError("The case file is nested too deep to be read.") from None
+
+
+def write_sheet(data: Mapping[str, Any]) -> str:
+    """TOML text of the given keys, a table for each section; `read_sheet` gives the same data."""
+    tables = [(name, value) for name, value in data.items() if isinstance(value, Mapping)]
+    lines = [f"{_name(name)} = {_value(value)}" for name, value in data.items() if not isinstance(value, Mapping)]
+    for name, table in tables:
+        lines += ["", f"[{_name(name)}]", *(f"{_name(key)} = {_value(value)}" for key, value in table.items())]
+    return "\n".join(lines).lstrip("\n") + "\n"
+
+
+def _name(name: str) -> str:
+    return name if re.fullmatch(r"[A-Za-z0-9_-]+", name) else _quoted(name)
+
+
+def _quoted(text: str) -> str:
+    """Text as JSON has it, which leaves the one control character that TOML refuses."""
+    return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007f")
+
+
+def _value(value: Any) -> str:
+    if isinstance(value, Mapping):
+        return "{ " + ", ".join(f"{_name(key)} = {_value(part)}" for key, part in value.items()) + " }"
+    if isinstance(value, list):
+        return "[" + ", ".join(map(_value, value)) + "]"
+    if isinstance(value, str):
+        return _quoted(value)
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    return repr(value) if isinstance(value, (int, float)) else str(value)
+
+
+def given(data: Mapping[str, Any], key: str) -> str:
+    """Value of a key as it was given; empty where it was not."""
+    value: Any = data
+    for part in key.split("."):
+        value = value.get(part) if isinstance(value, Mapping) else None
+    return "" if value is None else value if isinstance(value, str) else _value(value)
+
+
+def change(data: dict[str, Any], key: str, text: str) -> None:
+    """Set a key to what was typed; an empty text takes it away.
+
+    Raises
+    ------
+    CaseError
+    """
+    if text.strip():
+        put(Case, data, key, toml_value(text.strip()))
+        return
+    *path, last = key.split(".")
+    table: Any = data
+    for part in path:
+        table = table.get(part, {})
+    table.pop(last, None)
+
+
+def check(data: Mapping[str, Any], folder: Path, text: str = "") -> Checked:
+    """Check data for a page: what ``dbvfiv case`` refuses, files outside a folder, and what is too large to run."""
+    try:
+        _stay_inside(data)
+        case = make_case(Case, data, folder=folder, source="The case" if text else "", text=text)
+        elements = case.mesh.around * case.mesh.along
+        if elements > ELEMENTS:
+            raise CaseError(
+                f"mesh.around and mesh.along make {elements} elements; a page takes {ELEMENTS}.", key="mesh.around"
+            )
+        problems = tuple(contradictions(case))
+        return Checked(None if problems else case, problems, tuple(oddities(case)))
+    except CaseError as error:
+        return Checked(None, (str(error),), key=error.key or "")
+    except Exception as error:  # a case of any content must not end the server
+        return Checked(None, (f"The case cannot be read ({type(error).__name__}).",))
+
+
+def _stay_inside(data: Mapping[str, Any]) -> None:
+    """Refuse names of files outside the folder, and processes elsewhere.
+
+    Raises
+    ------
+    CaseError
+    """
+    for key, value in _leaves(data, ""):
+        if key.endswith("workers") and not (isinstance(value, int) and value <= WORKERS):
+            raise CaseError(f"{key} is given as {value!r}; here it must be a number up to {WORKERS}.", key=key)
+        for word in re.split(r"[\s,;:|()\[\]'\"=]+", value) if isinstance(value, str) else ():
+            parts = re.split(r"[/\\]", word)
+            if len(word) > 1 and (parts[0] in ("", "~") and len(parts) > 1 or ".." in parts or "\0" in word):
+                raise CaseError(f"{key} is given as {value[:80]!r}; files are named without their folder.", key=key)
+
+
+def _leaves(value: Any, key: str) -> Iterator[tuple[str, Any]]:
+    parts = value.items() if isinstance(value, Mapping) else enumerate(value) if isinstance(value, list) else None
+    if parts is None:
+        yield key, value
+        return
+    for name, part in parts:
+        yield from _leaves(part, f"{key}.{name}".lstrip("."))

@@ -1,0 +1,191 @@
+"""Process of its own for one valve: takes questions as lines of JSON, answers them likewise; between them it prepares.
+
+``python -m dbvfiv.app.worker``; a page talks to it through `dbvfiv.app.processes`.
+"""
+
+from __future__ import annotations
+
+import base64
+import csv
+import io
+import json
+import math
+import os
+import queue
+import sys
+import threading
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..api import Valve, load
+from ..case.parameters import PARAMETERS
+from ..case.quantity import GRAVITY
+from ..case.write import case_toml
+from ..drawing.style import draw_figures, style
+from ..drawing.views import ValveSkin, drawers_of
+from ..errors import CaseError, SolveError
+from ..explore import Answer, Explorer
+from ..model.equilibria import model_warnings
+from ..model.sizes import ValveSizes
+from ..record.mesh import MeshData
+from ..studies.session import load_result
+from ..studies.study import find_study
+
+#: Time without a question after which the reduced operator is enriched, s.
+IDLE = 0.3
+#: Density of a fluid whose pressures are told as heads, kg/m3.
+LIQUID = 300.0
+
+
+class Desk:
+    """Answers to questions on the valve that was opened last."""
+
+    def __init__(self) -> None:
+        self.valve: Valve | None = None
+        self.explorer: Explorer | None = None
+        self._last: Answer | None = None
+
+    def describe(self, case: str) -> dict[str, Any]:
+        """Drawing, sizes and warnings of a case file."""
+        model = load(case).session.described
+        figure = draw_figures(drawers_of(model), (), "case")["valve"]
+        with style():
+            figure.savefig(drawn := io.BytesIO(), format="png", dpi=90)
+        picture = base64.b64encode(drawn.getvalue()).decode()
+        return {"picture": picture, "sizes": ValveSizes.of(model).lines(), "notes": list(model_warnings(model))}
+
+    def case_of(self, path: str) -> str:
+        """Case of a result file, as TOML."""
+        return case_toml(load_result(path).header.case, comments=False)
+
+    def open(self, case: str) -> dict[str, Any]:
+        """Open a case file; the parameters that can be moved, SI, with their rows of the table."""
+        self.explorer = None
+        self.valve = load(case)
+        self.explorer = found = self.valve.explore()
+        units, liquid = found.case.units, found.case.fluid.density > LIQUID
+        in_pressure = not liquid or (units.text and not units.heads)
+        head = units.factor("pressure") if units.heads else GRAVITY * found.case.fluid.density
+        rows = {}
+        for name, (low, high) in found.ranges.items():
+            row = PARAMETERS[name]
+            title, unit, scale = row.title, row.shown_unit, row.scale
+            if name == "pressure" and not in_pressure:
+                title, unit, scale = "Head of the fluid", units.name("pressure") if units.heads else "m", head
+            rows[name] = {"low": low, "high": high, "own": found.base[name], "scale": scale, "unit": unit}
+            rows[name] |= {"title": title, "moves": found.moves(name)}
+        return {"parameters": rows}
+
+    def predict(self, values: dict[str, float]) -> dict[str, Any]:
+        """Prediction of the reduced operator."""
+        return self._explorer.predict(**values).summary()
+
+    def bounded(self, values: dict[str, float]) -> dict[str, Any]:
+        """The same with its bound."""
+        return self._explorer.bounded(**values).summary()
+
+    def confirm(self, values: dict[str, float]) -> dict[str, Any]:
+        """Answer of the full operator."""
+        self._last = self._explorer.confirm(**values)
+        return self._last.summary()
+
+    def margin(self) -> dict[str, Any]:
+        """The answer confirmed last, with its margin of damping."""
+        return self._explorer.with_margin(self._last).summary()
+
+    @property
+    def _explorer(self) -> Explorer:
+        if self.explorer is None:
+            raise CaseError("No valve is open.")
+        return self.explorer
+
+    def shape(self, values: dict[str, float]) -> dict[str, Any]:
+        """Skin of the whole valve at a point: corners, m, triangles, and displacement, m, at the corners."""
+        explorer = self._explorer
+        state, mesh = explorer.state(explorer.place(values)), MeshData.of(explorer.model)
+        skin = ValveSkin.of(mesh)
+        quads = skin.quads
+        moved = np.tile(np.linalg.norm(state.nodal[:, :3], axis=1)[skin.valve.node], 2)
+        triangles = np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]])
+        points = skin.points(state.nodal)
+        return {"points": np.round(points, 5).tolist(), "triangles": triangles.tolist(), "moved": moved.tolist()}
+
+    def result(self, path: str, figures: str) -> dict[str, Any]:
+        """Text, figures and tables of a result file, these written into a folder."""
+        found, folder = load_result(path), Path(figures)
+        folder.mkdir(exist_ok=True)
+        drawn = found.plot(folder) if found.drawable else []
+        tables = [write_table(found, spec, folder) for spec in find_study(found.kind).tables(found.mesh)]
+        said = [found.case.units.say(line) for line in found.lines()]
+        names = {"figures": [file.name for file in drawn], "tables": [file.name for file in tables if file]}
+        summary = found.summary() if found.kind == "map" else {}
+        return {"kind": found.kind, "lines": said, "complete": found.complete, "summary": summary} | names
+
+
+def write_table(result: Any, spec: Any, folder: Path) -> Path | None:
+    """Columns with one number a row of a table of a result as CSV; None where there are no rows."""
+    columns = [c for c in spec.columns if not spec.shape(c)]
+    if not columns or not result.record.rows(spec.name):
+        return None
+    path = folder / f"{spec.name}.csv"
+    with open(path, "w", newline="", encoding="utf-8") as file:
+        out = csv.writer(file)
+        out.writerow([f"{c.name} [{c.unit}]" if c.unit else c.name for c in columns])
+        out.writerows(zip(*(result.record.column(spec.name, c.name) for c in columns)))
+    return path
+
+
+def plain(value: Any) -> Any:
+    """A value for JSON; numbers that are not finite become None."""
+    if hasattr(value, "tolist"):
+        value = value.tolist()
+    if isinstance(value, dict):
+        return {str(k): plain(v) for k, v in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [plain(v) for v in value]
+    return None if isinstance(value, float) and not math.isfinite(value) else value
+
+
+def answer(desk: Desk, question: dict[str, Any]) -> dict[str, Any]:
+    """Answer to a question; what goes wrong as a sentence."""
+    number, name = question.pop("id"), question.pop("do")
+    try:
+        return {"id": number, "answer": plain(getattr(desk, name)(**question))}
+    except (CaseError, SolveError) as error:
+        return {"id": number, "error": str(error)}
+    except Exception as error:  # told on the page; the next question may be a better one
+        return {"id": number, "error": f"The program failed unexpectedly ({type(error).__name__}: {str(error)[:200]})."}
+
+
+def main() -> None:
+    """Answer questions until standard input ends."""
+    out = os.fdopen(os.dup(1), "w", encoding="utf-8")
+    os.dup2(2, 1)  # whatever else prints
+    asked: queue.Queue[str | None] = queue.Queue()
+
+    def listen() -> None:
+        for line in sys.stdin:
+            asked.put(line)
+        asked.put(None)
+
+    threading.Thread(target=listen, daemon=True).start()
+    desk, idle = Desk(), True
+    while True:
+        try:
+            line = asked.get(timeout=IDLE if idle else 3600.0)
+        except queue.Empty:
+            try:
+                idle = desk.explorer is not None and desk.explorer.prepare()
+            except (CaseError, SolveError):
+                idle = False
+            continue
+        if line is None:
+            return
+        print(json.dumps(answer(desk, json.loads(line))), file=out, flush=True)
+        idle = True
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,258 @@
+"""Answers at any parameter point in the time of a slider: steady state, leading eigenvalues and verdict, predicted by
+the reduced operator of the state with its bound, and confirmed by the full one.
+
+A reduced operator belongs to one steady state and holds for all of fluid, damping and pipe there. It is made where it
+is first asked, and enriched where its error is too large: at the points asked for, and between answers at the corners
+of the ranges.
+"""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field, replace
+from itertools import product
+from typing import Any
+
+import numpy as np
+
+from eigen import FamilyReduction, ReducedFamily
+from eigen.columns import TOLERANCE
+
+from .case.parameters import PARAMETERS, Mu
+from .errors import CaseError
+from .model.build import build_flow
+from .model.equilibria import redescribe
+from .model.state import SteadyState
+from .studies.modes.search import critical_damping_factor
+from .studies.session import Session
+from .studies.stability.place import check_scan, is_surrounding
+from .studies.stability.verdict import UNDECIDED, Verdict
+from .studies.stability.walk import StabilityWalk
+
+#: Leading modes that a reduced operator takes at a point.
+TAKEN = 4
+#: Share of its value in the case, and multiple of it, that a parameter is offered from and to.
+OFFERED = {"pressure": (0.1, 2.5), "density": (0.5, 1.5), "pipe_length": (0.2, 5.0)}
+#: The same of the damping.
+DAMPED = (0.25, 3.0)
+
+
+@dataclass(frozen=True)
+class Answer:
+    """Answer at a parameter point.
+
+    Attributes
+    ----------
+    place : Mu
+    state : SteadyState
+    verdict : Verdict
+    eigenvalues : (k,) complex array, 1/s
+        By falling growth rate.
+    bound : float
+        Estimated relative error of the leading eigenvalues; 0 of the full operator, NaN where it was not estimated.
+    confirmed : bool
+        True of the full operator with its independent count.
+    """
+
+    place: Mu
+    state: SteadyState
+    verdict: Verdict
+    eigenvalues: np.ndarray = field(default_factory=lambda: np.zeros(0, complex))
+    bound: float = np.nan
+    confirmed: bool = False
+
+    def summary(self) -> dict[str, Any]:
+        """Plain SI numbers for JSON."""
+        names = ("pressure", "head", "mass_flow", "volume_flow", "outlet_area", "outlet_velocity", "lip_opening")
+        return {
+            "values": dict(self.place),
+            "state": {name: float(getattr(self.state, name)) for name in names},
+            "verdict": self.verdict.summary(),
+            "eigenvalues": [[float(value.real), float(value.imag)] for value in self.eigenvalues],
+            "bound": float(self.bound) if np.isfinite(self.bound) else None,
+            "confirmed": self.confirmed,
+        }
+
+
+class Explorer:
+    """A valve asked at one parameter point after another.
+
+    Parameters
+    ----------
+    session : Session
+
+    Attributes
+    ----------
+    base : Mu
+        Parameter point of the case.
+    ranges : dict of (float, float), SI
+        Parameters that can be moved, with the range that is offered.
+
+    Raises
+    ------
+    CaseError, SolveError
+        For a case without flow, or with a pump, whose pressure is no choice.
+
+    Examples
+    --------
+    >>> explorer = dbvfiv.load().explore()                                       # doctest: +SKIP
+    >>> explorer.predict(density=900).verdict.outcome                            # doctest: +SKIP
+    >>> explorer.confirm(density=900).verdict.sentence()                         # doctest: +SKIP
+    """
+
+    def __init__(self, session: Session):
+        check_scan(session.case)
+        if session.case.seeks_operating_point:
+            raise CaseError("The head follows from the pump here, so it cannot be chosen; leave out upstream.pump.")
+        self.model = session.model
+        self.case = self.model.case
+        self.walk = StabilityWalk(self.case, model=self.model)
+        self.base = Mu.of(self.case)
+        self.ranges = dict(self._offered())
+        self._space: tuple[FamilyReduction, ReducedFamily, list[Mu]] | None = None
+
+    def _offered(self) -> Iterator[tuple[str, tuple[float, float]]]:
+        damped = [name for name in ("loss_factor", "beta", "alpha") if not self.case.damping.lacks(name)]
+        for name in ("pressure", "density", *damped[:1], "pipe_length"):
+            own, (low, high) = self.base.get(name, 0.0), OFFERED.get(name, DAMPED)
+            if own > 0 and not (name == "pipe_length" and self.case.upstream.pieces):
+                above = self.model.flow.back if name == "pressure" else 0.0
+                yield name, (above + low * (own - above), min(above + high * (own - above), PARAMETERS[name].high))
+
+    def moves(self, name: str) -> bool:
+        """True where a parameter changes the steady state."""
+        return not is_surrounding(self.case, name)
+
+    def place(self, values: Mapping[str, float]) -> Mu:
+        """Parameter point with some values changed.
+
+        Raises
+        ------
+        CaseError
+            For a name or a value that cannot be asked.
+        """
+        for name, value in values.items():
+            if name not in self.ranges:
+                raise CaseError(f"{name!r} is given, which cannot be moved here; known are {', '.join(self.ranges)}.")
+            row = PARAMETERS[name]
+            if not (row.low < value <= row.high or (value == row.low and row.low_included)):
+                raise CaseError(f"{name} is given as {value:g}; it must lie from {row.low:g} to {row.high:g}.")
+        return self.base.at(**values)
+
+    def state(self, place: Mu) -> SteadyState:
+        """Steady state of a point, its flow in the fluid of the point.
+
+        Raises
+        ------
+        SolveError
+        """
+        found = self.walk.state(place)
+        if place.density == self.base.density or self.moves("density"):
+            return found
+        seen = copy.copy(self.model)
+        seen.case = self.case.replace({PARAMETERS["density"].key: place.density})
+        seen.flow = build_flow(seen.case, seen.mesh)
+        return redescribe(seen, found)
+
+    def predict(self, **values: float) -> Answer:
+        """Answer of the reduced operator; where the point has a steady state of its own, with the bound there.
+
+        Raises
+        ------
+        CaseError, SolveError
+        """
+        place = self.place(values)
+        state, family = self.state(place), self.walk.family(place)
+        if self._space is None or self._space[0].family is not family:
+            reduction = self.walk.built(place).solver.reduction(family)
+            banded = family.relaxation(place) is None and np.isfinite(family.reach(place).band)
+            first = reduction.wide if banded else reduction.coarse
+            self._space = reduction, reduction.fine(first, [place], TAKEN), self._corners(place)
+            return self.bounded(**values)
+        return self._predicted(place, state, np.nan)
+
+    def bounded(self, **values: float) -> Answer:
+        """Prediction with its bound, on a reduced operator that is enriched where this is too large. Where the
+        constants of a rubber are unstable the verdict says so.
+
+        Raises
+        ------
+        CaseError, SolveError
+        """
+        place = self.place(values)
+        state, refusal = self.state(place), self.walk.refusal(place)
+        if refusal:
+            return Answer(place, state, Verdict.not_valid(refusal))
+        if self._space is None or self._space[0].family is not self.walk.family(place):
+            return self.predict(**values)
+        return self._predicted(place, state, self._enriched(place))
+
+    def prepare(self) -> bool:
+        """Enrich the reduced operator at one more corner of the ranges; False where nothing is left to do."""
+        if self._space is None or not self._space[2]:
+            return False
+        place = self._space[2].pop()
+        if not self.walk.refusal(place):
+            self._enriched(place)
+        return True
+
+    def confirm(self, **values: float) -> Answer:
+        """Answer of the full operator with its independent count, as `dbvfiv modes` gives it.
+
+        Raises
+        ------
+        CaseError, SolveError
+        """
+        place = self.place(values)
+        state, refusal = self.state(place), self.walk.refusal(place)
+        if refusal:
+            return Answer(place, state, Verdict.not_valid(refusal), confirmed=True)
+        spectrum = self.walk.spectrum(place, self.case.modes.count)
+        found = self.walk.sample(place, self.walk.column([place], spectra=[spectrum]))
+        counts, region = (found.unstable, found.counted, found.certain), {"line": found.line, "band": found.band}
+        values = np.asarray(spectrum.eigenvalues)
+        return Answer(place, state, Verdict.of(values, *counts, **region), values, 0.0, True)
+
+    def with_margin(self, answer: Answer) -> Answer:
+        """A confirmed answer with the factor on the damping at which flutter begins or ends.
+
+        Raises
+        ------
+        SolveError
+        """
+        factor = critical_damping_factor(self.walk, answer.place, answer.verdict)
+        return replace(answer, verdict=replace(answer.verdict, critical_damping_factor=factor))
+
+    def _corners(self, place: Mu) -> list[Mu]:
+        """Corners of the ranges that share the steady state of a point."""
+        free = [name for name in self.ranges if not self.moves(name)]
+        return [place.at(**dict(zip(free, ends))) for ends in product(*(self.ranges[name] for name in free))]
+
+    def _enriched(self, place: Mu) -> float:
+        """Bound at a point, once the reduced operator was enriched there as far as it takes."""
+        reduction, space, corners = self._space
+        bound = _bound(reduction, space, place)
+        if bound > TOLERANCE:
+            space = reduction.deeper(space, [place], TAKEN)
+            self._space = reduction, space, corners
+            bound = _bound(reduction, space, place)
+        return bound
+
+    def _predicted(self, place: Mu, state: SteadyState, bound: float) -> Answer:
+        _, space, _ = self._space
+        values = np.asarray(space.leading(place))[: self.case.modes.count]
+        unstable = int(np.where(values.imag > 0, 2, 1)[values.real > 0].sum())
+        said = f"{unstable} unstable eigenvalues of the reduced operator; the full one has not confirmed them."
+        found = replace(Verdict.of(values, unstable, unstable, True, proven=False, statement=said), certain=False)
+        if values.size and abs(values[0].real) <= bound * abs(values[0]):
+            found = replace(found, outcome=UNDECIDED, reason=f"The leading mode is neutral within {bound:.1g}. {said}")
+        return Answer(place, state, found, values, bound)
+
+
+def _bound(reduction: FamilyReduction, space: ReducedFamily, place: Mu) -> float:
+    """Relative change of the two leading eigenvalues under a correction with the full matrices."""
+    pairs = space.pairs(place, 2)
+    if not pairs.values.size:
+        return 0.0
+    return float((np.abs(reduction.correction(pairs, place)) / np.maximum(np.abs(pairs.values), 1.0)).max())

@@ -1,0 +1,58 @@
+"""Answers at a parameter point: predicted within the bound, confirmed as `modes` has them."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import dbvfiv
+from dbvfiv.errors import CaseError
+
+COARSE = {"mesh.around": 6, "mesh.along": 8}
+
+
+@pytest.fixture(scope="module")
+def explorer():
+    return dbvfiv.load(None, COARSE | {"damping.model": "rayleigh", "damping.beta": 0.003}).explore()
+
+
+@pytest.mark.parametrize("asked", [{}, {"density": 640.0, "beta": 0.001}, {"pressure": 9806.65, "beta": 0.0008}])
+def test_predictions_are_what_is_confirmed(explorer, asked):
+    predicted, exact = explorer.bounded(**asked), explorer.confirm(**asked)
+    assert exact.confirmed and not predicted.confirmed and not predicted.verdict.certain
+    assert predicted.verdict.outcome == exact.verdict.outcome
+    error = abs(predicted.eigenvalues[0] - exact.eigenvalues[0]) / abs(exact.eigenvalues[0])
+    assert error <= max(10 * predicted.bound, 1e-7) and predicted.bound <= 1e-6
+
+
+def test_confirmed_answers_are_those_of_the_command(explorer):
+    valve = dbvfiv.load(None, COARSE | {"damping.model": "rayleigh", "damping.beta": 0.003})
+    modes = valve.modes("12 kPa", density=800.0, beta=0.001)
+    answer = explorer.with_margin(explorer.confirm(pressure=12e3, density=800.0, beta=0.001))
+    leading = complex(modes.modes[0].growth_rate, modes.modes[0].angular_frequency)
+    assert abs(answer.eigenvalues[0] - leading) < 1e-7 * abs(leading)
+    assert answer.state.mass_flow == pytest.approx(modes.state.mass_flow, rel=1e-9)
+    ours, theirs = answer.verdict.summary(), modes.verdict.summary()
+    assert ours["outcome"] == theirs["outcome"] and ours["certain"]
+    for name in ("growth_rate", "frequency", "damping_ratio", "critical_damping_factor"):
+        assert ours[name] == pytest.approx(theirs[name], rel=1e-6), name
+
+
+def test_corners_are_prepared(explorer):
+    explorer.predict()
+    steps = 0
+    while explorer.prepare():
+        steps += 1
+    assert steps in (0, 4)  # of density and damping; another test may have come before
+    free = {name: explorer.ranges[name] for name in ("density", "beta")}
+    for share in np.random.default_rng(3).uniform(size=(8, 2)):
+        asked = {name: low + s * (high - low) for s, (name, (low, high)) in zip(share, free.items())}
+        predicted, exact = explorer.predict(**asked), explorer.confirm(**asked)
+        assert predicted.eigenvalues[0] == pytest.approx(exact.eigenvalues[0], rel=1e-3)
+
+
+def test_what_cannot_be_asked_is_said(explorer):
+    with pytest.raises(CaseError, match="cannot be moved here"):
+        explorer.predict(thickness=1.0)
+    with pytest.raises(CaseError, match="pressure is given as -5"):
+        explorer.predict(pressure=-5.0)
