@@ -18,7 +18,7 @@ from .parameters import PARAMETERS
 from .part import Part, part_of
 from .physics import Gravity, Outside
 from .pipes import Downstream, Upstream
-from .project import Project, Report
+from .project import Life, Project, Report
 from .section import BrokenRule, Section, key
 from .units import Units, unit_of
 from .valve import Valve
@@ -62,6 +62,7 @@ class Case(Section):
     supports: physics.Supports = key(physics.Supports(), "What keeps the lips from crossing.")
     project: Project = key(Project(), "What a report is for, and the units in which results are read.")
     report: Report = key(Report(), "What a report covers.")
+    life: Life = key(Life(), "Crack and rubber by which `dbvfiv life` tells the life of the valve.")
 
     @model_validator(mode="before")
     @classmethod

@@ -1,14 +1,17 @@
-"""Sections project and report of the case file: what stands on the first page of a report, and the heads it covers."""
+"""Sections project, report and life of the case file: the first page of a report, the heads it covers, and the crack
+and the rubber by which the life of a valve is told.
+"""
 
 from __future__ import annotations
 
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
-from pydantic import AfterValidator, StrictStr, ValidationInfo, field_validator
+from pydantic import AfterValidator, BeforeValidator, StrictStr, ValidationInfo, field_validator, model_validator
 
 from .axis import parse_axis
 from .physics import LoadPressure
-from .section import Described, Section, key
+from .quantity import Length, Quantity
+from .section import BrokenRule, Described, Section, key
 from .units import read_units
 
 Text = Annotated[StrictStr, Described("text", "a text")]
@@ -54,3 +57,63 @@ class Report(Section):
         if isinstance(given, str) and ":" in given:
             return parse_axis(f"pressure={given}", density=(info.context or {}).get("density")).values
         return [given] if isinstance(given, (str, float, int)) else given
+
+
+_LENGTH, _TOUGHNESS, _NUMBER = Quantity("m", "mm"), Quantity("J/m^2", "J/m^2"), Quantity("")
+
+
+def _spread(quantity: Quantity, least: float, most: float, word: str) -> Any:
+    """Type of a key that is one value, or two between which the middle 80 % lies."""
+
+    def check(given: tuple[float, ...]) -> tuple[float, ...]:
+        if len(given) not in (1, 2):
+            raise ValueError("which is neither")
+        if not least <= min(given) <= max(given) <= most:
+            raise ValueError("which is out of range")
+        if given[0] > given[-1]:
+            raise ValueError("which descends")
+        return given
+
+    ends = f"{least:g} to {most:g} {quantity.si}".rstrip()
+    return Annotated[
+        tuple[Annotated[float, quantity], ...],
+        BeforeValidator(lambda given: given if isinstance(given, (list, tuple)) else [given]),
+        AfterValidator(check),
+        Described("value or pair", f"{word} from {ends}, or two in ascending order", quantity),
+    ]
+
+
+class Life(Section):
+    """Fatigue life: growth of a flaw in the rubbers to a crack (`dbvfiv life`)."""
+
+    crack: Length = key(2e-3, "Length of the crack at which the valve is to be replaced.", gt=0, le=1)
+    precursor: _spread(_LENGTH, 1e-7, 1e-2, "a length") = key(
+        (20e-6, 50e-6),
+        "Length of the flaws that every rubber has. Of this and the keys below one value, or two between which the "
+        "middle 80 % lies.",
+    )
+    rubber: Literal["auto", "NR", "SBR", "CR", "EPDM"] = key(
+        "auto",
+        "Rubber whose shipped constants of crack growth hold for all rubber layers; with auto each has those of its "
+        "name.",
+    )
+    rate: _spread(_LENGTH, 1e-13, 1e-2, "a length") | None = key(
+        None, "Growth a cycle at an energy release rate of 1 kJ/m2 from zero load; the shipped one where not given."
+    )
+    exponent: _spread(_NUMBER, 1.0, 20.0, "a number") | None = key(
+        None, "Exponent of the energy release rate in the growth a cycle; the shipped one where not given."
+    )
+    threshold: _spread(_TOUGHNESS, 1e-3, 1e5, "an energy per area") | None = key(
+        None, "Energy release rate below which no crack grows; the shipped one where not given."
+    )
+    crystallisation: _spread(_NUMBER, 0.0, 20.0, "a number") | None = key(
+        None,
+        "By how much a minimum load slows the growth in a rubber that crystallises when stretched: the exponent grows "
+        "as exp(this times minimum over maximum); 0 of others; the shipped one where not given.",
+    )
+
+    @model_validator(mode="after")
+    def _flaw_is_no_crack(self) -> Life:
+        if self.precursor[-1] >= self.crack:
+            raise BrokenRule("crack", f"{self.crack:g} m", f"it must exceed the precursor, {self.precursor[-1]:g} m")
+        return self

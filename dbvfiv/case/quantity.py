@@ -44,6 +44,7 @@ DIMENSION = {
     "kg/s": "mass flow",
     "deg": "angle",
     "Pa s": "viscosity",
+    "J/m^2": "energy per area",
     "": "plain number",
 }
 _A = {si: f"{'an' if name[0] in 'aeiou' else 'a'} {name}" for si, name in DIMENSION.items()}

@@ -29,6 +29,7 @@ _AFTER = (
     verdict.verdict,
     results.plot,
     results.compare,
+    results.life,
     results.export,
     results.cfd,
     results.info,

@@ -205,6 +205,50 @@ def compare(
     print("\n".join([*found.lines(), f"Wrote {path}."]))
 
 
+def life(
+    file: ResultFile,
+    value: Annotated[
+        float | None,
+        typer.Option("--at", metavar="VALUE", help="Of cycle: the cycle nearest to this value, SI; else the last."),
+    ] = None,
+    since: Annotated[
+        float | None,
+        typer.Option(
+            "--since", metavar="T", help="Of a run: from this time on, s; else its last whole cycles, or all."
+        ),
+    ] = None,
+    per_day: Annotated[
+        float | None,
+        typer.Option("--per-day", metavar="N", min=1e-6, help="How often it takes place in a day; else without pause."),
+    ] = None,
+    overrides: Override = None,
+    plots: PlotFolder = None,
+    as_json: AsJson = False,
+) -> None:
+    """Hours until a flaw in the rubber is a crack of life.crack under the motion of a result, and where: a limit cycle
+    of `cycle`, a run of `transient` (with transient.save_every), or the way through the states of `closure` or
+    `steady` and back, N times a day.
+
+    dbvfiv life cycle.h5 --plots figures
+
+    dbvfiv life closure.h5 --per-day 24 --set 'life.rubber="NR"'
+    """
+    from ..case.load import toml_value
+    from ..studies.life import Life, motion_of
+    from ..studies.session import load_result
+
+    result, changes = load_result(file), {}
+    for override in overrides or ():
+        name, _, given = (part.strip() for part in override.partition("="))
+        if not name.startswith("life."):
+            raise CaseError(f"--set goes with keys of [life] here; {name!r} belongs to the motion, which is computed.")
+        changes[name] = toml_value(given)
+    case = result.case.replace(changes)
+    found = Life(result, motion_of(result, value, since, per_day), case.life)
+    figures = save_figures(found.figures(), plots)
+    print_answer(found.document(), found.lines, as_json, (figures, plots))
+
+
 class Format(StrEnum):
     """Kinds of files."""
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -256,24 +256,26 @@ def layer_stress(state: Any) -> Figure:
     return figure
 
 
-def layer_panels(mesh, values: np.ndarray, label: str) -> tuple[Figure, list]:
+def layer_panels(mesh, values: np.ndarray, label: str, titles: Sequence[str] | None = None) -> tuple[Figure, list]:
     """A panel for each layer with its values (layers, elements) over the unrolled part, the largest written above.
 
     Parameters
     ----------
     mesh : the mesh of the result, with its layers
     label : of the colour bars
+    titles : of the panels, where they are not all layers
     """
+    titles = [f"{i}  {title}" for i, title in enumerate(mesh.layer_titles(), 1)] if titles is None else titles
     arc, z = unrolled(mesh)
     columns = min(3, len(values))
     rows = -(-len(values) // columns)
     figure = new_figure(3.2 * columns, 4.1 * rows + 0.4)
     panels = figure.subplots(rows, columns, sharex=True, sharey=True, squeeze=False).ravel()
-    for number, (axes, title, of_layer) in enumerate(zip(panels, mesh.layer_titles(), values)):
+    for number, (axes, title, of_layer) in enumerate(zip(panels, titles, values)):
         shape = (mesh.shape[1], mesh.shape[0])
         image = axes.pcolormesh(arc * 1e3, z * 1e3, of_layer.reshape(shape), cmap=MAGNITUDE, vmin=0.0, rasterized=True)
         colour_bar(figure, image, axes, label, pad=0.03)
-        axes.set_title(f"{number + 1}  {title}", loc="left", fontsize=10)
+        axes.set_title(title, loc="left", fontsize=10)
         axes.set_title(f"max {of_layer.max():.3g}", loc="right", fontsize=9)
         axes.grid(False)
         axes.tick_params(labelbottom=True, labelleft=True)

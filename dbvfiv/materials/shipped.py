@@ -25,18 +25,19 @@ _TABLES = {2: "two", 3: "three"}
 
 
 @cache
-def _data(name: str) -> dict:
+def read_toml(name: str) -> dict:
+    """Contents of a file NAME.toml beside this one."""
     return tomllib.loads(files("dbvfiv.materials").joinpath(f"{name}.toml").read_text("utf-8"))
 
 
 def rubber_names() -> tuple[str, ...]:
     """Names of the shipped rubbers."""
-    return tuple(sorted(_data("rubbers")["three"]))
+    return tuple(sorted(read_toml("rubbers")["three"]))
 
 
 def strain_levels() -> tuple[float, ...]:
     """Tested strain levels as fractions, ascending."""
-    return tuple(_data("rubbers")["strain_level"])
+    return tuple(read_toml("rubbers")["strain_level"])
 
 
 def rubber(name: str, strain_level: float = 0.10, *, density: float | None = None) -> SofteningRubber:
@@ -62,7 +63,7 @@ def rubber(name: str, strain_level: float = 0.10, *, density: float | None = Non
     1307000.0
     """
     mu_inf, mu_0, knee, c, c_3 = _at_level("stable", name, strain_level, ("mu_inf", "mu_0", "x_0", "c", "c_3"))
-    return SofteningRubber(mu_inf, mu_0, knee, c, _data("rubbers")["density"] if density is None else density, c_3)
+    return SofteningRubber(mu_inf, mu_0, knee, c, read_toml("rubbers")["density"] if density is None else density, c_3)
 
 
 def published_rubber(
@@ -88,12 +89,12 @@ def published_rubber(
     if terms not in _TABLES:
         raise MaterialError(f"A published rubber has 2 or 3 constants, but terms = {terms!r} was given.")
     constants = _at_level(_TABLES[terms], name, strain_level, ("c10", "c01", "c11"))
-    return MooneyRivlin(*constants, _data("rubbers")["density"] if density is None else density)
+    return MooneyRivlin(*constants, read_toml("rubbers")["density"] if density is None else density)
 
 
 def _at_level(table: str, name: str, strain_level: float, constants: tuple[str, ...]) -> list[float]:
     """Constants of a rubber in a table of the shipped ones, interpolated."""
-    data = _data("rubbers")
+    data = read_toml("rubbers")
     if name not in data[table]:
         raise MaterialError(f"The shipped rubbers are {', '.join(rubber_names())}, but {name!r} was given.")
     require_finite(f"Rubber {name}", strain_level=strain_level)
@@ -125,12 +126,12 @@ class ShippedLoss:
 
 def shipped_loss_names() -> tuple[str, ...]:
     """Names of the materials whose loss factors come with the program."""
-    return tuple(name for name, entry in _data("loss_factors").items() if isinstance(entry, dict))
+    return tuple(name for name, entry in read_toml("loss_factors").items() if isinstance(entry, dict))
 
 
 def shipped_loss(name: str) -> ShippedLoss:
     """Loss factor that comes with the program, with its spread; raises `MaterialError` for an unknown name."""
     if name not in shipped_loss_names():
         raise MaterialError(f"Loss factors are shipped for {', '.join(shipped_loss_names())}, but {name!r} was given.")
-    entry = _data("loss_factors")[name]
-    return ShippedLoss(entry["value"], tuple(entry["range"]), entry["note"], _data("loss_factors")["source"])
+    entry = read_toml("loss_factors")[name]
+    return ShippedLoss(entry["value"], tuple(entry["range"]), entry["note"], read_toml("loss_factors")["source"])

@@ -45,7 +45,7 @@ def layer_fields(shell: Shell, q: np.ndarray) -> LayerFields:
     stress = np.empty_like(strain)
     for kind in np.unique(section.kinds):
         chosen = np.flatnonzero(section.kinds == kind)
-        stress[:, :, chosen] = _stress(int(kind), section.parameters[chosen], strain[:, :, chosen])
+        stress[:, :, chosen] = stress_at(int(kind), section.parameters[chosen], strain[:, :, chosen])
     von_mises = von_mises_stress(strain, stress, section.kinds == MOONEY_RIVLIN)
     count, layers, points = len(strain), len(section.layers), section.points_per_layer
 
@@ -64,10 +64,46 @@ def layer_fields(shell: Shell, q: np.ndarray) -> LayerFields:
     )
 
 
-def _stress(kind: int, parameters: np.ndarray, strain: np.ndarray) -> np.ndarray:
-    flat = np.moveaxis(strain, 2, 0).reshape(len(parameters), -1, 5)
-    stress = _stresses(kind, jnp.asarray(parameters), jnp.asarray(flat))
-    return np.moveaxis(np.asarray(stress).reshape(len(parameters), *strain.shape[:2], 5), 0, 2)
+def stress_at(kind: int, parameters: np.ndarray, strain: np.ndarray) -> np.ndarray:
+    """Second Piola-Kirchhoff stresses (..., np, 5), Pa, of strains at points with one kind of law, whose parameters are
+    (np, k).
+    """
+    flat = np.moveaxis(strain, -2, 0)
+    stress = _stresses(kind, jnp.asarray(parameters), jnp.asarray(flat.reshape(len(parameters), -1, 5)))
+    return np.moveaxis(np.asarray(stress).reshape(flat.shape), 0, -2)
+
+
+def face_strains(shell: Shell, q: np.ndarray) -> np.ndarray:
+    """Strains (ne, nl, 2, 5) at the inner and the outer face of each layer, in its axes, means over the element.
+
+    Strains are linear through the wall (of the shifted metric nearly so); a layer of one point has it on both faces.
+    """
+    count = shell.section.points_per_layer
+    strain = shell.strains(q).mean(axis=1)
+    strain = strain.reshape(len(strain), -1, count, 5)
+    middle, half = 0.5 * (strain[:, :, 0] + strain[:, :, -1]), 0.5 * (strain[:, :, -1] - strain[:, :, 0])
+    if count > 1:
+        half = half / np.polynomial.legendre.leggauss(count)[0][-1]
+    return np.stack([middle - half, middle + half], axis=2)
+
+
+def interlaminar_shear(shell: Shell, q: np.ndarray) -> np.ndarray:
+    """Shear stress (ne, nl - 1), Pa, at the joints between layers, inside to outside: that of a parabola through the
+    wall with the shear force of the element.
+    """
+    section, points = shell.section, shell.at_rest.points
+    (cosine, sine), scale = section.directions.T, section.shear_scale
+    strain = shell.strains(q).mean(axis=1)
+    strain[..., 3:] *= scale[:, None]
+    shear = np.empty((len(strain), len(section.kinds), 2))
+    for kind in np.unique(section.kinds):
+        chosen = np.flatnonzero(section.kinds == kind)
+        shear[:, chosen] = stress_at(int(kind), section.parameters[chosen], strain[:, chosen])[..., 3:]
+    axes = np.stack([cosine * shear[..., 0] - sine * shear[..., 1], sine * shear[..., 0] + cosine * shear[..., 1]])
+    mean = np.hypot(*(points[..., 1] * scale * axes).sum(axis=-1))
+    shares = points[..., 1].reshape(*points.shape[:-2], -1, section.points_per_layer).sum(axis=-1)
+    joints = np.cumsum(shares, axis=-1)[..., :-1] - 0.5
+    return 1.5 * mean[:, None] * (1.0 - 4.0 * joints**2)
 
 
 def _stresses(kind, parameters, strain):

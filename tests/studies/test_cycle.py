@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -12,6 +14,7 @@ from dbvfiv.motion.scheme import scheme
 from dbvfiv.motion.state import consistent_state
 from dbvfiv.motion.stepper import Stepper
 from dbvfiv.studies.case import thesis_case
+from dbvfiv.studies.life import Life, motion_of
 from dbvfiv.studies.session import Session, load_result, resume_result
 from tests.observers import Stop
 
@@ -37,6 +40,17 @@ def file(tmp_path_factory):
 @pytest.fixture(scope="module")
 def found(file):
     return session_of().perform("cycle", file)
+
+
+def test_life_of_a_cycle(found):
+    """A block is a period; flaws are driven harder by larger cycles; twice the instants give the same energies."""
+    large, small = (Life(found, motion_of(found, point.value)) for point in (found.points[-1], found.points[0]))
+    assert np.isclose(large.motion.hours * 3600 * found.points[-1].frequency, 1.0)
+    assert all(a.release > 1.05 * b.release > 0 for a, b in zip(large.parts[:3], small.parts))
+    orbit = found.points[-1].orbit
+    states = orbit.motion.at(np.pi * np.arange(128) / 64)[:, : orbit.model.size]
+    finer = Life(found, replace(large.motion, states=states))
+    assert np.allclose([part.release for part in finer.parts], [part.release for part in large.parts], rtol=1e-3)
 
 
 def lip_after(point, steps: int) -> float:
