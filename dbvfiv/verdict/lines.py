@@ -26,6 +26,8 @@ PEAK = 7.0
 _MOST, _SMALLEST, LEVEL = 12, 0.01, 5
 #: Resolutions within which lines are fitted together.
 _NEAR = 10.0
+#: Rounds of a fit to clipped samples at most, and relative change of its amplitudes at which it ends.
+_HIDDEN, _SETTLED = 60, 1e-6
 #: Multiples of the mains looked for, and how far off, Hz, the mains may be.
 _MULTIPLES, _OFF = 8, 0.2
 
@@ -265,7 +267,10 @@ def fit(
         matrix, found, left, square = trial
         if rails is not None:
             wanted, weight = _beyond(values, wanted - left, left, rails)
+            before = found
             matrix, found, left, square = project(place)
+            if np.abs(found - before).max() <= _SETTLED * np.abs(found).max():
+                break
         elif gain <= 1e-3 * square / len(x):  # of the likelihood, hardly anything
             break
     left = weight * left
@@ -290,7 +295,13 @@ def _beyond(
     beyond makes of them, for normal noise about the model.
     """
     low, high = values <= rails[0], values >= rails[1]
-    spread = max(float(left[~(low | high)].std()), 1e-9 * float(np.ptp(values)))
+    beyond = np.concatenate([model[low] - rails[0], rails[1] - model[high]])
+    seen = float(np.sum(left[~(low | high)] ** 2))
+    spread = max(np.sqrt(seen / max(np.count_nonzero(~(low | high)), 1)), 1e-9 * float(np.ptp(values)))
+    for _ in range(8):  # expectation and maximisation for the noise, of which the rails hide the largest
+        away = beyond / spread
+        hidden = len(away) + away @ np.exp(norm.logpdf(away) - norm.logsf(away))
+        spread = max(np.sqrt((seen + spread**2 * hidden) / len(values)), 1e-9 * float(np.ptp(values)))
     wanted, weight = values.copy(), np.ones(len(values))
     for chosen, rail, sign in ((low, rails[0], -1.0), (high, rails[1], 1.0)):
         away = sign * (rail - model[chosen]) / spread
@@ -325,7 +336,8 @@ def _with_errors(series, lines, place, whole, weight, found, left, free, level) 
         bin, wide = int(round(abs(turns))), 16 + int(abs(growth))
         near = slice(max(1, bin - wide), bin + wide + 1)
         local = max(float(power[near].mean()) if power[near].size else 0.0, float(floor[min(bin, len(floor) - 1)]))
-        variance = local / (2.0 * series.step)
+        # samples beyond the rails have weights below 1, and so has what they leave
+        variance = local / (2.0 * series.step * weight.mean())
         amplitude = float(np.hypot(a, b))
         toward = np.array([a, b]) / amplitude if amplitude else np.zeros(2)
         own = toward @ inverse[at : at + 2, at : at + 2] @ toward
@@ -370,6 +382,19 @@ def envelope(series: Series, frequency: float, width: float) -> np.ndarray:
     return 2.0 * np.abs(wave)
 
 
+def outbursts(values: np.ndarray, step: float, frequency: float) -> int:
+    """Number of times that an oscillation of a frequency, Hz, rises from below the noise to well above it."""
+    series, width = Series(0.0, step, values), 4.0 / frequency
+    _, floor = density(values, step)
+    at = min(int(round(frequency * len(values) * step)), len(floor) - 1)
+    power = envelope(series, frequency, width) ** 2
+    # mean square of the amplitude that noise has over a triangle of this width, by its spectrum or where it is quiet
+    quiet = float(np.quantile(power, 0.2)) / -np.log(0.8)
+    chance = min(4.0 / 3.0 * floor[at] / width, quiet) * (np.log(max(len(values) * step / width, 1.0)) + PEAK)
+    low, high = np.flatnonzero(power < chance), np.flatnonzero(power > 4.0 * chance)
+    return len(np.unique(np.searchsorted(low, high)))
+
+
 def wave(line: Line, series: Series) -> np.ndarray:
     """(k,) values of a line of constant amplitude at the samples of a series."""
     t = series.times() - line.start
@@ -404,7 +429,7 @@ def constant_lines(
         own = Series(series.start, series.step, fitted.left + sum(wave(line, series) for line in near))
         own = fit(own, [Line(frequency), *near], 0, rounds=6)
         lines = (*far, *own.lines)
-        fitted = fit(series, lines, level, rails=rails, rounds=12 if rails else 2)
+        fitted = fit(series, lines, level, rails=rails, rounds=_HIDDEN if rails else 2)
         lines = fitted.lines
         places = np.sort([line.frequency for line in lines]) * series.duration
         if (np.diff(places) < 1.5).any() or (places[2:] - places[:-2] < 4.0).any():

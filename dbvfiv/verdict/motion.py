@@ -9,7 +9,20 @@ from typing import Any
 import numpy as np
 
 from .judge import FILLED, JudgeOptions, Verdict, judge
-from .lines import LEVEL, Fit, Line, constant_lines, density, envelope, fit, mains_lines, ring, strongest, wave
+from .lines import (
+    LEVEL,
+    Fit,
+    Line,
+    constant_lines,
+    density,
+    envelope,
+    fit,
+    mains_lines,
+    outbursts,
+    ring,
+    strongest,
+    wave,
+)
 from .series import Series, check_samples, harmonics, longest_part
 
 #: Share of the energy of a ring-down that may be left about its frequency, as its damping depends on the amplitude.
@@ -42,6 +55,8 @@ class Motion:
         Root mean square of the noise.
     left : float
         Share of the power that neither lines nor level hold.
+    returns : bool
+        True where oscillations die and come back.
     """
 
     name: str
@@ -52,10 +67,14 @@ class Motion:
     noise: float = np.nan
     left: float = np.nan
     notes: tuple[str, ...] = field(default=())
+    returns: bool = False
 
 
 #: Cycles a sample beyond which an oscillation is none.
 _FASTEST = 0.4
+#: Least number of different values of a record that may be clipped; share of samples at a rail over that beside it,
+#: which is 2.4 at the crest of a sine that a converter has made steps of.
+_LEVELS, _CROWDED = 200, 4
 #: Frequencies of the mains, Hz.
 MAINS = (50.0, 60.0)
 #: Samples without which no line is sought, and motions that are one.
@@ -88,6 +107,8 @@ def judge_record(
     series = Series.of(time[part], values[part])
     found = find_motion(series, detrend, MAINS)
     if found.name not in _LINES:
+        if found.returns:
+            return replace(level, name="irregular", decided=True, reason=found.reason)
         if found.name == "steady" and level.name != "steady":
             words = "Nothing stands out of its noise."
             return replace(level, name="steady", decided=True, reason=words, noise=found.noise, cycles=0, period=np.nan)
@@ -170,26 +191,36 @@ def find_motion(series: Series, detrend: bool = True, mains: Sequence[float] = (
         freed = Series(series.start, series.step, series.values - sum(wave(line, series) for line in hum))
         for found, cell in sought:
             rung = _ringing(freed, found, cell, level)
-            if rung is not None:
+            if rung is not None and not _rang_before(freed, rung):
                 return replace(rung, lines=rung.lines + hum)
     fitted, whole = constant_lines(series, picked, level, rails)
-    found = _named(fitted, whole, series)
-    return found
+    named = _named(fitted, whole, series)
+    if named.name not in _LINES and any(f > 0 and outbursts(base.left, series.step, f) > 1 for f, _ in sought):
+        return replace(named, name="irregular", reason="Oscillations die and come back.", returns=True)
+    return named
 
 
 def clipped(values: np.ndarray) -> tuple[float, float] | None:
-    """Rails at which a record is clipped; None where it is not: more than a hundredth of it, and four in a row, at an
-    extreme value.
+    """Rails at which a record is clipped; None where it is not: more than a hundredth of it at an extreme value, and
+    many times what is at the value next to that, which tells rails from steps of a converter.
     """
-    low, high = float(values.min()), float(values.max())
-    hits = []
-    for rail in (low, high):
-        at = values == rail
-        runs = np.convolve(at, np.ones(3), "valid").max() if len(values) > 3 else 0
-        hits.append(at.mean() > 0.01 and runs >= 3 and len(np.unique(values[:2000])) > 200)
+    levels, counts = np.unique(values, return_counts=True)
+    if len(levels) < _LEVELS:
+        return None
+    low, high = float(levels[0]), float(levels[-1])
+    hits = [
+        rail > 0.01 * len(values) and rail > _CROWDED * beside
+        for rail, beside in ((counts[0], counts[1]), (counts[-1], counts[-2]))
+    ]
     if not any(hits):
         return None
     return (low if hits[0] else -np.inf, high if hits[1] else np.inf)
+
+
+def _rang_before(series: Series, rung: Motion) -> bool:
+    """True where what rings had died and come back more than once before."""
+    early = np.diff(series.values[: int((rung.start - series.start) / series.step)])  # without the level
+    return len(early) >= _FEWEST and outbursts(early, series.step, rung.lines[0].frequency) > 1
 
 
 def _ringing(series: Series, frequency: float, cell: tuple[int, int], level: int) -> Motion | None:

@@ -88,3 +88,23 @@ def test_dates_and_numbered_samples_are_read(command_line, tmp_path):
     asked = command_line("verdict", tmp_path / "numbered.csv")
     assert asked.status == 2 and "give their rate with --rate" in asked.err
     assert "5 +- " in command_line("verdict", tmp_path / "numbered.csv", "-c", "p", "--rate", "100").out
+
+
+@pytest.mark.parametrize("strength", [0.02, 0.15])
+def test_bursts_are_irregular_and_no_noise(strength):
+    time = np.arange(0.0, 6.0, 2e-3)
+    values = strength * np.random.default_rng(3).standard_normal(len(time))
+    for begin in (0.4, 1.9, 2.6, 4.1):
+        after = np.maximum(time - begin, 0.0)
+        values += np.exp(-6.0 * after) * np.sin(2 * np.pi * 25 * after)
+    found = judge_record(time, values)
+    assert found.name == "irregular" and "come back" in found.reason
+    assert judge_record(time[:200], values[:200]).name in ("steady", "irregular")  # before the first of them
+
+
+@pytest.mark.parametrize("rail", [0.6, 0.9])
+def test_a_clipped_line_has_the_amplitude_it_had_before(rail):
+    time = np.arange(0.0, 4.0, 1e-3)
+    values = np.sin(2 * np.pi * 113.3 * time) + 0.05 * np.random.default_rng(6).standard_normal(len(time))
+    (line,) = judge_record(time, np.clip(values, -rail, rail)).lines
+    assert abs(line["amplitude"] - 1) < 1.5 * line["amplitude_interval"] < 0.02
