@@ -10,8 +10,11 @@ from typing import Any
 
 from nicegui import ui
 
+from ..case.parameters import PARAMETERS
 from ..errors import CaseError
 
+#: Colour bar below a figure, so that a narrow page keeps its width.
+COLOUR_BAR = {"orientation": "h", "y": -0.05, "yanchor": "top", "thickness": 12}
 #: Steps of a slider.
 STEPS = 400
 #: Numbers that an answer shows: title, entry of the state, factor and unit.
@@ -34,14 +37,14 @@ class AskPanel:
     ----------
     values : dict
         Values of the sliders, SI.
-    seconds : list of float
-        Time from each move to its answer.
+    answers : int
+        Number of predictions that were shown.
     """
 
     def __init__(self, page: Any):
         self.page = page
         self.values: dict[str, float] = {}
-        self.seconds: list[float] = []
+        self.answers = 0
         self._file: Path | None = None
         self._rows: dict[str, dict] = {}
         self._boxes: dict[str, tuple[ui.slider, ui.number]] = {}
@@ -59,6 +62,7 @@ class AskPanel:
             with ui.column() as self._card:
                 self._verdict = ui.label("").style("font-size: 1.2rem").props('data-at="verdict"')
                 self._mark = ui.label("").classes("note").props('data-at="mark"')
+                self._reason = ui.label("").classes("note")
                 with ui.element("div").classes("numbers"):
                     self._numbers = {name: self._number(title) for title, name, *_ in NUMBERS}
                     self._margin = self._number("Least damping ratio")
@@ -70,7 +74,9 @@ class AskPanel:
                     ],
                     rows=[],
                 ).classes("full")
-                ui.button("Show the shape", on_click=self._shape).props("flat")
+                with ui.row():
+                    ui.button("Show the shape", on_click=self._shape).props("flat")
+                    ui.button("Animate the leading mode", on_click=self._animate).props("flat")
                 self._scene = ui.column().classes("full")
 
     @staticmethod
@@ -102,6 +108,12 @@ class AskPanel:
                 self.values[name] = min(max(value, row["low"]), row["high"])
                 slider.value = self.values[name] / row["scale"]
 
+    def shown(self, name: str) -> dict[str, Any]:
+        """Scale, label and own value of a parameter as the sliders show it."""
+        row = PARAMETERS[name]
+        own = self._rows.get(name, {"scale": row.scale, "title": row.title, "unit": row.shown_unit, "own": None})
+        return own | {"label": f"{own['title']}, {own['unit']}".rstrip(", ")}
+
     async def _follow(self, file: Path, values: dict[str, float]) -> None:
         """Answer moves of the sliders, the last one always, until another valve is opened."""
         predictor, confirmer = self.page.site.workers.of(file)
@@ -130,8 +142,10 @@ class AskPanel:
         """Predict, give the bound, and confirm, as far as no slider moves meanwhile."""
         since = self._since
         self._show(await predictor.about(file, "predict", values=values))
-        self.seconds = [*self.seconds[-999:], time.monotonic() - since]
-        self._status.text = f"answered in {self.seconds[-1]:.2f} s"
+        seconds = time.monotonic() - since
+        self.answers += 1
+        self._status.text = f"answered in {seconds:.2f} s"
+        self._status.props(f"data-answers={self.answers} data-seconds={seconds:.4f}")
         if self._moved.is_set():
             return
         self._show(await predictor.about(file, "bounded", values=values))
@@ -161,7 +175,7 @@ class AskPanel:
                 scale, step = row["scale"], (row["high"] - row["low"]) / row["scale"] / STEPS
                 low, high, own = row["low"] / scale, row["high"] / scale, row["own"] / scale
                 moves = ", moves the state" if row["moves"] else ""
-                ui.label(f"{row['title']}, {row['unit']}{moves}".rstrip(", ")).classes("note")
+                ui.label(f"{self.shown(name)['label']}{moves}").classes("note")
                 with ui.row().classes("full").style("flex-wrap: nowrap; align-items: center"):
                     slider = ui.slider(min=low, max=high, step=step, value=own).props(f'data-at="slide {name}"')
                     box = (
@@ -198,7 +212,7 @@ class AskPanel:
         self._verdict.text = verdict["outcome"].capitalize()
         bound = "" if found["bound"] is None else f", within {max(found['bound'], 1e-9):.0e} of an eigenvalue"
         self._mark.text = "confirmed by the full model" if found["confirmed"] else f"predicted{bound}"
-        self._mark.tooltip(verdict["reason"]) if not found["confirmed"] and not self._mark.text else None
+        self._reason.text = verdict["reason"]
         self._card.classes(
             add="confirmed" if found["confirmed"] else "predicted",
             remove="predicted" if found["confirmed"] else "confirmed",
@@ -208,23 +222,48 @@ class AskPanel:
             for real, imaginary in found["eigenvalues"][:5]
         ]
 
-    async def _shape(self) -> None:
-        """Draw the valve in space at the values of the sliders, coloured by its displacement."""
-        if self._file is None:
-            return
+    async def _asked(self, number: int, do: str) -> Any:
+        """Answer of one of the two workers at the values of the sliders; None where there is none, which is told."""
+        if self._file is None or not self.values:
+            return None
         try:
-            found = await self.page.site.workers.of(self._file)[0].about(self._file, "shape", values=self.values)
+            return await self.page.site.workers.of(self._file)[number].about(self._file, do, values=self.values)
         except CaseError as error:
             self.page.tell(str(error))
-            return
-        (x, y, z), (i, j, k) = zip(*found["points"]), zip(*found["triangles"])
-        mesh = {"type": "mesh3d", "x": z, "y": x, "z": y, "i": i, "j": j, "k": k, "colorscale": "Cividis"}
-        mesh |= {"intensity": [1e3 * value for value in found["moved"]], "flatshading": True}
-        layout = {"margin": {"l": 0, "r": 0, "t": 0, "b": 0}, "scene": {"aspectmode": "data"}, "height": 420}
+
+    async def _shape(self) -> None:
+        """Draw the valve in space at the values of the sliders, coloured by displacement or the strain of a layer."""
+        if (found := await self._asked(0, "shape")) is not None:
+            self._scene.clear()
+            with self._scene:
+                names = [*found["colours"]]
+                choice = ui.select(names, value=names[0], label="Colour").style("min-width: 240px")
+                plot = ui.plotly(_space(found, names[0])).classes("full")
+                choice.on_value_change(lambda event: plot.update_figure(_space(found, event.value)))
+
+    async def _animate(self) -> None:
+        """Show one cycle of the leading mode that oscillates."""
         self._scene.clear()
         with self._scene:
-            colours = {"colorbar": {"title": {"text": "Displacement, mm"}}}
-            ui.plotly({"data": [mesh | colours], "layout": layout}).classes("full")
+            waiting = ui.label("The modes are being computed.").classes("note")
+        shape, found = await self._asked(0, "shape"), await self._asked(1, "motion")
+        if shape is None or found is None:
+            waiting.text = ""
+            return
+        figure = _space(shape, next(iter(shape["colours"])))
+        frames = []
+        for points in found["frames"]:
+            x, y, z = zip(*points)
+            frames.append({"data": [{"type": "mesh3d", "x": z, "y": x, "z": y}]})
+        play = {"frame": {"duration": 80}, "transition": {"duration": 0}, "fromcurrent": True}
+        buttons = [{"label": "Play", "method": "animate", "args": [None, play]}]
+        buttons.append({"label": "Stop", "method": "animate", "args": [[None], {"mode": "immediate"}]})
+        place = {"direction": "left", "x": 0, "xanchor": "left", "y": 1, "yanchor": "top"}
+        figure["layout"]["updatemenus"] = [{"type": "buttons", "buttons": buttons} | place]
+        figure["frames"] = [{"name": str(i), **frame} for i, frame in enumerate(frames * 6)]
+        waiting.text = found["text"]
+        with self._scene:
+            ui.plotly(figure).classes("full")
 
     def close(self) -> None:
         """Stop following."""
@@ -232,6 +271,21 @@ class AskPanel:
             if task is not None:
                 with contextlib.suppress(Exception):
                     task.cancel()
+
+
+def _space(found: dict[str, Any], colour: str) -> dict[str, Any]:
+    """Figure of the skin in space."""
+    (x, y, z), (i, j, k) = zip(*found["points"]), zip(*found["triangles"])
+    mesh = {"type": "mesh3d", "x": z, "y": x, "z": y, "i": i, "j": j, "k": k, "colorscale": "Cividis"}
+    mesh |= {"intensity": found["colours"][colour], "flatshading": True, "colorbar": COLOUR_BAR | {"title": colour}}
+    camera = {"eye": {"x": -1.8, "y": -1.9, "z": 1.1}}
+    scene = {"aspectmode": "data", "camera": camera, **{f"{a}axis": {"title": {"text": f"{n}, m"}} for a, n in _AXES}}
+    layout = {"margin": {"l": 0, "r": 0, "t": 30, "b": 80}, "height": 480, "scene": scene}
+    return {"data": [mesh], "layout": layout, "config": {"responsive": False, "displaylogo": False}}
+
+
+#: Axes of the figure and of the valve.
+_AXES = (("x", "z"), ("y", "x"), ("z", "y"))
 
 
 def _short(value: float) -> str:

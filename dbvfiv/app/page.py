@@ -35,7 +35,7 @@ body { font-family: 'DejaVu Sans', Arial, sans-serif; background: #f6f7f9 }
 .numbers { display: grid; grid-template-columns: repeat(auto-fill, minmax(130px, 1fr)); gap: 8px; width: 100% }
 .number { background: white; border-radius: 6px; padding: 8px 10px } .number b { font-size: 1.25rem; display: block }
 .text { white-space: pre; overflow-x: auto; font: 12px 'DejaVu Sans Mono', monospace; max-width: 100%; width: 100% }
-.predicted { border-left: 4px solid #d98200 } .confirmed { border-left: 4px solid #2e7d32 }
+.predicted, .confirmed { border-left: 4px solid #d98200; padding-left: 10px } .confirmed { border-color: #2e7d32 }
 .q-tab-panel { padding: 12px } .nicegui-content { padding: 0 }
 """
 
@@ -89,7 +89,14 @@ class Page:
             with ui.tab_panel("Run"):
                 self.running.build()
         panels.on_value_change(lambda event: self.shown(event.value))
+        ui.context.client.on_delete(self._leave)
         await self._begin()
+
+    def _leave(self) -> None:
+        """Stop what goes on for a tab that was closed."""
+        self.asking.close()
+        if self._drawing is not None:
+            self._drawing.cancel()
 
     async def _begin(self) -> None:
         left = self.home / "valve.toml"
@@ -259,19 +266,8 @@ class Page:
 
     @ui.refreshable_method
     def _parts(self) -> None:
-        layers = self.data.get("layers")
-        rows = layers if isinstance(layers, list) else [layer.model_dump(mode="json") for layer in _DEFAULT.layers]
-        with ui.expansion("Layers, inside to outside").classes("full"):
-            for number, row in enumerate(rows):
-                with ui.row().style("align-items: center; gap: 8px"):
-                    for name in ("material", "thickness", "angle"):
-                        value = row.get(name, "") if isinstance(row, dict) else ""
-                        box = ui.input(name, value=str(value)).props("dense").style("width: 100px")
-                        box.on_value_change(
-                            lambda event, at=f"layers.{number}.{name}": self.typed(at, event.value or "")
-                        )
-                    ui.button(icon="remove", on_click=lambda _, n=number: self._layers(rows, n)).props("flat dense")
-            ui.button("Add a layer", on_click=lambda: self._layers(rows, None)).props("flat")
+        self._rows("Layers, inside to outside", "layers", ("material", "thickness", "angle"))
+        self._rows("Wall along the valve, from the lip", "valve.wall_map", ("to", "thickness"))
         with ui.expansion("Rubbers").classes("full"):
             own = self.data.get("materials", {})
             cards = (
@@ -291,11 +287,31 @@ class Page:
     def _data_files(self) -> list[str]:
         return sorted(path.name for path in self.home.glob("*.csv"))
 
-    def _layers(self, rows: list, removed: int | None) -> None:
-        kept = [row for number, row in enumerate(rows) if number != removed]
-        self.data["layers"] = kept if removed is not None else [*kept, dict(kept[-1]) if kept else {}]
-        self._parts.refresh()
-        self.changed()
+    def _rows(self, heading: str, key: str, names: tuple[str, ...]) -> None:
+        """Table of a list of the case, with its default where it is not given."""
+        table, _, last = key.rpartition(".")
+        holder = self.data if not table else self.data.get(table, {})
+        rows = holder.get(last) if isinstance(holder, dict) else None
+        if not isinstance(rows, list):
+            default = getattr(getattr(_DEFAULT, table), last) if table else getattr(_DEFAULT, last)
+            rows = [row.model_dump(mode="json") for row in default]
+
+        def resize(removed: int | None) -> None:
+            kept = [row for number, row in enumerate(rows) if number != removed]
+            kept += [dict(kept[-1])] if removed is None and kept else []
+            (self.data.setdefault(table, {}) if table else self.data)[last] = kept
+            self._parts.refresh()
+            self.changed()
+
+        with ui.expansion(heading).classes("full"):
+            for number, row in enumerate(rows):
+                with ui.row().style("align-items: center; gap: 8px"):
+                    for name in names:
+                        value, at = row.get(name, "") if isinstance(row, dict) else "", f"{key}.{number}.{name}"
+                        box = ui.input(name, value=str(value)).props(f'dense data-at="{at}"').style("width: 100px")
+                        box.on_value_change(lambda event, at=at: self.typed(at, event.value or ""))
+                    ui.button(icon="remove", on_click=lambda _, n=number: resize(n)).props("flat dense")
+            ui.button("Add a row", on_click=lambda: resize(None)).props("flat")
 
     def _add_rubber(self, name: str, shore: str, test: str | None, loss: str) -> None:
         if not re.fullmatch(r"[A-Za-z][\w-]{0,30}", name or ""):

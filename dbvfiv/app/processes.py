@@ -14,6 +14,7 @@ import signal
 import sys
 import time
 from collections import OrderedDict
+from collections.abc import Coroutine
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -26,6 +27,10 @@ VALVES, KEPT, WAITING, LONGEST = 3, 40, 8, 6 * 3600.0
 PATIENCE = 300.0
 #: Largest line of an answer, bytes.
 LINE = 64 << 20
+
+
+class Ended(CaseError):
+    """End of a process before its answer."""
 
 
 def surroundings(**further: str) -> dict[str, str]:
@@ -66,7 +71,7 @@ class Worker:
         self._opened = ""
         for waiting in self._waiting.values():
             if not waiting.done():
-                waiting.set_result({"error": "The process that computes ended; ask again, it is started anew."})
+                waiting.set_result({"error": "The process that computes ended; ask again.", "ended": True})
         self._waiting.clear()
 
     async def ask(self, do: str, **question: Any) -> Any:
@@ -89,12 +94,20 @@ class Worker:
             self._waiting.pop(number, None)
             self.end()
             raise CaseError("The process that computes did not answer and was ended; ask again.") from None
+        if "ended" in found:
+            raise Ended(found["error"])
         if "error" in found:
             raise CaseError(found["error"])
         return found["answer"]
 
     async def about(self, case: Path, do: str, **question: Any) -> Any:
-        """Answer to a question on a case file, which is opened before."""
+        """Answer to a question on a case file, which is opened before; asked once more where the process ends."""
+        try:
+            return await self._about(case, do, **question)
+        except Ended:
+            return await self._about(case, do, **question)
+
+    async def _about(self, case: Path, do: str, **question: Any) -> Any:
         async with self._lock:
             if self.pid is None or self._opened != str(case):
                 self._parameters = await self.ask("open", case=str(case))
@@ -287,7 +300,7 @@ class Runs:
         if run.state in ("waiting", "running"):
             run.state = "cancelled"
             run.keep()
-            _signal(run, signal.SIGTERM)
+            self._start(_insist(run))
 
     def delete(self, folder: Path, run: Run) -> None:
         """End a run and delete its folder."""
@@ -299,9 +312,12 @@ class Runs:
         while self._queue and len(self._running) < self.at_once:
             run = self._queue.pop(0)
             self._running.add(run)
-            task = asyncio.create_task(self._perform(run))
-            self._tasks.add(task)
-            task.add_done_callback(self._tasks.discard)
+            self._start(self._perform(run))
+
+    def _start(self, work: Coroutine) -> None:
+        task = asyncio.create_task(work)
+        self._tasks.add(task)
+        task.add_done_callback(self._tasks.discard)
 
     async def _perform(self, run: Run) -> None:
         try:
@@ -332,6 +348,15 @@ class Runs:
         """End all runs; those that ran are interrupted, and go on when they are resumed."""
         for run in self._running:
             _signal(run, signal.SIGTERM)
+
+
+async def _insist(run: Run) -> None:
+    """End the process of a run: it is asked, asked again where a library has swallowed that, and killed."""
+    process = run.process
+    for number, patience in ((signal.SIGTERM, 5.0), (signal.SIGTERM, 10.0), (signal.SIGKILL, 0.0)):
+        if run.process is process:
+            _signal(run, number)
+            await asyncio.sleep(patience)
 
 
 def _signal(run: Run, number: signal.Signals) -> None:

@@ -7,20 +7,34 @@ from typing import Any
 
 from nicegui import events, ui
 
-from ..case.parameters import PARAMETERS
 from ..errors import CaseError
 from ..studies import KINDS
+from .ask import COLOUR_BAR
 from .processes import Run
 
 #: Time between two looks at the runs, s.
 LOOK = 1.0
-#: Pictures of a valve: title, study, and keys of the case that it is asked with; "{}" stands for the largest head, Pa.
+#: Pictures of a valve: title, study, and its arguments; low and high are heads, Pa, damping a range of the damping.
 PICTURES = {
-    "Head-loss curve": ("steady", ('steady.pressures=["{:.6g} Pa:{:.6g} Pa:10"]',)),
-    "Root locus over head": ("sweep", ("sweep.over=pressure={:.6g}:{:.6g}:10",)),
-    "Stability map": ("map", ("map.x=pressure={:.6g}:{:.6g}:8", "map.y={}")),
+    "Head-loss curve": ("steady", ("-p", "{kpa_low:.6g} kPa:{kpa_high:.6g} kPa:10")),
+    "Root locus over head": ("sweep", ("--over", "pressure={low:.6g}:{high:.6g}:10")),
+    "Stability map": ("map", ("--x", "pressure={low:.6g}:{high:.6g}:8", "--y", "{damping}:8")),
+    "Cycle amplitude": ("cycle", ("--over", "{damping}:6")),
     "Closure": ("closure", ()),
+    "Probability of chatter": ("uncertainty", ()),
 }
+
+
+def arguments_of(case: Any, title: str) -> list[str]:
+    """Arguments of the study of a picture for a case: heads up to 1.5 times its own, damping from a quarter to three
+    times its own.
+    """
+    name = next((n for n in ("loss_factor", "beta", "alpha") if not case.damping.lacks(n)), "density")
+    own = getattr(case.damping, name, case.fluid.density) or 1.0
+    high = 1.5 * case.drive.pressure
+    heads = {"low": 0.1 * high, "high": high, "kpa_low": 1e-4 * high, "kpa_high": 1e-3 * high}
+    values = heads | {"damping": f"{name}={0.25 * own:.6g}:{3 * own:.6g}"}
+    return [argument.format(**values) for argument in PICTURES[title][1]]
 
 
 class RunView:
@@ -96,43 +110,32 @@ async def show_result(page: Any, run: Run) -> None:
 
 def show_map(page: Any, found: dict[str, Any]) -> None:
     """Draw a stability map with neutral curves and the star of the installation; a click goes to a cell."""
-    (x, y), grid = (found["x"], found["y"]), found["growth_rate"]
-    rows = [PARAMETERS[axis["parameter"]] for axis in (x, y)]
+    axes, grid = (found["x"], found["y"]), found["growth_rate"]
+    names = [axis["parameter"] for axis in axes]
+    rows = [page.asking.shown(name) for name in names]
+    x, y = ([value / row["scale"] for value in axis["values"]] for axis, row in zip(axes, rows))
     limit = max((abs(rate) for row in grid for rate in row if rate is not None), default=1.0)
-    cells = {
-        "type": "heatmap",
-        "x": [value / rows[0].scale for value in x["values"]],
-        "y": [value / rows[1].scale for value in y["values"]],
-        "z": grid,
-        "colorscale": "RdBu",
-        "reversescale": False,
-        "zmin": -limit,
-        "zmax": limit,
-        "colorbar": {"title": {"text": "Growth rate, 1/s"}},
-    }
-    curves = [
-        {"type": "scatter", "mode": "lines", "line": {"color": "black"}, "showlegend": False}
-        | {"x": [point[0] / rows[0].scale for point in curve], "y": [point[1] / rows[1].scale for point in curve]}
-        for curve in found["onset_curves"]
-    ]
-    asked = page.asking.values or {}
-    star = [asked.get(row.name) for row in rows]
-    if None not in star:
+    bar = COLOUR_BAR | {"title": "Growth rate, 1/s", "y": -0.25}
+    cells = {"type": "heatmap", "x": x, "y": y, "z": grid, "colorscale": "RdBu", "zmin": -limit, "zmax": limit}
+    drawn = [cells | {"colorbar": bar}]
+    for curve in found["onset_curves"]:
+        points = {name: [point[i] / rows[i]["scale"] for point in curve] for i, name in enumerate("xy")}
+        drawn.append({"type": "scatter", "mode": "lines", "line": {"color": "black"}, "showlegend": False} | points)
+    own = [page.asking.values.get(name, row["own"]) for name, row in zip(names, rows)]
+    if None not in own:
         marker = {"symbol": "star", "size": 16, "color": "gold", "line": {"color": "black", "width": 1}}
-        star = [value / row.scale for value, row in zip(star, rows)]
-        curves.append({"type": "scatter", "mode": "markers", "x": star[:1], "y": star[1:], "marker": marker})
-        curves[-1] |= {"name": "this installation", "showlegend": False}
-    axes = {
-        f"{name}axis": {"title": {"text": row.label}, "type": "log" if axis.get("log") else "linear"}
-        for name, row, axis in zip("xy", rows, (x, y))
-    }
-    figure = {"data": [cells, *curves], "layout": {"height": 420, "margin": {"t": 10}} | axes}
+        star = {name: [value / row["scale"]] for name, value, row in zip("xy", own, rows)}
+        drawn.append({"type": "scatter", "mode": "markers", "marker": marker, "name": "this installation"} | star)
+    layout = {"height": 460, "margin": {"t": 10, "r": 10}, "showlegend": False}
+    for name, axis, row in zip("xy", axes, rows):
+        layout[f"{name}axis"] = {"title": {"text": row["label"]}, "type": "log" if axis.get("log") else "linear"}
+    figure = {"data": drawn, "layout": layout, "config": {"responsive": False, "displaylogo": False}}
 
     def go(event: events.GenericEventArguments) -> None:
         point = (event.args.get("points") or [{}])[0]
         if point.get("x") is None:
             return
-        values = {row.name: float(point[name]) * row.scale for row, name in zip(rows, "xy")}
+        values = {name: float(point[axis]) * row["scale"] for name, row, axis in zip(names, rows, "xy")}
         page.panels.value = "Ask"
         page.asking.open(values)
 
@@ -162,20 +165,9 @@ class SeePanel:
         ui.timer(LOOK, self.refresh)
 
     def _ask(self, title: str) -> None:
-        kind, keys = PICTURES[title]
         case = self.page.checked.case
-        if case is None:
-            self.page.tell("The valve does not fit yet; see Describe.")
-            return
-        high = 1.5 * case.drive.pressure
-        damping = next((n for n in ("loss_factor", "beta", "alpha") if not case.damping.lacks(n)), "density")
-        own = getattr(case.damping, damping, 0.0) or 1.0
-        values = f"{damping}={0.25 * own:.6g}:{3 * own:.6g}:8"
-        arguments = []
-        for key in keys:
-            filled = key.format(values) if key.count("{") == 1 else key.format(0.1 * high, high)
-            arguments += ["--set", filled]
-        self.page.run(kind, title, arguments)
+        arguments = [] if case is None else arguments_of(case, title)
+        self.page.run(PICTURES[title][0], title, arguments)
         self.refresh()
 
     def refresh(self) -> None:

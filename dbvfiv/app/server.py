@@ -242,6 +242,7 @@ def serve(site: Site, host: str = "127.0.0.1", port: int = 0, password: str = ""
     listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
     try:
         listener.bind((host, port))
+        listener.listen(128)  # who opens the address at once waits
     except OSError as error:
         raise CaseError(f"{host}:{port} cannot be served ({error.strerror}); give another --port.") from None
     site.folder.mkdir(parents=True, exist_ok=True)

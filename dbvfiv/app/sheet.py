@@ -24,6 +24,7 @@ FORM: dict[str, tuple[tuple[str, str], ...]] = {
         ("valve.lip_half_width", "Half width of the bill"),
         ("valve.lip_radius", "Radius of the side edge"),
         ("valve.flange_radius", "Radius at the flange"),
+        ("valve.wall", "Wall"),
         ("valve.thickness_factor", "Wall thickness factor"),
         ("valve.scale", "Scale"),
     ),
@@ -138,7 +139,7 @@ def change(data: dict[str, Any], key: str, text: str) -> None:
     *path, last = key.split(".")
     table: Any = data
     for part in path:
-        table = table.get(part, {})
+        table = table[int(part)] if isinstance(table, list) else table.get(part, {})
     table.pop(last, None)
 
 

@@ -30,6 +30,7 @@ from ..explore import Answer, Explorer
 from ..model.equilibria import model_warnings
 from ..model.sizes import ValveSizes
 from ..record.mesh import MeshData
+from ..shell.recovery import layer_fields
 from ..studies.session import load_result
 from ..studies.study import find_study
 
@@ -102,15 +103,31 @@ class Desk:
         return self.explorer
 
     def shape(self, values: dict[str, float]) -> dict[str, Any]:
-        """Skin of the whole valve at a point: corners, m, triangles, and displacement, m, at the corners."""
+        """Skin of the whole valve at a point: corners, m, triangles, and what it can be coloured by at the corners."""
         explorer = self._explorer
         state, mesh = explorer.state(explorer.place(values)), MeshData.of(explorer.model)
-        skin = ValveSkin.of(mesh)
-        quads = skin.quads
-        moved = np.tile(np.linalg.norm(state.nodal[:, :3], axis=1)[skin.valve.node], 2)
-        triangles = np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]])
-        points = skin.points(state.nodal)
-        return {"points": np.round(points, 5).tolist(), "triangles": triangles.tolist(), "moved": moved.tolist()}
+        skin, found = ValveSkin.of(mesh), layer_fields(explorer.model.shell, state.q)
+        colours = {"Displacement, mm": 1e3 * np.linalg.norm(state.nodal[:, :3], axis=1)}
+        often = np.bincount(mesh.quads.ravel(), minlength=len(mesh.nodes))
+        for name, stretch in zip(mesh.layer_titles(), found.stretch[:, :, 1].T):
+            summed = np.bincount(mesh.quads.ravel(), np.repeat(stretch, 4), len(mesh.nodes))
+            colours[f"Largest strain of {name}, %"] = 100 * (summed / often - 1)
+        triangles = np.concatenate([skin.quads[:, [0, 1, 2]], skin.quads[:, [0, 2, 3]]])
+        points = np.round(skin.points(state.nodal), 5)
+        whole = {name: np.round(np.tile(field[skin.valve.node], 2), 4) for name, field in colours.items()}
+        return {"points": points, "triangles": triangles, "colours": whole}
+
+    def motion(self, values: dict[str, float], frames: int = 12) -> dict[str, Any]:
+        """One cycle of the leading mode that oscillates, as corners of the skin, m, with a sentence on it."""
+        rest = dict(values)
+        found = self.valve.modes(rest.pop("pressure"), **rest)
+        mode = next((mode for mode in found.modes if mode.frequency > 0), None)
+        if mode is None:
+            raise CaseError("No mode that is listed oscillates.")
+        skin, most = ValveSkin.of(found.mesh), mode.drawn_amplitude(found.state)
+        moved = (found.state.nodal + most * mode.at_phase(2 * np.pi * i / frames) for i in range(frames))
+        said = f"Mode of {mode.frequency:.4g} Hz, growth rate {mode.growth_rate:.4g} 1/s"
+        return {"frames": [np.round(skin.points(nodal), 5) for nodal in moved], "text": said}
 
     def result(self, path: str, figures: str) -> dict[str, Any]:
         """Text, figures and tables of a result file, these written into a folder."""
@@ -126,13 +143,13 @@ class Desk:
 
 def write_table(result: Any, spec: Any, folder: Path) -> Path | None:
     """Columns with one number a row of a table of a result as CSV; None where there are no rows."""
-    columns = [c for c in spec.columns if not spec.shape(c)]
+    columns = [c for c in spec.columns if spec.shape(c) == ()]
     if not columns or not result.record.rows(spec.name):
         return None
     path = folder / f"{spec.name}.csv"
     with open(path, "w", newline="", encoding="utf-8") as file:
         out = csv.writer(file)
-        out.writerow([f"{c.name} [{c.unit}]" if c.unit else c.name for c in columns])
+        out.writerow([f"{c.name} [{c.units}]" if c.units else c.name for c in columns])
         out.writerows(zip(*(result.record.column(spec.name, c.name) for c in columns)))
     return path
 

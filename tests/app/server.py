@@ -125,15 +125,25 @@ class Tab:
             time.sleep(0.05)
         raise AssertionError(f"not within {seconds:g} s; the page says:\n{self.text[:2000]}")
 
+    def _press(self, selector: str, words: str) -> None:
+        """Click the first element that is shown and says some words."""
+
+        def pressed() -> bool:
+            found = (e for e in self.driver.find_elements("css selector", selector) if e.is_displayed())
+            chosen = next((e for e in found if e.text.strip().lower() == words.lower()), None)
+            if chosen is not None:
+                chosen.click()
+            return chosen is not None
+
+        self.wait(pressed)
+
     def go(self, name: str) -> None:
         """Turn to a panel."""
-        tabs = self.driver.find_elements("css selector", ".q-tab")
-        next(tab for tab in tabs if tab.text.strip().lower() == name.lower()).click()
+        self._press(".q-tab", name)
 
     def click(self, words: str) -> None:
         """Click a button by its words."""
-        buttons = self.driver.find_elements("css selector", "button, a.q-btn")
-        next(b for b in buttons if b.is_displayed() and b.text.strip().lower() == words.lower()).click()
+        self._press("button, a.q-btn", words)
 
     def fill(self, name: str, text: str) -> None:
         """Write into a field."""
