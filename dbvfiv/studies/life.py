@@ -38,6 +38,8 @@ INSTANTS = 64
 STILL = 1e-7
 #: Share of the swings of the lip, by the fourth power, that full states have to hold, and that below which it is told.
 SEEN, WELL_SEEN = 0.3, 0.9
+#: Elements of a part in which the samples are followed: so many by their hours, and by their energy.
+PICKS = 3
 #: Last cycles of a run that has settled on one.
 LAST = 20
 #: Keys of [life] that stand before shipped constants.
@@ -117,7 +119,7 @@ def _run(result: Any, since: float | None, per_day: float | None) -> Motion:
     begin, end, advice = *history["time"][[0, -1]], 'compute it with --set transient.save_every="1 ms", for instance'
     if since is not None:
         begin = since
-    elif verdict["verdict"] == "limit cycle":
+    elif per_day is None and verdict["verdict"] == "limit cycle":
         lip = verdict["lip_displacement"]
         begin = max(begin, end - max(1, min(int(lip["cycles_observed"]), LAST)) / lip["frequency"])
     elif per_day is None and verdict["verdict"] != "irregular":
@@ -125,8 +127,8 @@ def _run(result: Any, since: float | None, per_day: float | None) -> Motion:
             f"The run ends {verdict['verdict']} and not in a motion that lasts; give how often a day it takes place, "
             "--per-day N, or the time from which its motion goes on, --since T."
         )
-    model, nodal = result.model, result.record.column("states", "nodal")
-    times = result.record.column("states", "time")
+    record, shell = result.record, result.model.shell
+    times = record.column("states", "time")
     rows, steps = np.flatnonzero(times >= begin), history["time"] >= begin
     if len(rows) < 3:
         raise CaseError(f"The run holds {len(rows)} full states from {begin:.4g} s on, which are no motion; {advice}.")
@@ -138,8 +140,8 @@ def _run(result: Any, since: float | None, per_day: float | None) -> Motion:
     hours = (end - begin) / 3600.0 if per_day is None else 24.0 / per_day
     often = "without pause" if per_day is None else f"{per_day:g} times a day"
     words = f"the run from {begin:.4g} to {end:.4g} s ({verdict['verdict']}), {often}"
-    states = StateSteps(rows, lambda row: model.shell.dofs.restrict(np.asarray(nodal[row])))
-    return Motion(model.shell, states, hours, words, remarks if seen < WELL_SEEN * whole else ())
+    states = StateSteps(rows, lambda row: shell.dofs.restrict(record.value("states", "nodal", int(row))))
+    return Motion(shell, states, hours, words, remarks if seen < WELL_SEEN * whole else ())
 
 
 def _swings(lip: np.ndarray) -> float:
@@ -182,10 +184,10 @@ class Part:
 
 
 def hours_text(value: float) -> str:
-    """Hours to two digits, or the word for a crack that does not grow."""
-    if np.isinf(value):
-        return "unlimited"
-    return f"{value:.1e}" if value >= 10 * LONG else f"{float(f'{value:.2g}'):,.15g}".replace(",", " ")
+    """Hours to two digits, or the word for a crack that does not grow; 1e8 are ten thousand years."""
+    if value >= 100 * LONG:
+        return "unlimited" if np.isinf(value) else "over 1e8"
+    return f"{float(f'{value:.2g}'):,.15g}".replace(",", " ")
 
 
 def _place(part: Part) -> str:
@@ -284,9 +286,12 @@ class Life:
         cycles, (family, spread) = count_cycles(energy), self.constants[rubber]
         middle, drawn, most = CrackGrowth.middle(spread), CrackGrowth.draw(spread), energy.max(axis=1)
         hours = self.motion.hours * middle.blocks(cycles, self.keys.crack)
-        element = int(np.argmin(hours) if np.isfinite(hours).any() else np.argmax(most))
-        there = cycles[element][cycles[element, :, 0] > 0] if most[element] > 0 else np.zeros((1, 2))
-        samples = self.motion.hours * drawn.blocks(there, self.keys.crack)
+        picks = np.unique(np.concatenate([np.argsort(hours)[:PICKS], np.argsort(-most)[:PICKS]]))
+        own = [cycles[e][: max(1, np.count_nonzero(cycles[e, :, 0]))] for e in picks]
+        each = np.stack([self.motion.hours * drawn.blocks(some, self.keys.crack) for some in own])
+        samples, grows = each.min(axis=0), np.isfinite(each).any(axis=0)
+        wins = np.bincount(each[:, grows].argmin(axis=0), minlength=len(picks)) if grows.any() else most[picks]
+        element, there = picks[np.argmax(wins)], own[np.argmax(wins)]
         low, half, high = np.quantile(samples, [0.1, 0.5, 0.9], method="inverted_cdf").tolist()
         top, bottom = there[np.argmax(np.ptp(there, axis=1))]
         with np.errstate(divide="ignore"):
@@ -298,7 +303,7 @@ class Life:
             all_hours=hours,
             all_cuts=cuts[2],
             all_releases=SHAPE * middle.precursor * most,
-            element=element,
+            element=int(element),
             hours=half,
             interval=[low, high],
             without_growth=float(np.isinf(samples).mean()),

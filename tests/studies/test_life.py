@@ -136,6 +136,22 @@ def test_valve_that_opens_some_times_a_day(opened, command_line, tmp_path):
     assert told[0].startswith("Hours to a crack of 2 mm: ") and "10 ways a day from rest to 18 kPa and back" in told[1]
 
 
+def test_run_in_time(command_line, one_sentence, tmp_path):
+    """A part of a run without pause is the same as so often a day; full states too far apart are refused."""
+    keys = {"transient.start": "rest", "transient.duration": 0.06, "transient.step": 1e-3, "drive.pressure": 6e3}
+    keys["fluid.density"] = 60.0
+    path, sparse = tmp_path / "run.h5", tmp_path / "sparse.h5"
+    load_small(keys | {"transient.save_every": 2e-3}).transient(output=path)
+    load_small(keys | {"transient.save_every": 0.02}).transient(output=sparse)
+    cut = ("--since", 0.02, "--set=life.precursor=1 mm", "--set=life.threshold=1", "--json")
+    lasting = json.loads(command_line("life", path, *cut).out)
+    daily = json.loads(command_line("life", path, *cut, "--per-day", 86400 / 0.04).out)
+    assert np.isclose(lasting["hours"], daily["hours"], rtol=1e-6) and "without pause" in lasting["motion"]
+    assert 0 < lasting["ratio"] < 1 and lasting["interval"][0] < lasting["hours"] < lasting["interval"][1]
+    outcome = command_line("life", sparse, "--since", 0.01)
+    assert outcome.status == 2 and one_sentence(outcome.err) and "of the swings of the lip" in outcome.err
+
+
 def test_results_without_a_motion_are_refused(opened, command_line, one_sentence, tmp_path):
     path = tmp_path / "run.h5"
     load_small({"transient.duration": 0.02, "transient.step": 1e-3}).transient(output=path)
