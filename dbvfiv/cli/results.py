@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -24,6 +24,7 @@ from .terminal import (
 )
 
 if TYPE_CHECKING:
+    from ..studies.recognition import Recognition
     from ..studies.state import State
 
 #: Kinds of results that can be compared.
@@ -166,23 +167,44 @@ def compare(
     files: Annotated[
         list[Path],
         typer.Argument(
-            metavar="RUN.h5 RUN.h5 ...", help="Result files of transient runs, of steady or of closure ones."
+            metavar="RUN.h5 RUN.h5 ...",
+            help="Result files of transient runs, of steady or of closure ones; or a measured record and one result of "
+            "modes, cycle or transient.",
         ),
     ],
     output: Annotated[Path, typer.Option("-o", "--output", metavar="FILE.png", help="Figure to write.")] = Path(
         "comparison.png"
     ),
+    columns: Annotated[
+        list[str] | None,
+        typer.Option("--column", "-c", metavar="NAME", help="Of a record: column by name or number; may be repeated."),
+    ] = None,
+    within: Annotated[
+        float,
+        typer.Option("--within", metavar="%", help="Of a record: half the 95 % interval of computed frequencies."),
+    ] = 10.0,
     as_json: AsJson = False,
 ) -> None:
     """Compare transient runs: their histories in one figure, their verdicts in one table; or steady runs: their head
     and discharge in one figure, the flows at the pressures of the first and what they differ by in one table; or
     closure runs: seal, force, displacement, passage and stiffness over the back pressure. Measured data that they name
     are in the figure, and what each is off by is told. Runs are named by the case keys that tell them apart.
+
+    Or a measured record: which computed mode or cycle it is, with frequency and damping of both side by side.
+
+    dbvfiv compare vibration.csv modes.h5 -c acceleration --within 10
     """
+    from h5py import is_hdf5
+
     from ..studies.comparing import save_figure
     from ..studies.session import load_result
     from ..studies.study import find_study
 
+    if files[0].is_file() and not is_hdf5(files[0]):
+        found = _recognise(files, columns or (), within)
+        path = save_figure(found.draw, output)
+        print_answer(found.document() | {"figure": str(path)}, lambda: [*found.lines(), f"Wrote {path}."], as_json)
+        return
     results = [load_result(file) for file in files]
     kind = results[0].kind
     for file, result in zip(files, results):
@@ -203,6 +225,25 @@ def compare(
         print_json({"runs": runs, **found.document(), "figure": str(path)})
         return
     print("\n".join([*found.lines(), f"Wrote {path}."]))
+
+
+def _recognise(files: list[Path], columns: Sequence[str], within: float) -> Recognition:
+    """A measured record beside a result."""
+    from ..studies.recognition import Recognition
+    from ..studies.session import load_result
+    from ..verdict import JudgeOptions
+    from .verdict import Reading, judge_file
+
+    if len(files) != 2:
+        raise CaseError(
+            f"{str(files[0])!r} is a measured record; it is compared with one result, as in "
+            "`dbvfiv compare record.csv modes.h5`."
+        )
+    if not 0 < within < 100:
+        raise CaseError(f"--within is {within:g}; it must be greater than 0 and less than 100.")
+    judged = judge_file(files[0], Reading(columns), JudgeOptions())
+    signals = [(one.signal.name, one.signal.time, one.signal.values, one.verdict) for one in judged]
+    return Recognition(signals, load_result(files[1]), 0.01 * within)
 
 
 def life(

@@ -76,8 +76,12 @@ def verdict(
 
     dbvfiv verdict pressure.csv --column 2 --plots figures
     """
+    from ..verdict import JudgeOptions
+
     reading = Reading(columns or (), time, rate, time_unit, skip_bad, since, until, detrend)
-    judged = _judge_file(file, reading, steady, closed_below)
+    if not 0 < steady < 1:
+        raise CaseError(f"--steady is {steady:g}; it must be greater than 0 and less than 1.")
+    judged = judge_file(file, reading, JudgeOptions(steady=steady), closed_below)
     figures = [each.draw(plots) for each in judged] if plots is not None else []
     if as_json:
         print_json({"signals": [each.summary() for each in judged]})
@@ -197,15 +201,13 @@ def _line_of(line: dict[str, Any]) -> str:
     return f"  {line['called'] or 'oscillation':<20}{', '.join(said)}"
 
 
-def _judge_file(file: Path, reading: Reading, steady: float, closed_below: float | None = None) -> list[JudgedSignal]:
+def judge_file(
+    file: Path, reading: Reading, options: JudgeOptions, closed_below: float | None = None
+) -> list[JudgedSignal]:
     """Judge the columns of a text file or of a transient run."""
-    from ..verdict import JudgeOptions
-
-    if not 0 < steady < 1:
-        raise CaseError(f"--steady is {steady:g}; it must be greater than 0 and less than 1.")
     found = []
     for signal in _read_signals(file, reading):
-        verdict = _judged(file, signal, JudgeOptions(steady=steady), closed_below, reading)
+        verdict = _judged(file, signal, options, closed_below, reading)
         found.append(JudgedSignal(signal, verdict, _peaks(signal.between(*verdict.judged))))
     return found
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+
 import h5py
 import numpy as np
 import pytest
@@ -212,3 +214,31 @@ def test_a_damaged_file_is_told(stored, tmp_path, one_sentence):
     with pytest.raises(CaseError) as caught:
         dbvfiv.load_result(path)
     assert one_sentence(str(caught.value))
+
+
+def test_a_measured_record_is_laid_beside_modes(modes, stored, tmp_path, command_line):
+    time = np.arange(0.0, 4.0, 1e-3)
+    noise = 0.02 * np.random.default_rng(5).standard_normal(len(time))
+    flutter = next(mode for mode in modes.modes if mode.growth_rate > 0)
+    damped = min((mode for mode in modes.modes if 0 < mode.damping_ratio < 0.9), key=lambda mode: mode.damping_ratio)
+    ring = np.exp(damped.growth_rate * time) * np.cos(damped.angular_frequency * time)
+    line = 0.3 * np.cos(flutter.angular_frequency * time)
+    np.savetxt(
+        tmp_path / "record.csv",
+        np.column_stack([time, line + noise, ring + noise, np.cos(2 * np.pi * 250.0 * time) + noise]),
+        delimiter=",",
+        header="time [s],flutter,ring,far",
+        comments="",
+    )
+    files = tmp_path / "record.csv", stored.path, "-o", tmp_path / "beside.png", "--within", "2"
+    told = command_line("compare", *files, "--json")
+    document = json.loads(told.out)
+    says = {one["signal"]: one for one in document["measured"]}
+    assert says["flutter"]["says"] == f"It is mode {flutter.number}."
+    assert says["ring"]["matches"][0]["name"] == f"mode {damped.number}"
+    assert says["ring"]["matches"][0]["share"] > 0.9 and says["ring"]["matches"][0]["distance"] < 0.5
+    assert says["far"]["says"].startswith("None of them")
+    assert (tmp_path / "beside.png").stat().st_size > 10_000
+    assert f"It is mode {flutter.number}." in command_line("compare", *files).out
+    alone = command_line("compare", tmp_path / "record.csv")
+    assert alone.status == 2 and "compared with one result" in alone.err
