@@ -22,7 +22,7 @@ verify: setup
 
 # one outcome and one count at thousands of random states
 random: setup
-	@$(PYTHON) -m pytest -n $(JOBS) --dist load -m random tests/verification
+	@$(PYTHON) -m pytest -n $(JOBS) --dist load -m random tests/verification tests/model
 
 # flow and wall in three dimensions, end to end; installs Debian's OpenFOAM where there is none
 verify-3d: setup

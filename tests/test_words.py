@@ -5,6 +5,7 @@ from __future__ import annotations
 import ast
 import re
 from collections.abc import Iterator
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -49,6 +50,7 @@ def messages(path: Path) -> Iterator[tuple[int, str]]:
                 yield node.lineno, " ".join(node.value.split())
 
 
+@cache
 def readings() -> list[tuple[str, str]]:
     """Places and texts that a user reads."""
     pages = [*(ROOT / "docs" / "tutorials").glob("*.md"), ROOT / "docs" / "report.md", ROOT / "README.md"]

@@ -190,8 +190,6 @@ def test_a_pressure_without_a_unit_is_refused(command_line, one_sentence, given)
 
 def test_heads_are_pressures_of_the_fluid(command_line):
     options = ("steady", *COARSE, "--set", "fluid.density=1025", "--json")
-    documents = [
-        json.loads(command_line(*options, "-p", given).out) for given in ("0.3048 m", "1 ft", "3063.793593 Pa")
-    ]
+    documents = [json.loads(command_line(*options, "-p", given).out) for given in ("0.3048 m", "1 ft")]
     pressures = [document["points"][0]["pressure"] for document in documents]
-    assert pressures == pytest.approx(3 * [0.3048 * 9.80665 * 1025], rel=1e-9)
+    assert pressures == pytest.approx(2 * [0.3048 * 9.80665 * 1025], rel=1e-9)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import cache
+
 import numpy as np
 import pytest
 from scipy.optimize import brentq
@@ -40,6 +42,7 @@ def _options(step=np.inf) -> LoadStepOptions:
     return LoadStepOptions(NewtonOptions(1e-9, 30), 1e-8, max_step=step)
 
 
+@cache
 def _critical(elements: int) -> tuple[float, PressedShell, object]:
     model = _ring(elements)
     watch = BucklingWatch(model, _options(), lambda q, p: stiffness_spectrum(model, q, p, 3))
