@@ -10,7 +10,7 @@ from dbvfiv.case.parameters import Mu
 from dbvfiv.model import ValveModel, linearise
 from dbvfiv.model.equilibria import find_equilibria
 from dbvfiv.studies.case import thesis_case
-from dbvfiv.studies.sensitivity.derivatives import differentiate
+from dbvfiv.studies.sensitivity.derivatives import Neighbourhood
 from dbvfiv.studies.stability.walk import StabilityWalk
 from eigen import SearchOptions, leading_modes
 
@@ -66,7 +66,8 @@ def test_sensitivities_are_slopes_of_the_eigenvalue():
         return q, found.mode(i)
 
     q, mode = leading(pressure, 200.0)
-    found = [differentiate(model, q, pressure, conditions, mode, name) for name in ("pressure", "density")]
+    here = Neighbourhood(model, q, pressure, conditions, [mode])
+    found = [here.slope(name) for name in ("pressure", "density")]
     for sensitivity, h in zip(found, (8.0, 0.2)):
         ends = [
             leading(*((pressure + s * h, 200.0) if sensitivity.parameter == "pressure" else (pressure, 200.0 + s * h)),
