@@ -35,6 +35,7 @@ _PUBLIC = {
     "SweepResult": "studies.sweep.study",
     "TransientResult": "studies.transient.study",
     "UncertaintyResult": "studies.uncertainty.study",
+    "DesignResult": "studies.design.study",
 }
 __all__ = sorted(_PUBLIC)
 

@@ -8,6 +8,7 @@ from .observer import Observer as Observer
 from .resuming import resume as resume
 from .studies.closure.study import ClosureResult as ClosureResult
 from .studies.cycle.study import CycleResult as CycleResult
+from .studies.design.study import DesignResult as DesignResult
 from .studies.levels.study import LevelsResult as LevelsResult
 from .studies.map.study import MapResult as MapResult
 from .studies.modes.study import ModesResult as ModesResult

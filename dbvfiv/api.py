@@ -19,6 +19,7 @@ from .observer import Observer, Progress, is_watched
 from .studies.case import Case, load_case
 from .studies.closure.study import ClosureResult
 from .studies.cycle.study import CycleResult
+from .studies.design.study import DesignResult
 from .studies.map.study import MapResult
 from .studies.modes.study import ModesResult
 from .studies.onset.study import OnsetResult
@@ -389,6 +390,40 @@ class Valve:
         if workers is not None:
             asked["uncertainty.workers"] = workers
         return self._ask(asked, changes).perform("uncertainty", output, observer or bar())
+
+    def design(
+        self,
+        variables: Mapping[str, str] | None = None,
+        *,
+        aim: str | None = None,
+        constraints: Sequence[str] | None = None,
+        cases: str | Path | None = None,
+        output: Output = None,
+        observer: Observer | None = None,
+        **changes: Any,
+    ) -> DesignResult:
+        """Better valves within bounds, each verified on a finer mesh.
+
+        Parameters
+        ----------
+        variables : mapping, optional
+            Bounds by the names of parameters or keys of the case, {"thickness": "0.7:1.4"}.
+        aim : str, optional
+            "loss coefficient at 2 m down"; design.aim of the case by default.
+        constraints : sequence of str, optional
+            "margin from 0.1 m to 5 m at least 5 %"; design.constraints by default.
+        cases : path, optional
+            Folder for the case file of each design.
+        output, observer, changes
+            As for `onset`.
+
+        Raises
+        ------
+        CaseError, SolveError
+        """
+        asked = {"design.variables": variables, "design.aim": aim, "design.constraints": constraints}
+        folder = None if cases is None else Path(cases)
+        return self._ask(asked, changes).perform("design", output, observer or bar(), cases=folder)
 
     def transient(
         self,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import typing
-from collections.abc import Collection
+from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any, TypeVar
 
@@ -82,3 +82,16 @@ def key(default: Any, description: str, **limits: Any) -> Any:
     Type and unit come from the annotation. A default of ``...`` makes the key mandatory.
     """
     return Field(default, description=description, **limits)
+
+
+def _flat(given: Mapping[str, Any], before: str = "") -> Iterator[tuple[str, Any]]:
+    for name, value in given.items():
+        if isinstance(value, Mapping):
+            yield from _flat(value, f"{before}{name}.")
+        else:
+            yield f"{before}{name}", value
+
+
+def flattened(given: Any) -> Any:
+    """Entries of nested tables by their names with dots, for keys that hold names of other keys."""
+    return dict(_flat(given)) if isinstance(given, Mapping) else given

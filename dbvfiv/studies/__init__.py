@@ -16,6 +16,7 @@ KINDS = (
     "onset",
     "map",
     "uncertainty",
+    "design",
     "transient",
     "cycle",
     "closure",

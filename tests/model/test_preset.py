@@ -22,7 +22,7 @@ from dbvfiv.model.preset import stress_free_shape
 from dbvfiv.model.pressed_shell import PressedShell
 from dbvfiv.model.symmetry import SYMMETRIES
 from dbvfiv.studies.case import load_case, thesis_case
-from dbvfiv.studies.sensitivity.derivatives import parameters_of
+from dbvfiv.studies.stability.derivatives import parameters_of
 from dbvfiv.studies.stability.place import redesigned
 from eigen import SearchOptions, leading_modes
 from tests.verification.test_shell_large_displacement import cantilever

@@ -8,7 +8,7 @@ import pytest
 import dbvfiv
 from dbvfiv.case import CaseError
 from dbvfiv.studies.case import thesis_case
-from dbvfiv.studies.sensitivity.derivatives import parameters_of
+from dbvfiv.studies.stability.derivatives import parameters_of
 from tests.verification.test_transient_modes import check_three_routes, three_routes
 
 SMALL = {"mesh.around": 6, "mesh.along": 8, "drive.pressure": 6e3, "damping.alpha": 0.0, "fluid.density": 100.0}

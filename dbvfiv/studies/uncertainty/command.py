@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
 import typer
 from pydantic import BeforeValidator, Field, StrictInt, StrictStr, ValidationInfo, field_validator
@@ -13,24 +12,11 @@ from ...case.distribution import with_full_names
 from ...case.model import Case
 from ...case.parameters import listed
 from ...case.quantity import Number, number_or_text
-from ...case.section import Described, Section, key
+from ...case.section import Described, Section, flattened, key
 from ..request import DensityOption, LawOption, PressureOption, Request, WorkersOption, refuse_moved
 from ..workers import WORKERS_HELP, WorkersKey
 
 ORDER = 31
-
-
-def _flat(given: Any, before: str = "") -> Iterator[tuple[str, Any]]:
-    """Names with dots of the entries of nested tables."""
-    for name, value in given.items():
-        if isinstance(value, Mapping):
-            yield from _flat(value, f"{before}{name}.")
-        else:
-            yield f"{before}{name}", value
-
-
-def _flattened(given: Any) -> Any:
-    return dict(_flat(given)) if isinstance(given, Mapping) else given
 
 
 Correlation = tuple[StrictStr, StrictStr, Annotated[Number, Field(gt=-1, lt=1)]]
@@ -52,7 +38,7 @@ class Keys(Section):
         "plain",
         "Samples of the inputs as they are, or (rare) about the inputs of a rare flutter, with weights, at one state.",
     )
-    inputs: Annotated[dict[StrictStr, StrictStr], BeforeValidator(_flattened)] = key(
+    inputs: Annotated[dict[StrictStr, StrictStr], BeforeValidator(flattened)] = key(
         {},
         "Distribution of each uncertain number: a parameter (thickness, loss_factor, ...) or a key of the case "
         "(materials.CR.stiffness_factor, valve.initial_gap, ...); without them those shipped for its materials.",

@@ -10,7 +10,7 @@ from dbvfiv.case.parameters import Mu
 from dbvfiv.model import ValveModel, linearise
 from dbvfiv.model.equilibria import find_equilibria
 from dbvfiv.studies.case import thesis_case
-from dbvfiv.studies.sensitivity.derivatives import Neighbourhood
+from dbvfiv.studies.stability.derivatives import Neighbourhood
 from dbvfiv.studies.stability.walk import StabilityWalk
 from eigen import SearchOptions, leading_modes
 

@@ -9,7 +9,7 @@ from dbvfiv.model import ValveModel, linearise
 from dbvfiv.model.equilibria import find_equilibria
 from dbvfiv.model.newton import EquilibriumSolver, NewtonOptions
 from dbvfiv.studies.case import thesis_case
-from dbvfiv.studies.sensitivity.derivatives import Neighbourhood, changed, parameters_of
+from dbvfiv.studies.stability.derivatives import Neighbourhood, changed, parameters_of
 from eigen import SearchOptions, leading_modes
 
 RAYLEIGH = Mu(density=10.0, alpha=1.0, beta=0.003)

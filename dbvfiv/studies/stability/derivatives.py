@@ -29,7 +29,7 @@ from ...model import ValveModel, linearise
 from ...model.sizes import ValveSizes
 from ...model.state import describe_state
 from ..case import Case
-from ..stability.place import design_value, is_surrounding, key_of, redesigned, require_parameter
+from .place import design_value, is_surrounding, key_of, redesigned, require_parameter
 
 #: What a steady state does beside vibrating: names, units and words.
 PERFORMANCE = {

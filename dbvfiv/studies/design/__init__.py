@@ -1,0 +1,1 @@
+"""Designs of a valve: variables within bounds, an aim, and constraints."""

@@ -1,0 +1,95 @@
+"""``dbvfiv design``: a better valve within bounds."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from pydantic import BeforeValidator, StrictInt, StrictStr, field_validator
+
+from ...case.quantity import Number, number_or_text
+from ...case.section import Section, flattened, key
+from ...case.statement import QUANTITIES, parse_statement
+from ..request import DensityOption, Request
+
+ORDER = 32
+#: A density for checks of the form; heads are pressures of the case's own fluid.
+_ANY = 1000.0
+
+
+class Keys(Section):
+    """A better valve within bounds."""
+
+    variables: Annotated[dict[StrictStr, StrictStr], BeforeValidator(flattened)] = key(
+        {},
+        "Bounds of each number that may change: a parameter (thickness, angle, ...) or a key of the case "
+        '("valve.saddle_length", "layers.2.angle", "materials.SBR.stiffness_factor"), as LOW:HIGH.',
+    )
+    aim: StrictStr = key(
+        "",
+        f"What is made better: {', '.join(QUANTITIES)} at heads, 'up' or 'down', such as 'loss coefficient at 2 m "
+        "down'. The margin is the least damping ratio.",
+    )
+    constraints: tuple[StrictStr, ...] = key(
+        (),
+        "What must hold, such as 'margin from 0.1 m to 5 m at least 5 %' or 'mass at most 12 kg'; one may have bounds "
+        "FIRST:LAST:COUNT, for a front of designs.",
+    )
+    starts: StrictInt = key(1, "Designs to start from: the case itself, then others between the bounds.", ge=1, le=100)
+    evaluations: StrictInt = key(40, "Valves that a start may try.", ge=2, le=10_000)
+    finer: Number = key(1.5, "Elements each way, over those of the case, on which a design is verified.", ge=1, le=4)
+
+    @field_validator("aim")
+    @classmethod
+    def _readable_aim(cls, text: str) -> str:
+        if text:
+            parse_statement(text, True, _ANY)
+        return text
+
+    @field_validator("constraints")
+    @classmethod
+    def _readable_constraints(cls, texts: tuple[str, ...]) -> tuple[str, ...]:
+        found = [parse_statement(text, False, _ANY) for text in texts]
+        if sum(len(statement.bounds) > 1 for statement in found) > 1:
+            raise ValueError("in which more than one constraint has several bounds")
+        return texts
+
+
+def command(
+    aim: Annotated[
+        str | None, typer.Option("--aim", metavar="TEXT", help="What is made better: design.aim without it.")
+    ] = None,
+    constraint: Annotated[
+        list[str] | None,
+        typer.Option("--constraint", metavar="TEXT", help="What must hold; may be repeated; design.constraints."),
+    ] = None,
+    vary: Annotated[
+        list[str] | None,
+        typer.Option("--vary", metavar="NAME=LOW:HIGH", help="A number that may change; may be repeated."),
+    ] = None,
+    density: DensityOption = None,
+    starts: Annotated[int | None, typer.Option("--starts", metavar="N", help="Designs to start from.")] = None,
+    cases: Annotated[
+        Path | None, typer.Option("--cases", metavar="FOLDER", help="Write the case file of each design there.")
+    ] = None,
+) -> Request:
+    """A better valve: numbers of the case between bounds, so that an aim is reached and constraints hold.
+
+    Gradients are exact, modes in reach count together, and every design found is verified by counted verdicts on a
+    finer mesh. Valves without a steady state are steps back. The margin is the least damping ratio of the modes.
+
+    With -o every state is kept at once: `dbvfiv resume` goes on after Ctrl-C or a crash.
+
+    dbvfiv design cases/dbv12-in-line.toml --vary thickness=0.7:1.4 --vary "angle=30 deg:70 deg" --aim "loss coefficient
+    at 2 m down" --constraint "margin from 0.2 m to 4 m at least 5 %" -o design.h5 --cases designs
+    """
+    pairs = [text.partition("=") for text in vary or ()]
+    changes = {
+        "design.aim": aim,
+        "design.constraints": list(constraint) if constraint else None,
+        "design.variables": {name.strip(): bounds.strip() for name, _, bounds in pairs} if pairs else None,
+        "design.starts": starts,
+        "fluid.density": number_or_text(density),
+    }
+    return Request(changes, {"cases": cases})

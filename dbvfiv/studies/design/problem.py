@@ -1,0 +1,263 @@
+"""A design as a problem of optimisation: what a valve does at the heads asked, and its exact derivatives.
+
+The margin at a head is the least damping ratio zeta of its modes as the smooth aggregate
+
+    -ln( sum_i exp(-rho zeta_i) ) / rho
+
+(Kreisselmeier and Steinhauser, IFAC Proc. 12(7), 1979, 113): all modes in reach count, so it stays smooth where they
+change places, and it is never above the least one, by at most ln(modes) / rho below it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from eigen import leading_modes
+
+from ...case.parameters import DESIGN, PARAMETERS, Mu
+from ...case.statement import OF_THE_WALL, Statement, parse_span, parse_statement
+from ...errors import CaseError, SolveError
+from ...observer import Observer
+from ..case import Case
+from ..stability.derivatives import Neighbourhood
+from ..stability.place import design_value, key_of, redesigned, require_parameter
+from ..stability.walk import StabilityWalk, name_state_in_failures
+
+#: rho: four modes of equal damping take 0.14 % of critical off the margin.
+SHARPNESS = 1000.0
+#: Damping ratio above the least one from which on a mode has no weight: exp(-14) is 1e-6.
+REACH = 14.0 / SHARPNESS
+#: Names of what `Neighbourhood` gives for a quantity.
+_PERFORMANCE = {"flow": "flow", "opening": "opening", "loss coefficient": "loss_coefficient", "mass": "mass"}
+
+
+@dataclass(frozen=True)
+class Variable:
+    """A number that may change.
+
+    Attributes
+    ----------
+    name : str
+        Of a parameter of the table, or a key of the case.
+    low, high, start : float
+        SI; angles in degrees.
+    unit : str
+    """
+
+    name: str
+    low: float
+    high: float
+    start: float
+    unit: str
+
+
+def variables_of(case: Case) -> tuple[Variable, ...]:
+    """Variables of a case.
+
+    Raises
+    ------
+    CaseError
+        For a name that is no number of the case, or bounds that cannot be read or do not hold its value.
+    """
+    found = []
+    for name, text in case.design.variables.items():
+        key = f"design.variables.{name}"
+        if name in ("pressure", "storage", "strain"):
+            raise CaseError(f"{key} is given, and {name} is no number that a designer chooses.", key=key)
+        if name in PARAMETERS:
+            require_parameter(case, name)
+            own = design_value(case, name) if name in DESIGN else Mu.of(case)[name]
+            quantity = PARAMETERS[name].quantity
+            if own is None:
+                raise CaseError(f"{key} is given, and the valve has no one value of {name}; name keys of layers.", key)
+        else:
+            quantity, own = key_of(case, name, key)
+        try:
+            low, high = parse_span(text, quantity)
+        except ValueError as error:
+            raise CaseError(f"{key} is given as {text!r}, {error}; it must be LOW:HIGH.", key=key) from None
+        if not low <= own <= high:
+            raise CaseError(
+                f"{key} is given as {text!r}, and the case has {own:g} {quantity.si}".rstrip()
+                + ", which is not between them: a search begins at the case.",
+                key=key,
+            )
+        found.append(Variable(name, low, high, own, quantity.si))
+    return tuple(found)
+
+
+def statements_of(case: Case) -> tuple[Statement, ...]:
+    """Aim and constraints of a case, the aim first.
+
+    Raises
+    ------
+    CaseError
+        If variables or aim are missing, or nothing has a head.
+    """
+    if not case.design.variables:
+        raise CaseError(
+            'Nothing may change: give design.variables, such as { thickness = "0.7:1.4" }.', "design.variables"
+        )
+    if not case.design.aim:
+        raise CaseError("Nothing is aimed at: give design.aim, such as 'loss coefficient at 2 m down'.", "design.aim")
+    density = case.fluid.density
+    found = [parse_statement(case.design.aim, True, density)]
+    found += [parse_statement(text, False, density) for text in case.design.constraints]
+    if all(one.quantity in OF_THE_WALL for one in found):
+        raise CaseError("Aim and constraints name no head, at which the valve must open.", key="design.aim")
+    return tuple(found)
+
+
+@dataclass(frozen=True)
+class AtHead:
+    """What a valve does at a pressure: values by quantity, and their derivatives (n,) by the variables."""
+
+    values: dict[str, float]
+    slopes: dict[str, np.ndarray]
+
+
+class DesignProblem:
+    """Valves of a case between the bounds of its variables.
+
+    Parameters
+    ----------
+    case : Case
+    known : mapping, optional
+        Found earlier, by values of the variables and pressure: what the valve does, or the sentence why it does not.
+    """
+
+    def __init__(self, case: Case, known: Mapping[tuple, AtHead | str] = {}):
+        self.case, self.variables = case, variables_of(case)
+        self.known: dict[tuple, AtHead | str] = dict(known)
+        self._near: dict[float, np.ndarray] = {}
+        self._walk: tuple[tuple, StabilityWalk] | None = None
+
+    def values_at(self, share: np.ndarray) -> tuple[float, ...]:
+        """Values of the variables from their shares (n,) of the way between the bounds."""
+        return tuple(float(one.low + (one.high - one.low) * x) for one, x in zip(self.variables, share))
+
+    @property
+    def start(self) -> np.ndarray:
+        """Shares (n,) of the case itself."""
+        return np.array([(one.start - one.low) / (one.high - one.low) for one in self.variables])
+
+    def case_at(self, values: Sequence[float]) -> Case:
+        """Case with other values of the variables.
+
+        Raises
+        ------
+        CaseError
+            For values that do not go together.
+        """
+        case = self.case
+        for one, value in zip(self.variables, values):
+            if value != one.start:
+                case = redesigned(case, {one.name: value})
+        return case
+
+    def at(self, values: tuple[float, ...], pressure: float, margin: bool) -> AtHead:
+        """What the valve with these values does at a pressure.
+
+        Raises
+        ------
+        SolveError
+            If it does nothing that can be told: no steady state, or one that diverges.
+        """
+        key = (values, pressure, margin)
+        if key not in self.known:
+            try:
+                self.known[key] = self._solved(values, pressure, margin)
+            except (SolveError, CaseError, ValueError) as error:
+                self.known[key] = str(error)
+        found = self.known[key]
+        if isinstance(found, str):
+            raise SolveError(found)
+        return found
+
+    def opening(self, values: tuple[float, ...], pressure: float) -> float | None:
+        """Opening, m2, that was found with these values at a pressure; None where none was."""
+        for margin in (True, False):
+            found = self.known.get((values, pressure, margin))
+            if isinstance(found, AtHead):
+                return found.values["opening"]
+        return None
+
+    def _solved(self, values: tuple[float, ...], pressure: float, margin: bool) -> AtHead:
+        if self._walk is None or self._walk[0] != values:
+            self._walk = values, StabilityWalk(self.case_at(values), Observer())
+        walk = self._walk[1]
+        place = Mu.of(walk.case).at(pressure=pressure)
+        walk.settle(place, self._near.get(pressure))
+        q, model = walk.equilibrium(place), walk.built(place).model
+        self._near[pressure] = q
+        modes = self._modes(walk, place) if margin else ()
+        beside = Neighbourhood(model, q, pressure, place, modes, self.case.sensitivity.step)
+        found = {name: beside.performance[theirs] for name, theirs in _PERFORMANCE.items()}
+        if not np.isfinite(found["loss coefficient"]):
+            raise SolveError(f"Nothing flows at {pressure:.6g} Pa.")
+        slopes = {name: [] for name in found}
+        eigenvalues = np.array([mode.eigenvalue for mode in modes])
+        weights = np.zeros(0)
+        if margin:
+            found["margin"], weights = _aggregate(eigenvalues)
+            slopes["margin"] = []
+        for one, value in zip(self.variables, values):
+            slope = beside.slope(one.name)
+            turn = slope.value / value if value else 1.0  # of a factor that the changed case has taken over
+            for name, theirs in _PERFORMANCE.items():
+                slopes[name].append(turn * slope.performance[theirs])
+            if margin:
+                slopes["margin"].append(turn * float(weights @ _of_ratio(eigenvalues, np.array(slope.eigenvalues))))
+        return AtHead(found, {name: np.array(slope) for name, slope in slopes.items()})
+
+    def _modes(self, walk: StabilityWalk, place: Mu):
+        """Modes that the margin depends on, with left vectors.
+
+        Raises
+        ------
+        SolveError
+            If a motion grows without oscillating.
+        """
+        family = walk.family(place)
+        with name_state_in_failures(place.pressure):
+            found = leading_modes(family.at(place), walk.case.modes.count, replace(family.search(place), left=True))
+        growing = [value for value in found.eigenvalues if abs(value.imag) <= 1e-9 * abs(value) and value.real > 0]
+        if growing:
+            raise SolveError(f"The state at {place.pressure:.6g} Pa diverges, by {growing[0].real:.4g} 1/s.")
+        ratios = _ratios(found.eigenvalues)
+        near = ratios <= np.nanmin(ratios, initial=np.inf) + REACH
+        return [found.mode(i) for i in np.flatnonzero(near & (ratios < 1.0))]
+
+
+def _ratios(eigenvalues: np.ndarray) -> np.ndarray:
+    return -eigenvalues.real / np.abs(eigenvalues)
+
+
+def _of_ratio(eigenvalues: np.ndarray, slopes: np.ndarray) -> np.ndarray:
+    """Derivatives of damping ratios from those of eigenvalues."""
+    rate, turn, size = eigenvalues.real, eigenvalues.imag, np.abs(eigenvalues)
+    return -(turn**2 * slopes.real - rate * turn * slopes.imag) / size**3
+
+
+def _aggregate(eigenvalues: np.ndarray) -> tuple[float, np.ndarray]:
+    """Smooth least damping ratio, and the weights of the modes in its derivative; 1 where nothing oscillates."""
+    if not len(eigenvalues):
+        return 1.0, np.zeros(0)
+    ratios = _ratios(eigenvalues)
+    least = ratios.min()
+    shares = np.exp(-SHARPNESS * (ratios - least))
+    return float(least - np.log(shares.sum()) / SHARPNESS), shares / shares.sum()
+
+
+def together(statement: Statement, found: Sequence[AtHead]) -> tuple[float, np.ndarray]:
+    """Value of an aim over several heads and its derivatives (n,): their mean, of margins the smooth least one."""
+    values = np.array([one.values[statement.quantity] for one in found])
+    slopes = np.array([one.slopes[statement.quantity] for one in found])
+    if statement.quantity != "margin" or len(values) == 1:
+        return float(values.mean()), slopes.mean(axis=0)
+    shares = np.exp(-SHARPNESS * (values - values.min()))
+    value = values.min() - np.log(shares.sum()) / SHARPNESS
+    return float(value), shares @ slopes / shares.sum()

@@ -1,0 +1,238 @@
+"""Search for a design by sequential quadratic programming (Kraft 1988, DFVLR-FB 88-28; SLSQP of scipy).
+
+Spans of heads are asked at few heads first; where the design that is found fails between them, the worst head is added
+and the search goes on.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from contextlib import suppress
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...case.statement import Statement
+from ...errors import SolveError
+from .problem import AtHead, DesignProblem, together
+
+#: Constraint over its bound that still counts as held.
+HELD = 1e-5
+#: Rounds in which heads are added, and heads of a span that are looked at.
+ROUNDS, LOOK = 3, 13
+#: Change of the aim, over its size at the start, at which a search ends.
+GAIN = 1e-5
+#: Aim and constraints, over their sizes, by which a valve that cannot be computed seems worse: the step is cut to a
+#: tenth.
+FAR = 1e3
+
+
+class _Enough(Exception):
+    """As many valves were tried as may be."""
+
+
+@dataclass(frozen=True)
+class Design:
+    """A design that was found.
+
+    Attributes
+    ----------
+    values : tuple of float
+        Of the variables, SI.
+    aim : float
+    constraints : tuple of float
+        Least favourable value of each.
+    violation : float
+        Largest share of a bound, or of the value at the start where that is larger, by which it is missed; 0 where all
+        hold.
+    """
+
+    values: tuple[float, ...]
+    aim: float
+    constraints: tuple[float, ...]
+    violation: float
+
+    @property
+    def holds(self) -> bool:
+        return self.violation <= HELD
+
+
+class Search:
+    """Designs of a problem for an aim and constraints with one bound each.
+
+    Parameters
+    ----------
+    problem : DesignProblem
+    aim : Statement
+    constraints : sequence of Statement
+    tried : callable
+        Called with each `Design` that was tried, or the sentence why it could not be.
+    """
+
+    def __init__(
+        self,
+        problem: DesignProblem,
+        aim: Statement,
+        constraints: Sequence[Statement],
+        tried: Callable[[Design | str], None],
+    ):
+        self.problem, self.aim, self.constraints, self._tried = problem, aim, list(constraints), tried
+        self._seen: dict[tuple, tuple] = {}
+        self._sizes: dict[str, float] = {}  # what constraints are counted in, by their texts
+        self._latest: tuple | None = None  # valve of the last step that was one
+
+    def from_start(self, share: np.ndarray, evaluations: int) -> Design | None:
+        """Best design found from a start, given by shares (n,); None where no valve could be computed."""
+        best, tried = None, [share]
+        for _ in range(ROUNDS):
+            self._seen.clear()
+            best = self._optimised(self._first_that_holds(tried), evaluations)
+            if best is None or not self._add_worst_heads(best):
+                break
+            tried = [self.share(found[4]) for found in self._by_aim()] + [share]
+        return best
+
+    def _by_aim(self) -> list[tuple]:
+        """What was tried and held, the best aim first."""
+        held = [found for found in self._seen.values() if found is not None and found[4].holds]
+        return sorted(held, key=lambda found: found[0])
+
+    def _first_that_holds(self, shares: list[np.ndarray]) -> np.ndarray:
+        """First of some designs that holds at the heads asked; the last where none does."""
+        for share in shares[:-1]:
+            found = self._evaluated(share)
+            if found is not None and found[4].holds:
+                return share
+        return shares[-1]
+
+    def share(self, design: Design) -> np.ndarray:
+        return np.array([(x - one.low) / (one.high - one.low) for x, one in zip(design.values, self.problem.variables)])
+
+    def _optimised(self, share: np.ndarray, evaluations: int) -> Design | None:
+        from scipy.optimize import minimize
+
+        try:
+            scale, limit = self._scale(share), len(self._seen) + evaluations
+        except _Enough:
+            return None
+
+        def part(number: int, x: np.ndarray):
+            """One of what `_evaluated` gives; of a valve that is none, what makes any step to it too long."""
+            if len(self._seen) >= limit and self.problem.values_at(x) not in self._seen:
+                raise _Enough
+            found = self._evaluated(np.clip(x, 0.0, 1.0))
+            if found is not None:
+                self._latest = found
+                return (found[0] / scale, found[1] / scale, -found[2], -found[3])[number]
+            before = self._latest
+            return (before[0] / scale + FAR, before[1] / scale, -before[2] - FAR, -before[3])[number]
+
+        held = {"type": "ineq", "fun": lambda x: part(2, x), "jac": lambda x: part(3, x)}
+        with suppress(_Enough):
+            minimize(
+                lambda x: part(0, x),
+                np.clip(share, 0.0, 1.0),
+                jac=lambda x: part(1, x),
+                bounds=[(0.0, 1.0)] * len(share),
+                constraints=[held] if self.constraints else [],
+                method="SLSQP",
+                options={"ftol": GAIN, "maxiter": evaluations},
+            )
+        designs = [found[4] for found in self._seen.values() if found is not None]
+        held_ones = [design for design in designs if design.holds]
+        if held_ones:
+            return min(held_ones, key=lambda design: -self.aim.sign * design.aim)
+        return min(designs, key=lambda design: design.violation, default=None)
+
+    def _scale(self, share: np.ndarray) -> float:
+        """Size of the aim at the start.
+
+        Raises
+        ------
+        _Enough
+            If there is no valve to start from.
+        """
+        self._latest = self._evaluated(share)
+        if self._latest is None:
+            raise _Enough
+        return abs(self._latest[0]) or 1.0
+
+    def _rows(self, statements: Sequence[Statement]) -> list[tuple[Statement, float | None]]:
+        """Statements at their pressures, one by one."""
+        return [(one, p) for one in statements for p in (one.pressures or (None,))]
+
+    def _heads(self) -> dict[float, bool]:
+        """Pressures that are asked, and whether modes are."""
+        found: dict[float, bool] = {}
+        for one in (self.aim, *self.constraints):
+            for p in one.pressures:
+                found[p] = found.get(p, False) or one.quantity == "margin"
+        return found
+
+    def _evaluated(self, x: np.ndarray):
+        """Aim and its derivatives by the shares, constraints (c,) and theirs (c, n), and the design; None where a
+        valve is none.
+        """
+        values = self.problem.values_at(x)
+        if values not in self._seen:
+            try:
+                self._seen[values] = self._compute(values)
+                self._tried(self._seen[values][4])
+            except SolveError as error:
+                self._seen[values] = None
+                self._tried(str(error))
+        return self._seen[values]
+
+    def _compute(self, values: tuple[float, ...]):
+        heads = self._heads()
+        found = {p: self.problem.at(values, p, margin) for p, margin in heads.items()}
+        any_head = next(iter(found.values()))
+        widths = np.array([one.high - one.low for one in self.problem.variables])
+        asked = [found[p] for p in self.aim.pressures] or [any_head]
+        aim, slope = together(self.aim, asked)
+        values_, missed, slopes, worst = [], [], [], []
+        for one in self.constraints:
+            here = [found[p] for p in one.pressures] or [any_head]
+            values_ = np.array([at.values[one.quantity] for at in here])
+            (bound,) = one.bounds
+            size = self._sizes.setdefault(one.text, max(abs(bound), float(np.abs(values_).max())))
+            missed += list(one.sign * (bound - values_) / size)
+            slopes += [-one.sign * at.slopes[one.quantity] * widths / size for at in here]
+            worst.append(float(one.sign * np.min(one.sign * values_)))
+        violation = max([0.0, *missed])
+        design = Design(values, aim, tuple(worst), float(violation))
+        table = np.array(slopes).reshape(len(missed), len(widths))
+        return -self.aim.sign * aim, -self.aim.sign * slope * widths, np.array(missed), table, design
+
+    def _add_worst_heads(self, design: Design) -> bool:
+        """True where a span fails between its heads: the head where it fails most is added."""
+        added = False
+        for i, one in enumerate(self.constraints):
+            if not one.span:
+                continue
+            (bound,) = one.bounds
+            looked = [p for p in one.between(LOOK) if p not in one.pressures]
+            size = self._sizes[one.text]
+            missed = {p: one.sign * (bound - self._plain(design.values, p, one)) / size for p in looked}
+            worst = max(missed, key=missed.get, default=None)
+            if worst is not None and missed[worst] > HELD:
+                self.constraints[i] = one.asked_also_at(worst)
+                added = True
+        return added
+
+    def _plain(self, values: tuple[float, ...], pressure: float, statement: Statement) -> float:
+        try:
+            at: AtHead = self.problem.at(values, pressure, statement.quantity == "margin")
+        except SolveError:
+            return -statement.sign * np.inf
+        return at.values[statement.quantity]
+
+
+def starts_of(problem: DesignProblem, count: int) -> list[np.ndarray]:
+    """Shares (n,) of designs to start from: the case itself, then a scrambled Sobol sequence between the bounds."""
+    from scipy.stats import qmc
+
+    found = [problem.start]
+    if count > 1:
+        found += list(qmc.Sobol(len(problem.start), seed=1).random_base2((count - 1).bit_length())[: count - 1])
+    return found

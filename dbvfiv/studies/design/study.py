@@ -1,0 +1,346 @@
+"""Designs: run, storage, and what can be read off a run or its file."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import asdict, replace
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from ...case.parameters import Mu
+from ...case.statement import QUANTITIES, Statement
+from ...case.write import case_toml
+from ...errors import CaseError, SolveError
+from ...observer import Observer
+from ...record.mesh import MeshData
+from ...record.record import GrowingRecord, Record
+from ...record.table import Column, TableSpec
+from ..case import Case
+from ..result import StudyResult
+from ..session import Session
+from ..stability.place import check_scan
+from ..stability.verdict import OUTCOMES, STABLE
+from ..stability.walk import StabilityWalk
+from ..study import Study, nothing_to_resume
+from . import figures
+from .problem import AtHead, DesignProblem, Variable, statements_of, variables_of
+from .search import LOOK, Design, Search, starts_of
+
+DESIGNS, VERIFIED, _STATE, _DESIGN = "designs", "verified", "state", "design"
+#: Number of a design in tables: the case itself.
+CASE = -1
+_DESIGNS = (
+    Column("design", "", "Number of the bound it was sought for", "i8"),
+    Column("start", "", "Number of the start", "i8"),
+    Column("bound", "SI", "Bound that the front goes over"),
+    Column("aim", "SI", "What was aimed at"),
+    Column("violation", "", "Largest share by which a bound is missed"),
+)
+_VERIFIED = (
+    Column("design", "", f"Number of the design; {CASE} for the case itself", "i8"),
+    Column("pressure", "Pa", "Inlet pressure"),
+    Column("outcome", "", f"Verdict: {', '.join(f'{i} {name}' for i, name in enumerate(OUTCOMES))}", "i8"),
+    Column("margin", "", "Least damping ratio"),
+    Column("flow", "m^3/s", "Volume flow"),
+    Column("opening", "m^2", "Area between the lips"),
+    Column("loss_coefficient", "", "Head loss over the velocity head at the flange"),
+)
+_TABLES = TableSpec(DESIGNS, _DESIGNS), TableSpec(VERIFIED, _VERIFIED)
+
+
+def tables_of(_mesh: MeshData) -> tuple[TableSpec, ...]:
+    """Tables of a result: designs, and verdicts on the best ones on a finer mesh."""
+    return _TABLES
+
+
+def rows_to_keep(known: Record, _case: Case) -> dict[str, int]:
+    """Rows that a run goes on from: none, because designs follow from the states, which are kept.
+
+    Raises
+    ------
+    CaseError
+        If the run is complete.
+    """
+    if known.complete:
+        raise nothing_to_resume("design", known.path)
+    return {DESIGNS: 0, VERIFIED: 0}
+
+
+def run(session: Session, record: GrowingRecord, cases: Path | None = None) -> None:
+    """Designs for the aim and constraints of `design` of the case.
+
+    Parameters
+    ----------
+    cases : Path, optional
+        Folder for the case file of each design.
+
+    Raises
+    ------
+    CaseError
+        For variables or statements that cannot be used.
+    """
+    case = session.case
+    check_scan(case)
+    if case.has_pump:
+        raise CaseError("Behind a pump a head is no input; give drive.pressure and no upstream.pump.", "upstream.pump")
+    aim, *constraints = statements_of(case)
+    problem = DesignProblem(case, _known(record))
+    _keep_states(problem, record)
+    bounds = max((one.bounds for one in constraints), key=len, default=(np.nan,))
+    starts = starts_of(problem, case.design.starts)
+    record.begin("design", len(bounds) * len(starts) * case.design.evaluations)
+    best: Design | None = None
+    for number, bound in enumerate(bounds):
+        asked = [replace(one, bounds=(bound,)) if len(one.bounds) > 1 else one for one in constraints]
+        found: list[Design] = []
+        for i, share in enumerate(starts):
+            search = Search(problem, aim, asked, lambda one: _tell(one, record))
+            if i == 0 and best is not None:
+                share = search.share(best)
+            design = search.from_start(share, case.design.evaluations)
+            if design is None:
+                record.fail(f"From start {i + 1} no valve could be computed.")
+                continue
+            found.append(design)
+            record.note(_DESIGN, design=number, start=i, **asdict(design))
+            row = {"design": number, "start": i, "bound": bound, "aim": design.aim, "violation": design.violation}
+            record.append(DESIGNS, row)
+        best = _best(found, aim) if found else None
+        if best is None:
+            continue
+        if not best.holds:
+            record.warn(
+                f"No design holds all constraints{_for(bound, bounds)}: the nearest misses one by {best.violation:.2%}."
+            )
+        if cases is not None:
+            _write(problem.case_at(best.values), cases / f"design-{number + 1}.toml", best)
+    result = DesignResult(record, session)
+    for number, design in [(CASE, None), *result.best.items()]:
+        _verify(problem, case, number, design, result.pressures, record)
+
+
+def _for(bound: float, bounds) -> str:
+    return f" with the bound {bound:g}" if len(bounds) > 1 else ""
+
+
+def _best(found: list[Design], aim: Statement) -> Design:
+    """Design that holds and aims best, or misses least."""
+    return min(found, key=lambda one: (0.0, -aim.sign * one.aim) if one.holds else (one.violation, 0.0))
+
+
+def _tell(tried: Design | str, record: GrowingRecord) -> None:
+    if isinstance(tried, str):
+        record.progress(f"a step back: {tried}")
+    else:
+        record.progress(f"aim {tried.aim:.4g}, constraints missed by {tried.violation:.2%}")
+        record.item(tried)
+
+
+def _known(record: GrowingRecord) -> dict[tuple, AtHead | str]:
+    """States of an interrupted attempt."""
+    found: dict[tuple, AtHead | str] = {}
+    for note in record.notes(_STATE):
+        key = tuple(note["values"]), note["pressure"], note["margin"]
+        known = note["found"]
+        slopes = {} if isinstance(known, str) else {name: np.array(slope) for name, slope in note["slopes"].items()}
+        found[key] = known if isinstance(known, str) else AtHead(known, slopes)
+    return found
+
+
+def _keep_states(problem: DesignProblem, record: GrowingRecord) -> None:
+    """Keep each state in the record as soon as it is known."""
+
+    class Kept(dict):
+        def __setitem__(self, key, found):
+            values, pressure, margin = key
+            told = found if isinstance(found, str) else found.values
+            slopes = {} if isinstance(found, str) else {name: list(map(float, s)) for name, s in found.slopes.items()}
+            record.note(_STATE, values=list(values), pressure=pressure, margin=margin, found=told, slopes=slopes)
+            super().__setitem__(key, found)
+
+    problem.known = Kept(problem.known)
+
+
+def _write(case: Case, path: Path, design: Design) -> None:
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_text(case_toml(case, comments=False) + "\n")
+
+
+#: Difference of an opening between the meshes above which it is said.
+APART = 0.1
+
+
+def _verify(problem: DesignProblem, case: Case, number: int, design: Design | None, pressures, record) -> None:
+    """Counted verdicts on a valve at all heads, on a finer mesh, its states from rest."""
+    case = case if design is None else problem.case_at(design.values)
+    finer, mesh = case.design.finer, case.mesh
+    changes = {"mesh.around": round(finer * mesh.around), "mesh.along": round(finer * mesh.along)}
+    walk = StabilityWalk(case.replace(changes), Observer())
+    for pressure in pressures:
+        record.progress(f"verdict at {pressure:.6g} Pa on {finer:g} times the elements each way")
+        place = Mu.of(case).at(pressure=pressure)
+        try:
+            state, verdict = walk.state(place), walk.verdict(place)
+        except SolveError as error:
+            record.fail(f"Design {number + 1} could not be verified: {error}" if number >= 0 else str(error))
+            continue
+        loss = state.hydraulics.loss_coefficient if state.hydraulics else np.nan
+        row = {"design": number, "pressure": pressure, "outcome": OUTCOMES.index(verdict.outcome)}
+        row |= {"margin": verdict.damping_ratio, "flow": state.volume_flow, "opening": state.outlet_area}
+        record.append(VERIFIED, row | {"loss_coefficient": loss})
+        sought = None if design is None else problem.opening(design.values, pressure)
+        if sought is not None and abs(state.outlet_area / sought - 1) > APART:
+            record.warn(
+                f"Design {number + 1} opens to {1e4 * sought:.4g} cm2 at {pressure:.6g} Pa in the search and to "
+                f"{1e4 * state.outlet_area:.4g} cm2 from rest on the finer mesh: the mesh is too coarse, or the valve "
+                "has several steady states there."
+            )
+
+
+class DesignResult(StudyResult):
+    """Designs for an aim and constraints.
+
+    Attributes
+    ----------
+    variables : tuple of Variable
+    statements : tuple of Statement
+        The aim, then the constraints.
+    best : dict of Design
+        By the number of the bound of the front; one, 0, where there is no front.
+
+    Examples
+    --------
+    >>> found = dbvfiv.load("my.toml").design()                             # doctest: +SKIP
+    >>> found.best[0].values, found.best[0].holds                           # doctest: +SKIP
+    """
+
+    kind = "design"
+
+    @cached_property
+    def variables(self) -> tuple[Variable, ...]:
+        return variables_of(self.case)
+
+    @cached_property
+    def statements(self) -> tuple[Statement, ...]:
+        return statements_of(self.case)
+
+    @property
+    def bounds(self) -> tuple[float, ...]:
+        """Bounds of the front; NaN alone without constraints."""
+        return max((one.bounds for one in self.statements[1:]), key=len, default=(np.nan,))
+
+    @cached_property
+    def pressures(self) -> list[float]:
+        """Inlet pressures, Pa, at which designs are verified: those asked, and some between in each span."""
+        return sorted({p for one in self.statements for p in one.between(LOOK)})
+
+    @property
+    def found(self) -> list[dict[str, Any]]:
+        """Designs from each start: ``design``, ``start`` and what `Design` holds; the last attempt's."""
+        known = {(note["design"], note["start"]): note for note in self.record.notes(_DESIGN)}
+        return list(known.values())
+
+    @property
+    def best(self) -> dict[int, Design]:
+        found: dict[int, list[Design]] = {}
+        for note in self.found:
+            design = Design(tuple(note["values"]), note["aim"], tuple(note["constraints"]), note["violation"])
+            found.setdefault(note["design"], []).append(design)
+        return {number: _best(designs, self.statements[0]) for number, designs in found.items()}
+
+    def case_of(self, number: int = 0) -> Case:
+        """Case of a design."""
+        return DesignProblem(self.case).case_at(self.best[number].values)
+
+    def verified(self, number: int) -> dict[str, np.ndarray]:
+        """Columns of the verdicts on a design by pressure; `CASE` for the case itself."""
+        rows = {column.name: self.record.column(VERIFIED, column.name) for column in _VERIFIED}
+        here = np.flatnonzero(rows["design"] == number)
+        here = here[np.argsort(rows["pressure"][here])]
+        return {name: column[here] for name, column in rows.items()}
+
+    def evidence(self, number: int) -> str:
+        """What the finer mesh says of a design, as a sentence."""
+        rows = self.verified(number)
+        if not len(rows["pressure"]):
+            return "not verified"
+        unstable = [
+            f"{OUTCOMES[outcome]} at {p:.4g} Pa"
+            for p, outcome in zip(rows["pressure"], rows["outcome"])
+            if OUTCOMES[outcome] != STABLE
+        ]
+        if unstable:
+            return ", ".join(unstable)
+        return f"stable at {len(rows['pressure'])} heads, margin at least {100 * np.nanmin(rows['margin']):.3g} %"
+
+    def summary(self) -> dict[str, Any]:
+        aim, *constraints = self.statements
+        best = self.best
+
+        def told(number: int, design: Design) -> dict[str, Any]:
+            rows = self.verified(number)
+            return {
+                "bound": self.bounds[number] if self.bounds[number] == self.bounds[number] else None,
+                "values": dict(zip((one.name for one in self.variables), design.values)),
+                "aim": design.aim,
+                "constraints": dict(zip((one.text for one in constraints), design.constraints)),
+                "holds": design.holds,
+                "violation": design.violation,
+                "verified": {name: column.tolist() for name, column in rows.items() if name != "design"}
+                | {"outcome": [OUTCOMES[i] for i in rows["outcome"]]},
+            }
+
+        started = self.verified(CASE)
+        return {
+            "variables": [asdict(one) for one in self.variables],
+            "aim": aim.text,
+            "constraints": [one.text for one in constraints],
+            "designs": [told(number, design) for number, design in best.items()],
+            "starts": [{k: v for k, v in note.items() if k != "what"} for note in self.found],
+            "case": {name: column.tolist() for name, column in started.items() if name not in ("design", "outcome")}
+            | {"outcome": [OUTCOMES[i] for i in started["outcome"]]},
+            "states": len(self.record.notes(_STATE)),
+        } | self.ending()
+
+    def lines(self) -> list[str]:
+        aim, *constraints = self.statements
+        lines = [f"Aim: {aim.text}; {'; '.join(one.text for one in constraints) or 'no constraints'}."]
+        for number, design in self.best.items():
+            front = len(self.bounds) > 1
+            lines.append(f"Design {number + 1}{_for(self.bounds[number], self.bounds) if front else ''}:")
+            for one, value in zip(self.variables, design.values):
+                change = f"{100 * (value / one.start - 1):+.1f} %" if one.start else ""
+                lines.append(f"  {one.name:<34}{one.start:12.5g} -> {value:<12.5g}{one.unit:<8}{change}")
+            lines.append(f"  {aim.quantity:<34}{'':12}    {_shown(aim.quantity, design.aim)}")
+            for one, value in zip(constraints, design.constraints):
+                lines.append(f"  {one.text:<60} {_shown(one.quantity, value)}")
+            lines.append(
+                f"  {'all constraints hold' if design.holds else f'a constraint is missed by {design.violation:.2%}'}"
+            )
+            lines.append(f"  on the finer mesh: {self.evidence(number)}")
+        if len(self.verified(CASE)["pressure"]):
+            lines.append(f"The case itself on the finer mesh: {self.evidence(CASE)}.")
+        return lines
+
+    def drawers(self) -> Iterator[tuple[str, Callable[[], Figure]]]:
+        yield from figures.draw(self)
+
+    def shortfall(self) -> str | None:
+        missed = [number for number, design in self.best.items() if not design.holds]
+        missing = len(self.bounds) - len(self.best)
+        if self.complete and missing:
+            return f"{missing} of {len(self.bounds)} designs were not found"
+        return f"{len(missed)} of {len(self.bounds)} designs miss a constraint" if missed else None
+
+
+def _shown(quantity: str, value: float) -> str:
+    row = QUANTITIES[quantity]
+    text = row.show(float(f"{value:.5g}"))
+    return text if isinstance(text, str) and row.shown else f"{value:.5g}"
+
+
+STUDY = Study("design", tables_of, run, DesignResult, rows_to_keep=rows_to_keep)

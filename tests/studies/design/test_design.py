@@ -1,0 +1,124 @@
+"""Designs of a small valve: gradients of margin, loss and mass; run, file, interruption, case file, sentences."""
+
+import numpy as np
+import pytest
+
+import dbvfiv
+from dbvfiv.errors import CaseError
+from dbvfiv.studies.design.problem import DesignProblem, together
+from dbvfiv.studies.design.study import CASE
+from tests.observers import Stop
+from tests.small_valves import load_small
+
+KEYS = {"fluid.density": 20.0, "damping.beta": 3e-3, "design.evaluations": 4, "design.finer": 1}
+VARIABLES = {"thickness": "0.7:1.4", "valve.lip_half_width": "115 mm:130 mm", "layers.2.angle": "30 deg:70 deg"}
+AIM, CONSTRAINTS = "loss coefficient at 6 kPa down", ["margin at 6 kPa, 9 kPa at least 1 %", "mass at most 8 kg"]
+ASKED = {"design.variables": VARIABLES, "design.aim": AIM, "design.constraints": CONSTRAINTS}
+
+
+@pytest.fixture(scope="module")
+def valve():
+    return load_small(KEYS)
+
+
+@pytest.fixture(scope="module")
+def found(valve, tmp_path_factory):
+    folder = tmp_path_factory.mktemp("design")
+    return valve.design(VARIABLES, aim=AIM, constraints=CONSTRAINTS, cases=folder, output=folder / "d.h5")
+
+
+LOSSY = {
+    "damping.model": "loss factor",
+    "damping.beta": 0,
+    "materials.constants": "stable",
+    "fluid.continuity": "storage",
+}
+
+
+@pytest.mark.parametrize("changes", [{}, LOSSY])
+def test_gradients_are_those_of_valves_solved_anew(changes):
+    """Away from the case itself, for a factor and lengths alike, both flow models, with and without loss factors."""
+    problem = DesignProblem(load_small(KEYS, ASKED, changes).case)
+    share = np.array([0.35, 0.55, 0.3])
+    here = problem.at(problem.values_at(share), 6e3, True)
+    for i, one in enumerate(problem.variables):
+        step = np.zeros(3)
+        step[i] = 2e-4
+        far, near = ([problem.at(problem.values_at(share + k * s * step), 6e3, True) for s in (1, -1)] for k in (2, 1))
+        for name, slope in here.slopes.items():
+            width = 2 * step[i] * (one.high - one.low)
+            simple, wide = ((a.values[name] - b.values[name]) / width for a, b in (near, far))
+            direct, size = (4 * simple - wide / 2) / 3, abs(here.values[name]) / (one.high - one.low)
+            assert slope[i] == pytest.approx(direct, rel=2e-6, abs=2e-6 * size), (one.name, name)
+
+
+def test_the_design_is_better_and_holds(valve, found):
+    design = found.best[0]
+    start = DesignProblem(found.case).at(tuple(one.start for one in found.variables), 6e3, True)
+    assert design.holds and design.aim < 0.9 * start.values["loss coefficient"]
+    assert design.constraints[0] >= 0.01 - 1e-6 and design.constraints[1] <= 8.0
+    rows = found.verified(0)
+    assert list(rows["pressure"]) == [6e3, 9e3] and (rows["margin"] >= 0.01 - 1e-6).all()
+    assert rows["loss_coefficient"][0] == pytest.approx(design.aim, rel=1e-6)
+    assert "stable at 2 heads" in found.evidence(0) and len(found.verified(CASE)["pressure"]) == 2
+
+
+def test_the_case_file_is_the_design(found):
+    case = dbvfiv.load(found.path.parent / "design-1.toml").case
+    assert case.valve.lip_half_width == pytest.approx(found.best[0].values[1], rel=1e-12)
+    assert case.valve.thickness_factor == pytest.approx(found.best[0].values[0], rel=1e-12)
+    modes = dbvfiv.load(found.path.parent / "design-1.toml").modes("9 kPa")
+    assert modes.verdict.damping_ratio == pytest.approx(found.verified(0)["margin"][1], rel=1e-6)
+
+
+def test_the_file_says_the_same_and_draws(found):
+    stored = dbvfiv.load_result(found.path)
+    assert stored.summary() == found.summary() and stored.lines() == found.lines()
+    assert set(stored.figures()) == {"heads"}
+
+
+@pytest.mark.slow
+def test_an_interrupted_run_goes_on(valve, found, tmp_path):
+    path = tmp_path / "d.h5"
+    part = valve.design(VARIABLES, aim=AIM, constraints=CONSTRAINTS, output=path, observer=Stop(2))
+    assert not part.complete and not part.best
+    again = dbvfiv.resume(path)
+    assert again.complete and again.best[0].values == pytest.approx(found.best[0].values, rel=1e-6)
+
+
+@pytest.mark.slow
+def test_a_front_goes_over_the_bounds(valve):
+    constraints = ["mass at most 7 kg:9 kg:3"]
+    front = valve.design({"thickness": "0.7:1.4"}, aim="flow at 6 kPa down", constraints=constraints)
+    masses = [design.constraints[0] for design in front.best.values()]
+    assert masses == pytest.approx([7.0, 8.0, 9.0], rel=1e-3)  # the heavier, the stiffer, the less flows
+    flows = [design.aim for design in front.best.values()]
+    assert flows[0] > flows[1] > flows[2] and set(front.figures()) == {"heads", "front"}
+
+
+def test_several_heads_of_an_aim_count_together(valve):
+    problem = DesignProblem(load_small(KEYS, ASKED).case)
+    values = tuple(one.start for one in problem.variables)
+    pair = [problem.at(values, p, True) for p in (6e3, 9e3)]
+    statement = type("S", (), {"quantity": "margin"})
+    value, _ = together(statement, pair)
+    assert value <= min(one.values["margin"] for one in pair)
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({"design.variables": {}}, "Nothing may change"),
+        ({"design.aim": ""}, "Nothing is aimed at"),
+        ({"design.variables": {"thicknes": "0.7:1.4"}}, "neither a parameter"),
+        ({"design.variables": {"thickness": "1.1:1.4"}}, "not between them"),
+        ({"design.variables": {"thickness": "thin:thick"}}, "must be LOW:HIGH"),
+        ({"design.variables": {"pressure": "1 kPa:2 kPa"}}, "no number that a designer chooses"),
+        ({"design.aim": "mass down", "design.constraints": ["mass at most 3 kg"]}, "name no head"),
+        ({"design.aim": "drag at 2 m down"}, "cannot be read"),
+        ({"design.constraints": ["mass at most 3 kg:4 kg:2", "margin at 1 m at least 1 %:2 %:2"]}, "more than one"),
+    ],
+)
+def test_what_cannot_be_asked_is_said(changes, words):
+    with pytest.raises(CaseError, match=words):
+        load_small(KEYS, ASKED, changes).design()
