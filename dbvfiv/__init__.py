@@ -29,6 +29,7 @@ _PUBLIC = {
     "MapResult": "studies.map.study",
     "ModesResult": "studies.modes.study",
     "OnsetResult": "studies.onset.study",
+    "ResponseResult": "studies.response.study",
     "SensitivityResult": "studies.sensitivity.study",
     "State": "studies.state",
     "SteadyResult": "studies.steady.study",

@@ -13,6 +13,7 @@ from .studies.levels.study import LevelsResult as LevelsResult
 from .studies.map.study import MapResult as MapResult
 from .studies.modes.study import ModesResult as ModesResult
 from .studies.onset.study import OnsetResult as OnsetResult
+from .studies.response.study import ResponseResult as ResponseResult
 from .studies.sensitivity.study import SensitivityResult as SensitivityResult
 from .studies.session import load_result as load_result
 from .studies.state import State as State

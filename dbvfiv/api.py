@@ -23,6 +23,7 @@ from .studies.design.study import DesignResult
 from .studies.map.study import MapResult
 from .studies.modes.study import ModesResult
 from .studies.onset.study import OnsetResult
+from .studies.response.study import ResponseResult
 from .studies.sensitivity.study import SensitivityResult
 from .studies.session import Session, named_changes
 from .studies.state import State, sensitivity_keys
@@ -245,6 +246,29 @@ class Valve:
             As for `modes`; also pressure.
         """
         return self._ask(sensitivity_keys(of, mode), changes).perform("sensitivity", output, observer or bar())
+
+    def response(
+        self,
+        over: Range | None = None,
+        *,
+        noise: float | str | None = None,
+        output: Output = None,
+        observer: Observer | None = None,
+        **changes: Any,
+    ) -> ResponseResult:
+        """Lip motion, flow and pressure per pressure at the inlet over frequency, and under pressure noise.
+
+        Parameters
+        ----------
+        over : str or mapping, optional
+            Range as for `onset`, at whose values the response is asked; response.over of the case by default.
+        noise : float or str, optional
+            Root mean square of white pressure noise, Pa.
+        output, observer, changes
+            As for `modes`; also pressure.
+        """
+        asked = {"response.over": write_axis(over), "response.noise": noise}
+        return self._ask(asked, changes).perform("response", output, observer or bar())
 
     def closure(
         self,

@@ -17,6 +17,7 @@ KINDS = (
     "map",
     "uncertainty",
     "design",
+    "response",
     "transient",
     "cycle",
     "closure",

@@ -1,0 +1,1 @@
+"""Forced response of a steady state to the pressure at its inlet."""

@@ -1,0 +1,134 @@
+"""Forced response against runs in time, against the full operator and against the closed form of one mode."""
+
+import json
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+import dbvfiv
+from dbvfiv.case.parameters import Mu
+from dbvfiv.studies.response.transfer import OUTPUTS, Transfer
+from dbvfiv.studies.stability.walk import StabilityWalk
+from tests.small_valves import load_small
+
+RAYLEIGH = {"damping.alpha": 5.0, "damping.beta": 0.001}
+LOSS = {"damping.model": "loss factor", "materials.constants": "stable", "damping.alpha": 0.0, "damping.beta": 0.0}
+#: Stable states under both flow models, with either damping.
+STATES = {
+    "storage-rayleigh": {"fluid.continuity": "storage", "drive.pressure": 6e3, **RAYLEIGH},
+    "storage-loss": {"fluid.continuity": "storage", "drive.pressure": 6e3, **LOSS},
+    "quasi-steady-rayleigh": {
+        "fluid.continuity": "quasi-steady",
+        "drive.pressure": 6e3,
+        **RAYLEIGH,
+        "damping.beta": 0.003,
+    },
+    "quasi-steady-loss": {"fluid.continuity": "quasi-steady", "drive.pressure": 20e3, **LOSS, "damping.alpha": 10.0},
+}
+FREQUENCIES = np.arange(1, 241) * 0.5
+
+
+def transfer_of(case, frequencies=FREQUENCIES):
+    walk, place = StabilityWalk(case), Mu.of(case)
+    assert walk.verdict(place).stable, "a state that is stable is needed"
+    return Transfer(walk.family(place).linear, place, frequencies)
+
+
+@pytest.fixture(scope="module", params=STATES)
+def valve(request):
+    case = load_small(STATES[request.param], {"fluid.density": 1000.0}).case
+    return SimpleNamespace(case=case, transfer=transfer_of(case))
+
+
+def in_time(case, folder, time, pressure, step, duration):
+    table = folder / "drive.csv"
+    np.savetxt(table, np.column_stack([time, pressure]), delimiter=",", header="time [s],pressure [Pa]", comments="")
+    keys = {"drive_table": str(table), "start": "steady", "step": step, "duration": duration}
+    return dbvfiv.load(case, {f"transient.{name}": value for name, value in keys.items()}).transient().history
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("frequency", [3.0, 12.0, 25.0])
+def test_a_sine_in_time_has_the_amplitude_and_the_phase(valve, tmp_path, frequency):
+    inlet, amplitude = valve.case.drive.pressure, 5.0
+    step, duration = 1 / frequency / 200, max(12 / frequency, 1.2)
+    time = np.arange(0.0, duration, step / 2)
+    pressure = inlet + amplitude * np.sin(2 * np.pi * frequency * time)
+    history = in_time(valve.case, tmp_path, time, pressure, step, duration - step)
+    t = history["time"]
+    late = t > t[-1] - 4 / frequency
+    turn = 2 * np.pi * frequency * t[late]
+    columns = np.column_stack([np.sin(turn), np.cos(turn), np.ones(len(turn)), turn])
+    (found,) = valve.transfer.at([frequency])
+    for name, number, scale in (("lip_displacement", 0, 1.0), ("outlet_area", 1, 1.0), ("mass_flow", 2, 1e3)):
+        sine, cosine, *_ = np.linalg.lstsq(columns, history[name][late], rcond=None)[0]
+        ratio = (sine + 1j * cosine) / amplitude / scale / found[number]
+        assert abs(abs(ratio) - 1) < 0.01 and abs(np.angle(ratio, deg=True)) < 1.0, name
+
+
+@pytest.mark.slow
+def test_noise_in_time_has_the_root_mean_square(valve, tmp_path):
+    inlet, sigma, step, duration = valve.case.drive.pressure, 10.0, 1e-3, 20.0
+    time = np.arange(0.0, duration + 4 * step, 4 * step)  # straight between values at random
+    random = sigma * np.random.default_rng(7).standard_normal(len(time))
+    history = in_time(valve.case, tmp_path, time, inlet + random, step, duration)
+    kept = history["time"] > 1.0
+    spread = valve.transfer.spread(lambda f: 2 * sigma**2 * 4 * step * np.sinc(f * 4 * step) ** 4)
+    # the same noise through the response, which leaves no scatter of one sample
+    fine = np.arange(0.0, duration, step)
+    spectrum = np.fft.rfft(np.interp(fine, time, random))
+    grid = np.fft.rfftfreq(len(fine), step)
+    inside = (grid >= FREQUENCIES[0]) & (grid <= FREQUENCIES[-1])
+    passed = np.zeros((len(grid), len(OUTPUTS)), complex)
+    passed[inside] = spectrum[inside, None] * valve.transfer.at(grid[inside])
+    expected = np.fft.irfft(passed, len(fine), axis=0)[fine > 1.0].std(axis=0)
+    for name, number, scale in (("lip_displacement", 0, 1.0), ("mass_flow", 2, 1e3)):
+        rms = history[name][kept].std() / scale
+        print(f"{name}: {rms / expected[number]:.4f} of the same noise, {rms / spread.rms[number]:.4f} of its spectrum")
+        assert rms == pytest.approx(expected[number], rel=0.05)
+
+
+def test_the_reduced_operator_is_the_full_one():
+    transfer = transfer_of(load_small(STATES["storage-rayleigh"], {"fluid.density": 1000.0}).case, FREQUENCIES[:160:4])
+    assert transfer.error < 1e-5 and transfer.size < 60
+    for frequency in (0.9, 17.3, 44.4, 63.6):
+        full = transfer.full(frequency)[0]
+        assert np.abs(transfer.at([frequency])[0] / full - 1).max() < 1e-5
+
+
+@pytest.mark.slow
+def test_the_static_response_is_the_slope_of_the_steady_states():
+    case = load_small(STATES["storage-rayleigh"], {"fluid.density": 1000.0}).case
+    low, high = (dbvfiv.load(case).steady(pressure=pressure) for pressure in (5990.0, 6010.0))
+    slopes = [(getattr(high, n) - getattr(low, n)) / 20 for n in ("lip_displacement", "volume_flow")]
+    assert transfer_of(case, FREQUENCIES[:32]).full(0.0)[0][[0, 2]] == pytest.approx(slopes, rel=2e-3)
+
+
+def test_variance_and_correlation_time_of_one_mode_are_those_of_its_formula(monkeypatch):
+    """One oscillator under white noise: variance S / (8 zeta w^3), S one-sided per Hz; correlation time 1 / decay."""
+    w, zeta = 2 * np.pi * 20.0, 0.01
+    transfer = object.__new__(Transfer)
+    transfer.frequencies = np.array([0.01, 400.0])
+    at = lambda f: (1.0 / (w**2 - (2 * np.pi * f) ** 2 + 2j * zeta * w * 2 * np.pi * f))[:, None]  # noqa: E731
+    monkeypatch.setattr(transfer, "at", at)
+    monkeypatch.setattr(transfer, "modes", lambda: np.array([w * complex(-zeta, np.sqrt(1 - zeta**2))]))
+    found = transfer.spread(lambda f: np.full_like(f, 3.0))
+    assert found.rms[0] ** 2 == pytest.approx(3.0 / (8 * zeta * w**3), rel=1e-3)
+    assert found.correlation_time[0] == pytest.approx(1 / (zeta * w), rel=1e-2)
+
+
+def test_the_command_tells_peaks_precursors_and_states_that_flutter(tmp_path, command_line):
+    size = ("--set", "mesh.around=6", "--set", "mesh.along=8", "--set", "response.count=64")
+    given = ("--over", "density=100:1000:3", "-p", "6 kPa", "--max-frequency", "60 Hz", "-o", tmp_path / "found.h5")
+    told = command_line("response", "cases/dbv12.toml", *size, *given, "--plots", tmp_path, "--json")
+    document = json.loads(told.out)
+    assert told.status == 1 and len(document["failures"]) == 1 and "is not stable" in document["failures"][0]
+    first, second = document["points"]
+    assert first["value"] == 550 and second["value"] == 1000
+    assert first["lip_displacement_rms"] > second["lip_displacement_rms"]  # the onset lies at lower densities
+    assert len(first["curve"]["frequency"]) == 64 and first["peaks"][0]["frequency"] > 0
+    assert {path.name for path in tmp_path.glob("*.png")} == {"response.png", "precursors.png"}
+    assert dbvfiv.load_result(tmp_path / "found.h5").summary()["points"][0]["peaks"] == first["peaks"]
+    still = command_line("response", "cases/dbv12.toml", *size, "--set", "fluid.unsteady=false", "-p", "6 kPa")
+    assert still.status == 2 and "needs a fluid with inertia" in still.err.replace("\n", " ")
