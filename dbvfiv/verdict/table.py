@@ -87,6 +87,9 @@ _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eEdD][+-]?\d+)?")
 _MISSING = {"", "nan", "+nan", "-nan", "na", "n/a", "#n/a", "#na", "null", "none", "-", "--", "inf", "+inf", "-inf"}
 #: Dates with a time of day, as ISO 8601 and control systems write them.
 _DATE = re.compile(r"\d{1,4}[-./]\d{1,2}[-./]\d{1,4}[T ]\s*\d{1,2}:\d{2}")
+#: A date and a time of day in columns of their own.
+_DAY = re.compile(r"\d{1,4}[-./]\d{1,2}[-./]\d{1,4}")
+_CLOCK = re.compile(r"\d{1,2}:\d{2}(:\d{2}([.,]\d+)?)?(\s*[AP]M)?", re.IGNORECASE)
 _DAYS = ("%Y-%m-%d", "%Y/%m/%d", "%d.%m.%Y", "%m/%d/%Y", "%d/%m/%Y", "%d-%m-%Y")
 _CLOCKS = ("%H:%M:%S.%f", "%H:%M:%S", "%H:%M", "%I:%M:%S %p", "%I:%M:%S.%f %p")
 #: Numbers beyond this are no measurement, and their squares would overflow.
@@ -189,6 +192,8 @@ def read_table(path: str | Path) -> Table:
         raise ValueError("it holds no numbers")
     separator, decimal = _format_of([line.split("#")[0] for _, line in bodies])
     rows = [(number, _cells(line.split("#")[0], separator)) for number, line in bodies]
+    parted = _parted_dates(rows)
+    rows = [(number, _joined(cells, parted)) for number, cells in rows]
     numbers = [[_number(cell, decimal) for cell in cells] for _, cells in rows]
     first = next((i for i, row in enumerate(numbers) if _is_data(row)), None)
     if first is None:
@@ -197,7 +202,7 @@ def read_table(path: str | Path) -> Table:
     head = [_cells(line, separator) for _, line in bodies[:first]]
     if not head:
         head = [_cells(line.lstrip("# "), separator) for line in lines[: bodies[0][0] - 1] if line.startswith("#")]
-    names, units = _header(head, width)
+    names, units = _header([_joined(cells, parted) for cells in head], width)
     values, texts = np.full((len(rows) - first, width), np.nan), {}
     for i, ((_, cells), row) in enumerate(zip(rows[first:], numbers[first:])):
         fits = len(row) <= width or not any(cell.strip() for cell in cells[width:])
@@ -208,6 +213,25 @@ def read_table(path: str | Path) -> Table:
             else:
                 texts[i, j] = (cells[j] if j < len(cells) else "") if fits else separator.join(cells)
     return Table(names, values, units, np.array([number for number, _ in rows[first:]]), texts)
+
+
+def _parted_dates(rows: list[tuple[int, list[str]]]) -> int | None:
+    """Column of dates beside one of times of day, by most of the rows; None without such."""
+    found = Counter(
+        at
+        for _, cells in rows[:_LOOKED_AT]
+        for at, (day, clock) in enumerate(zip(cells, cells[1:]))
+        if _DAY.fullmatch(day.strip()) and _CLOCK.fullmatch(clock.strip())
+    )
+    at, count = found.most_common(1)[0] if found else (None, 0)
+    return at if 2 * count > len(rows[:_LOOKED_AT]) else None
+
+
+def _joined(cells: list[str], at: int | None) -> list[str]:
+    """Cells with a column and the next one made one."""
+    if at is None or len(cells) < at + 2:
+        return cells
+    return [*cells[:at], " ".join(cells[at : at + 2]).strip(), *cells[at + 2 :]]
 
 
 def _why_no_data(rows: list[tuple[int, list[str]]], numbers: list[list[float | None]]) -> str:

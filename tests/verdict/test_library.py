@@ -1,5 +1,7 @@
 """Verdicts on records with known truths: right, with intervals that hold them, and the same for any length."""
 
+from datetime import datetime, timedelta
+
 import numpy as np
 import pytest
 
@@ -75,6 +77,27 @@ def test_a_level_without_noise_is_no_oscillation():
     time = np.arange(0.0, 10.0, 2e-3)
     assert judge_record(time, 5 - 3 * np.exp(-time / 2)).name == "decaying"
     assert judge_record(time, np.full(len(time), 5.0)).name == "steady"
+
+
+@pytest.mark.parametrize(
+    ("form", "separator", "decimal"),
+    [
+        ("%d.%m.%Y %H:%M:%S.%f", ";", ","),
+        ("%m/%d/%Y,%H:%M:%S.%f", ",", "."),
+        ("%m/%d/%Y %I:%M:%S.%f %p", ",", "."),
+        ("%Y-%m-%d;%H:%M:%S.%f", ";", "."),
+    ],
+)
+def test_dates_of_control_systems_are_read(form, separator, decimal, command_line, tmp_path):
+    start, head = datetime(2026, 3, 14, 11, 59, 57), "stamp" if separator not in form else f"date{separator}time"
+    rows = [f"{head}{separator}p [bar]"]
+    for k in range(300):
+        stamp = (start + timedelta(milliseconds=20 * k)).strftime(form)
+        rows.append(f"{stamp}{separator}{np.sin(0.2 * np.pi * k):.6f}".replace(".", decimal if decimal == "," else "."))
+    text = "\n".join(rows).replace("14,03,2026", "14.03.2026")
+    (tmp_path / "scada.csv").write_text(text)
+    told = command_line("verdict", tmp_path / "scada.csv")
+    assert told.status == 0 and told.out.startswith("p [bar]: limit cycle") and "5 +- " in told.out
 
 
 def test_dates_and_numbered_samples_are_read(command_line, tmp_path):

@@ -17,7 +17,7 @@ from ...case.tables import ExistingFile, read_pairs
 from ...errors import CaseError
 from ..request import DensityOption, LawOption, PressureOption, Request, refuse_moved, with_unit
 
-ORDER = 32
+ORDER = 33
 
 
 class Keys(Section):
