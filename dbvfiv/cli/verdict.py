@@ -270,7 +270,7 @@ def _signals_of_table(table: Table, reading: Reading) -> list[Signal]:
     else:
         factor = seconds_in(reading.unit) if reading.unit is not None else _seconds(table, at)
         time = factor * table.values[:, at]
-        if len(time) and np.nanmin(time) > _DATES:  # times of day, which start with the record
+        if np.isfinite(time).any() and np.nanmin(time) > _DATES:  # times of day, which start with the record
             time = time - np.nanmin(time)
     found = []
     for i in wanted:

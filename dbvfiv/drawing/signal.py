@@ -16,14 +16,13 @@ from ..verdict.lines import envelope
 from ..verdict.series import smoothed
 from .style import ACCENT, COMPUTED, new_figure, style
 
-
 #: Cycles in the zoom, peaks of the spectrum with labels, and points of the phase portrait at most.
 CYCLES, PEAKS, POINTS = 10, 6, 20_000
 
 
 def signal(name: str, time: np.ndarray, values: np.ndarray, verdict: Verdict) -> Figure:
-    """Signal over time with its envelope, its last ten cycles, its spectrum with labelled peaks, its phase portrait, and
-    the numbers of the verdict.
+    """Signal over time with its envelope, last ten cycles, spectrum with labelled peaks, phase portrait, and numbers of
+    the verdict.
     """
     figure = new_figure(9.6, 7.2)
     grid = figure.add_gridspec(3, 2, width_ratios=(2, 1))

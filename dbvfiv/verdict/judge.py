@@ -182,7 +182,7 @@ def noise_at_end(series: Series) -> tuple[float, float] | None:
     rms = float(values.std())
     if count < _FEWEST_OF_NOISE // 2 or rms == 0.0:
         return None
-    power = np.abs(np.fft.rfft((values - level) * np.hanning(count + 2)[1:-1])[2:]) ** 2
+    power = np.abs(np.fft.rfft((values - level) / rms * np.hanning(count + 2)[1:-1])[2:]) ** 2
     bands = np.array_split(power, min(_BANDS, max(2, len(power) // _BANDS)))
     means = np.array([band.mean() for band in bands])
     if not means.min() > 0:

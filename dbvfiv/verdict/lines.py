@@ -250,7 +250,11 @@ def fit(
         right = whole.T @ (weight * left) / size
         better = False
         for _ in range(6):
-            step = np.linalg.solve(gram + damping * np.eye(len(gram)), right) / size
+            try:
+                step = np.linalg.solve(gram + damping * np.eye(len(gram)), right) / size
+            except np.linalg.LinAlgError:  # two columns alike, as of a line that has died at once
+                damping = max(10.0 * damping, 1e-4)
+                continue
             change = np.zeros_like(place)
             change[free] = np.clip(step[matrix.shape[1] :], -1.0, 1.0) * np.where(
                 np.abs(place[free]) > 20, 1.0 + 0.02 * np.abs(place[free]) * (np.nonzero(free)[1] == 1), 1.0

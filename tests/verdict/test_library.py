@@ -5,6 +5,7 @@ from datetime import datetime, timedelta
 import numpy as np
 import pytest
 
+from dbvfiv.drawing.signal import signal
 from dbvfiv.verdict import judge_record
 from tests.verdict.library import EACH, records
 
@@ -131,3 +132,19 @@ def test_a_clipped_line_has_the_amplitude_it_had_before(rail):
     values = np.sin(2 * np.pi * 113.3 * time) + 0.05 * np.random.default_rng(6).standard_normal(len(time))
     (line,) = judge_record(time, np.clip(values, -rail, rail)).lines
     assert abs(line["amplitude"] - 1) < 1.5 * line["amplitude_interval"] < 0.02
+
+
+def test_the_figure_has_the_envelope_ten_cycles_labels_and_a_phase_portrait():
+    time = np.arange(0.0, 6.0, 2e-3)
+    noise = 0.02 * np.random.default_rng(2).standard_normal(len(time))
+    ring = np.exp(-0.8 * time) * np.sin(2 * np.pi * 12 * time) + noise
+    upper, zoom, lower, portrait = signal("ring", time, ring, judge_record(time, ring)).axes
+    swing = upper.lines[-2]  # above the level
+    assert swing.get_ydata() == pytest.approx(np.exp(-0.8 * swing.get_xdata()), abs=0.05)
+    assert np.ptp(zoom.lines[0].get_xdata()) == pytest.approx(10 / 12, abs=0.01)
+    assert [text.get_text() for text in lower.texts] == ["12 Hz"]
+    radius = np.hypot(portrait.lines[0].get_xdata(), portrait.lines[0].get_ydata() / (2 * np.pi * 12))
+    assert radius[0] > 0.85 and radius[-1] < 0.65
+    for values in (np.full(len(time), 5.0), 5 - 3 * np.exp(-time / 2), noise, np.where(time > 3, 1.0, 0.0)):
+        assert signal("other", time, values, judge_record(time, values)).axes[2].get_xlim()[1] > 0
+    assert signal("short", time[:3], ring[:3], judge_record(time[:3], ring[:3])).axes

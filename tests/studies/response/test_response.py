@@ -24,7 +24,7 @@ STATES = {
         **RAYLEIGH,
         "damping.beta": 0.003,
     },
-    "quasi-steady-loss": {"fluid.continuity": "quasi-steady", "drive.pressure": 20e3, **LOSS, "damping.alpha": 10.0},
+    "quasi-steady-loss": {"fluid.continuity": "quasi-steady", "drive.pressure": 30e3, **LOSS, "damping.alpha": 60.0},
 }
 FREQUENCIES = np.arange(1, 241) * 0.5
 
