@@ -105,7 +105,7 @@ def test_a_closed_valve_strains_its_rubbers():
     "changes",
     [
         {"drive.kind": "uniform"},
-        {"drive.kind": "uniform", "drive.side": "outside"},
+        {"drive.kind": "uniform", "drive.side": "outside", "drive.pressure": 4e3},
         {"upstream.length": 5, "downstream.pressure": 2e3},
         {"valve.bill_offset": 0.5},
     ],
