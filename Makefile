@@ -11,6 +11,8 @@ setup:
 
 # each program that JAX compiles runs a few times only: less is spent on making it fast
 test: export XLA_FLAGS ?= --xla_backend_optimization_level=0
+# and all of them are kept: tests make many small ones again and again
+test: export JAX_PERSISTENT_CACHE_MIN_COMPILE_TIME_SECS ?= 0
 test: setup
 	@$(PYTHON) -m pytest -n $(JOBS) --dist loadscope -m "not slow"
 
