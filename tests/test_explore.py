@@ -34,8 +34,10 @@ def test_confirmed_answers_are_those_of_the_command(explorer):
     assert answer.state.mass_flow == pytest.approx(modes.state.mass_flow, rel=1e-9)
     ours, theirs = answer.verdict.summary(), modes.verdict.summary()
     assert ours["outcome"] == theirs["outcome"] and ours["certain"]
-    for name in ("growth_rate", "frequency", "damping_ratio", "critical_damping_factor"):
+    for name in ("growth_rate", "frequency", "damping_ratio"):
         assert ours[name] == pytest.approx(theirs[name], rel=1e-6), name
+    # searched to 1e-4 of itself, so that it depends on what was asked before by a part of that
+    assert ours["critical_damping_factor"] == pytest.approx(theirs["critical_damping_factor"], rel=1e-4)
 
 
 def test_corners_are_prepared(explorer):
