@@ -43,6 +43,10 @@ class SolveError(RuntimeError):
         super().__init__(" ".join(str(sentence).split()))
 
 
+class JumpError(SolveError):
+    """A bracket of growth rates of opposite sign across which the steady state jumps, so that no mode is neutral."""
+
+
 class NotValidError(SolveError):
     """A state that the constants of its rubber do not describe, so that nothing is said of its vibration."""
 

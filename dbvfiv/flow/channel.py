@@ -255,33 +255,35 @@ class Channel(FlowLaw):
         speed = jnp.sqrt(2.0 * inlet / (parameters["density"] * jnp.where(ratio > 0, ratio, 1.0)))
         return pressure, jnp.where(ratio > 0, speed, jnp.inf)[None]
 
-    def shut_pressures(self, area: np.ndarray, given, seal: int) -> tuple[np.ndarray, np.ndarray]:
+    def shut_pressures(self, area: np.ndarray, given, seal: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Derivatives (m, m) of the pressures by rates and accelerations of the areas about still fluid that ends at a
-        shut station.
+        shut station, and the lengths (m,), m, over which pressures do work on areas.
 
         Nothing leaves there, so what the wall displaces between it and a station comes from the inlet; in the sections
-        from there to the outlet the faces lie on each other.
+        from there to the outlet the faces lie on each other. With the discharges Q_k = sum_j S_kj dA_j/dt by trapezoids
+        the kinetic energy is rho/2 sum_k l_k Q_k^2/A_k, and pressures follow from it, so that they feed no motion.
         """
-        parameters, still = self.values(given), jnp.zeros(len(area))
+        parameters, count, blend = self.values(given), self.count, float(self._blend(self.values(given)))
+        half = 0.5 * self.step * (np.arange(count - 1) >= seal)
+        before = np.insert(half, 0, 0.0)
+        spans = np.append(half, 0.0) + before
+        opening = jax.jvp(lambda a: above_floor(a, self.floor), (jnp.asarray(area),), (jnp.ones(count),))
+        open_, slope = (np.asarray(part) for part in opening)
+        lengths = spans * slope
+        sums = np.tril(np.tile(lengths, (count, 1)), -1) + np.diag(before * slope)
 
         def stream(rate):
-            _, opening = jax.jvp(lambda a: above_floor(a, self.floor), (area,), (rate,))
-            behind = jnp.where(jnp.arange(self.count) >= seal, self._blend(parameters) * opening, 0.0)
-            pieces = 0.5 * self.step * (behind[1:] + behind[:-1]) * (jnp.arange(self.count - 1) >= seal)
-            speed = -jnp.concatenate([jnp.zeros(1), jnp.cumsum(pieces)]) / above_floor(area, self.floor)
-            return self.stream(area, rate, -speed, -speed[-1:])
+            speed = blend * jnp.asarray(sums) @ rate / open_
+            return self.stream(area, rate, speed, speed[-1:])
 
-        def heads(rate):
-            return self.term_heads(stream(rate), parameters, self.losses)
+        def work(function, *of):
+            found = jax.jacfwd(lambda rate: function(stream(rate), parameters, *of))(jnp.zeros(count))
+            return lengths[:, None] * np.asarray(found)
 
-        def psi(rate):
-            flow = stream(rate)
-            found = upstream_integral(self.step, flow.speed) + self.term_momenta(flow, parameters)
-            return found + wall_share(self.step, flow.speed) if self.bowed else found
-
-        open_ = np.arange(self.count) > seal
-        found = (-parameters["density"] * np.asarray(jax.jacfwd(f)(still)) * open_[:, None] for f in (heads, psi))
-        return tuple(found)
+        momenta = work(self.term_momenta)
+        inertia = blend * sums.T @ ((spans / open_)[:, None] * sums) + 0.5 * (momenta + momenta.T)
+        over = -parameters["density"] / np.where(lengths > 0, lengths, np.inf)[:, None]
+        return over * work(self.term_heads, self.losses), over * inertia, lengths
 
     def without_drives(self) -> Channel:
         """Copy of the channel with only those terms that act on steady flow."""

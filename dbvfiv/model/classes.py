@@ -18,7 +18,7 @@ import scipy.sparse as sp
 from ..flow.plug import centroid_matrix, centroid_slope, plug_parts
 from ..shell import Shell
 from ..shell.pressure import pressure_stiffness
-from .dynamics import LinearisedState, linearise
+from .dynamics import LinearisedState, linearise, without_circulation
 from .symmetry import ClassDofs, Symmetry
 from .valve import ValveModel
 
@@ -86,6 +86,7 @@ def linearise_class(model: ValveModel, q: np.ndarray, inlet: float, symmetry: Sy
     if model.contact is not None:
         touching = model.contact.stiffness_of_class(q, shell, symmetry.moves_lips_apart)
         matrices[2] = (matrices[2] + touching).tocsr()
+    matrices[2] = without_circulation(model, area, matrices[2])
     added = None if model.outside is None else model.outside.added_mass(q, matrices[1], symmetry.name, shell)
     coupled = slope.T.tocsr(), slope, area, added
     return LinearisedClass(model, q, inlet, *matrices, *coupled, symmetry=symmetry, shell=shell)

@@ -13,6 +13,7 @@ from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
+import scipy.sparse as sp
 
 from eigen import CoupledPencil, Relaxation
 from eigen.operator import FLUID_PARTS
@@ -82,7 +83,7 @@ class LinearisedState:
         given = {"inlet": self.inlet, "density": density, **line} | ({} if storage is None else {"storage": storage})
         parts = self.no_flow(flow.inner)
         if flow.unsteady:
-            parts["A1"], parts["A2"] = still_channel(flow).shut_pressures(self.area, given, self.seal)
+            parts["A1"], parts["A2"], _ = still_channel(flow).shut_pressures(self.area, given, self.seal)
         parts["S0"] = np.eye(flow.inner)
         return parts
 
@@ -183,6 +184,15 @@ def still_channel(flow: FlowLaw) -> Channel:
     return flow
 
 
+def without_circulation(model: ValveModel, area: np.ndarray, stiffness: sp.csr_matrix) -> sp.csr_matrix:
+    """Stiffness (n, n) with the pressures of still fluid where sections (m,), m2, are sealed.
+
+    Still fluid is conservative, so its stiffness is symmetric. Pressures that stay with the nodes are not where they
+    change along the wall, as they do over the element at the edge of the seal: they would feed motions past it.
+    """
+    return stiffness if model.seal(area) is None else (0.5 * (stiffness + stiffness.T)).tocsr()
+
+
 def linearise(
     model: ValveModel,
     q: np.ndarray,
@@ -213,7 +223,14 @@ def linearise(
         pressure, _ = model.flow.evaluate(FlowMotion.still(area, inner), mu)
     _, values = model.structure(q)
     structure, stiffness = matrix(values), matrix(model.stiffness(q, pressure, values))
+    forces, slope = model.station_forces(nodal), model.rows.jacobian(nodal)
+    seal = model.seal(area)
+    if seal is not None:
+        stiffness = without_circulation(model, area, stiffness)
+        if model.flow.unsteady:  # pressures do work on the areas
+            *_, lengths = still_channel(model.flow).shut_pressures(area, {"inlet": inlet, "density": 1.0}, seal)
+            forces = (slope.T @ sp.diags(lengths)).tocsr()
     if added is None and model.outside is not None:
         added = model.outside.added_mass(q, structure)
-    coupled = model.station_forces(nodal), model.rows.jacobian(nodal), area, added, inner
+    coupled = forces, slope, area, added, inner
     return LinearisedState(model, q, inlet, matrix(model.mass(q)), structure, stiffness, *coupled)

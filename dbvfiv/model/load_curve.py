@@ -253,7 +253,7 @@ class LoadCurve:
             parameter_scales={LOAD: self._unit},
             folds=False,
             branch_points=False,
-            newton=ContinuationNewton(max(self.newton.tolerance, _POINTS), 12),
+            newton=ContinuationNewton(max(self.newton.tolerance, _POINTS), 7),
             max_angle=self._angle,
         )
         return branch_tracer(self._system, {LOAD: self._start}, LOAD, options, observers=_Told(self.observer))

@@ -13,7 +13,7 @@ import numpy as np
 
 from ..texts import shortly
 
-LAYOUT = 3
+LAYOUT = 4
 TEXT = "text"
 #: SI value of the units in which numbers are printed, where it is not 1.
 PRINTED = {"kPa": 1e3, "static kPa": 1e3, "mm": 1e-3, "cm2": 1e-4, "mm2": 1e-6, "L/s": 1e-3, "%": 1e-2}

@@ -27,8 +27,8 @@ from dbvfiv.studies.stability.place import redesigned
 from eigen import SearchOptions, leading_modes
 from tests.verification.test_shell_large_displacement import cantilever
 
-#: The 12-inch valve on a mesh that cracks in some seconds.
-COARSE = {"mesh.around": 8, "mesh.along": 12, "fluid.continuity": "storage"}
+#: The 12-inch valve on a mesh that cracks in a second or two.
+COARSE = {"mesh.around": 6, "mesh.along": 8, "fluid.continuity": "storage"}
 PRESSURE = 800.0
 
 
@@ -90,7 +90,7 @@ def test_faces_press_evenly_at_rest_in_the_shape_that_is_drawn(model):
     state, valve = model.contact.state(model.rest()), model.case.valve
     nodes = model.mesh.nodes[model.contact.plane.nodes]
     inside = (nodes[:, 0] < 0.7 * valve.lip_half_width) & (nodes[:, 2] < 0.7 * valve.moulded_length)
-    assert np.count_nonzero(inside) > 10
+    assert np.count_nonzero(inside) > 5
     assert state.pressure[inside] == pytest.approx(PRESSURE, rel=0.03)
     assert np.abs(model.nodal(model.rest())[:, :3]).max() < valve.initial_gap
     beyond = model.mesh.nodes[:, 1] - model.shell.stress_free.nodes[:, 1]
@@ -179,18 +179,36 @@ def test_presets_that_cannot_be_are_refused_in_a_sentence(keys, words):
         thesis_case(keys)
 
 
-def test_still_fluid_behind_a_seal_is_the_mass_of_what_the_wall_displaces():
-    """Pressure where sections widen alike from the seal of a straight passage: -rho/(2 a) [(l - s)^2 - (z - s)^2]."""
-    z, area, seal = np.linspace(0.0, 0.5, 11) ** 1.5, 2e-3, 3
+def shut_channel(count: int):
+    """Inertia (m, m) of still fluid of 900 kg/m3 between the flange and a seal at 0.1 m, in sections of 20 cm2 that end
+    at 0.5 m, stations z, and lengths.
+    """
+    z, seal = np.linspace(0.0, 0.5, count + 1), count // 5
     channel = Channel(z, 1e-9, storage=1.0)
     given = {"inlet": 1e3, "density": 900.0}
-    rate, acceleration = channel.shut_pressures(np.full(len(z), area), given, seal)
-    widening = np.where(np.arange(len(z)) >= seal, 1.0, 0.0)
-    wanted = -900.0 / (2 * area) * ((z[-1] - z[seal]) ** 2 - (z - z[seal]) ** 2)
-    assert (acceleration @ widening)[seal + 1 :] == pytest.approx(wanted[seal + 1 :], rel=1e-12, abs=1e-12)
-    assert not rate.any() and not acceleration[: seal + 1].any()
-    none = channel.shut_pressures(np.full(len(z), area), given | {"storage": 0.0}, seal)
+    rate, acceleration, lengths = channel.shut_pressures(np.full(len(z), 2e-3), given, seal)
+    assert not rate.any() and not acceleration[:seal].any() and not acceleration[:, :seal].any()
+    none, *_ = channel.shut_pressures(np.full(len(z), 2e-3), given | {"storage": 0.0}, seal)
     assert not np.any(none)  # no fluid is displaced under the quasi-steady flow model
+    return acceleration, z, lengths
+
+
+def test_still_fluid_behind_a_seal_is_the_mass_of_what_the_wall_displaces():
+    """Sections that widen alike by dA/dt from the seal s on: -rho/(2 a) [(l - s)^2 - (z - s)^2] per acceleration, with
+    an energy of rho (l - s)^3/(6 a) (dA/dt)^2; symmetric, so that it feeds no motion.
+    """
+    errors = []
+    for count in (20, 40):
+        acceleration, z, lengths = shut_channel(count)
+        widening = np.where(z > 0.1 - 1e-9, 1.0, 0.0)
+        wanted = -900.0 / (2 * 2e-3) * (0.4**2 - (z - 0.1) ** 2)
+        work = lengths[:, None] * acceleration
+        assert work == pytest.approx(work.T, abs=1e-12 * np.abs(work).max())
+        assert np.linalg.eigvalsh(work)[-1] <= 1e-12 * np.abs(work).max()
+        inside = slice(count // 5 + 1, -1)
+        assert (acceleration @ widening)[inside] == pytest.approx(wanted[inside], rel=2.0 / count, abs=1e-2)
+        errors.append(-0.5 * widening @ work @ widening / (900.0 * 0.4**3 / (6 * 2e-3)) - 1.0)
+    assert abs(errors[0]) < 5e-3 and errors[0] / errors[1] == pytest.approx(4.0, rel=0.05)
 
 
 @pytest.mark.parametrize("storage", [0.0, 1.0])

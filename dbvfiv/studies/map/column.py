@@ -93,8 +93,11 @@ class MapPlan:
 
     @property
     def transposed(self) -> bool:
-        """True where columns run along x, since y alone changes the steady state."""
-        return is_surrounding(self.case, self.x.parameter) and not is_surrounding(self.case, self.y.parameter)
+        """True where columns run along x: its cells share a steady state, or, where those of neither axis do, a wall
+        under pressures that rise.
+        """
+        along_x, along_y = (is_surrounding(self.case, axis.parameter) for axis in (self.x, self.y))
+        return not along_y and (along_x or self.x.parameter == "pressure")
 
     @property
     def across(self) -> Axis:
@@ -209,7 +212,7 @@ def grid_of(plan: MapPlan, columns: Iterable[MapColumn], name: str, parts: Itera
 
 
 def solve_column(plan: MapPlan, walk: StabilityWalk, task: ColumnTask) -> MapColumn:
-    """A column; a steady state that is not found leaves a gap with the reason.
+    """A column; a steady state that is not found leaves a gap with the reason, of the cells that share it.
 
     On the grid every cell gets a certificate; in columns between, put in for the onset curves, those that onsets lie
     between. Where both axes change the steady state, states are found anew, whatever columns came before.
@@ -222,7 +225,7 @@ def solve_column(plan: MapPlan, walk: StabilityWalk, task: ColumnTask) -> MapCol
         for part in task.parts:
             line = plan.line(walk, task.value, part, task.level > 0)
             samples[part], worst = line.cells(), max(worst, line.error)
-            if part < len(plan.laws):
+            if part < len(plan.laws) and (line.stays or plan.case.map.curve):
                 onsets += [(part, *row) for row in _onsets(line)]
     except (SolveError, CaseError) as error:
         return MapColumn.gap(task, str(error), time.process_time() - started)
@@ -234,8 +237,14 @@ def _onsets(line: ParameterLine) -> list[tuple[float, float, float, float]]:
     """Value, frequency, direction, and what is left of the growth rate over the size of the eigenvalue."""
     found = []
     for crossing in line.scan.run(line.values):
-        onset = line.locate(crossing, ROUGH if line.is_reduced else LOCATED)
-        found.append((onset.value, onset.frequency, 1.0 if crossing.gains else -1.0, onset.residual))
+        direction = 1.0 if crossing.gains else -1.0
+        try:
+            onset = line.locate(crossing, ROUGH if line.is_reduced else LOCATED)
+        except SolveError:  # the state jumps there, or is not found
+            if line.stays:
+                raise
+            continue
+        found.append((onset.value, onset.frequency, direction, onset.residual))
     return found
 
 

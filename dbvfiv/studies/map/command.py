@@ -26,7 +26,11 @@ class Keys(Section):
     )
     y: StabilityRange = key("density=1:1000:64:log", "Vertical range, likewise.")
     continuity: Literal["case", "both"] = key("case", "The flow model of the case, or both models side by side.")
-    curve: StrictBool = key(True, "Put in columns until the onset curves are known everywhere.")
+    curve: StrictBool = key(
+        True,
+        "Put in columns until the onset curves are known everywhere; false also leaves out onsets between cells that "
+        "have steady states of their own.",
+    )
     refine: StrictInt = key(
         2, "How often columns are put in between neighbours with different numbers of onsets.", ge=0, le=6
     )

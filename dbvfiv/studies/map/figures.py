@@ -29,6 +29,8 @@ from ..stability.verdict import NOT_VALID, OUTCOMES
 
 #: Places across a picture at which its regions are looked at.
 _FINE = 120
+#: Colour of cells of a sealed bill.
+SEALED = "#c9b8a0"
 _BAR = "Growth rate of the leading mode, 1/s"
 _TITLES = {0.0: "Quasi-steady continuity", 1.0: "Storage: moving walls displace fluid"}
 
@@ -50,6 +52,7 @@ def stability_map(result: StudyResult) -> Figure:
     figure, panels = _panels(result)
     for law, axes in enumerate(panels):
         mesh = _cells(axes, result, growth[law], matplotlib.colormaps[SIGNED], norm)
+        _sealed(axes, result, law)
         _curves(axes, result, law)
         label_regions(axes, result, law)
     bar = colour_bar(figure, mesh, panels, _BAR, pad=0.015, ticks=levels, extend="both", spacing="uniform")
@@ -67,6 +70,7 @@ def leading_frequency(result: StudyResult) -> Figure:
     figure, panels = _panels(result)
     for law, axes in enumerate(panels):
         mesh = _cells(axes, result, frequency[law], matplotlib.colormaps[MOTION], norm)
+        _sealed(axes, result, law)
         _curves(axes, result, law)
         label_regions(axes, result, law)
     colour_bar(figure, mesh, panels, "Frequency of the leading mode, Hz", pad=0.015)
@@ -182,6 +186,15 @@ def _cells(axes, result: StudyResult, values, colours, norm):
     return mesh
 
 
+def _sealed(axes, result: StudyResult, law: int) -> None:
+    """Cells of a bill that is moulded shut and sealed: no flow, so that nothing but its own damping decides."""
+    sealed = result.grid("sealed")[law] > 0
+    if sealed.any():
+        shown = np.where(sealed, 1.0, np.nan)
+        colour = matplotlib.colors.ListedColormap([SEALED])
+        axes.pcolormesh(_edges(result.plan.x), _edges(result.plan.y), shown, cmap=colour, rasterized=True)
+
+
 def _curves(axes, result: StudyResult, law: int) -> None:
     """Onset curves in black, dashed where they are interpolated, their frequency written along them."""
     for curve in result.curves:
@@ -234,7 +247,9 @@ def label_regions(axes, result: StudyResult, law: int) -> None:
     unstable = result.grid("unstable")[law]
     sure, invalid = certified_cells(result)[law], invalid_cells(result)[law]
     cells = [_drawn_cells(axis) for axis in (result.plan.x, result.plan.y)]
-    regions = {"unstable": sure & (unstable > 0), "not valid": invalid, "stable": sure & (unstable == 0)}
+    sealed = result.grid("sealed")[law] > 0
+    regions = {"unstable": sure & (unstable > 0), "not valid": invalid, "stable": sure & (unstable == 0) & ~sealed}
+    regions["sealed"] = sealed
     for word, mask in regions.items():
         parts, count = label(mask[np.ix_(cells[1], cells[0])])
         sizes = np.bincount(parts.ravel(), minlength=count + 1)[1:]

@@ -64,6 +64,8 @@ def check_cells(
     found = []
     for i, cell, law in picks:
         kept = usable[i].samples[law][cell]
+        if kept.is_missing:
+            continue
         spectrum = walk.spectrum(plan.place(usable[i].value, kept.value, plan.laws[law]), 4)
         leading, true = (complex(v[0]) if len(v) else complex(np.nan) for v in (kept.eigenvalues, spectrum.eigenvalues))
         error, unstable = abs(leading - true) / max(abs(true), 1.0), spectrum.unstable_count
@@ -153,8 +155,11 @@ def _doubts(plan: MapPlan, columns: Iterable[MapColumn], checks: Iterable[dict[s
     solved, said = [c for c in columns if not c.failure], []
     for prefix, parts in _variants(plan):
         cells = [s for c in solved if not c.level for part in parts for s in c.samples[part]]
+        lost = [s.failure for s in cells if s.failure]
         refused = sum(bool(s.refusal) for s in cells)
-        doubtful = sum(not (s.certified or s.refusal) for s in cells)
+        doubtful = sum(not (s.certified or s.is_missing) for s in cells)
+        if lost:
+            said.append(f"{prefix}{len(lost)} cells have no steady state that was found; the first: {lost[0]}")
         if refused:
             first = next(c for c in solved if c.refusal)
             said.append(f"{prefix}{refused} cells are not valid; the first at {first.value:.6g}: {first.refusal}")
@@ -393,6 +398,7 @@ class MapResult(StudyResult):
     def _picture(self, law: int) -> dict[str, Any]:
         leading = {"leading": self._leading(law)} if self.classes else {}
         followed = cycles.summary_of(self.record, self.plan, law) if self.case.map.cycles else {}
+        sealed = {"sealed": self.grid("sealed")[law].astype(bool).tolist()} if self.case.valve.is_preset else {}
         mine = [curve for curve in self.curves if curve.law == law]
         return (
             {key: self.grid(name)[law].tolist() for key, name in _CELLS.items()}
@@ -404,6 +410,7 @@ class MapResult(StudyResult):
                 "onset_frequencies": [curve.frequency.tolist() for curve in mine],
                 "onset_curves_exact": [bool(curve.exact) for curve in mine],
             }
+            | sealed
             | leading
             | followed
         )
@@ -446,12 +453,14 @@ class MapResult(StudyResult):
         number = {name: int((outcome == i).sum()) for i, name in enumerate(OUTCOMES)}
         unstable, invalid = number[FLUTTERS] + number[DIVERGES], number[NOT_VALID]
         gaps, direct = int((how == MISSING).sum()) - invalid, int((how == DIRECT).sum())
+        sealed = int(self.grid("sealed")[law].sum())
         name = LAWS.get(self.plan.laws[law], f"blend {self.plan.laws[law]:g}")
         return (
             f"{name}: {how.shape[1]} x {how.shape[0]} cells, {unstable} unstable, {number[STABLE]} stable, "
             f"{int(certified.sum())} of {how.size} certified"
             + (f", {number[DIVERGES]} of the unstable ones diverge" if number[DIVERGES] else "")
             + (f", {invalid} not valid" if invalid else "")
+            + (f", {sealed} of the stable ones sealed" if sealed else "")
             + (f", {direct} solved directly" if direct else "")
             + (f", {gaps} in gaps" if gaps else "")
             + "."

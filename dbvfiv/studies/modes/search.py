@@ -390,7 +390,7 @@ def run_modes(
     if symmetry.of_equilibria and not (model.mesh.part.is_quarter or in_vacuo):
         notes = (*notes, _NO_PLUG)
     searched = family.is_searched(certified.spectrum.eigenvalues, place, search.band)
-    verdict = _verdict(certified, searched, search.claimed)
+    verdict = _verdict(certified, searched, search.claimed, linear.seal is not None)
     modes = _shapes(model, pencil, linear, certified.spectrum, symmetry, in_vacuo)
     notes = (*notes, *_contact_notes(model, state, linear, modes, symmetry))
     result = FoundModes(modes, Certificate.of(certified), verdict, notes, certified.spectrum)
@@ -418,7 +418,7 @@ def _contact_notes(model, state: SteadyState, linear, modes: Sequence[ModeShape]
     return said
 
 
-def _verdict(found: CertifiedSpectrum, searched: np.ndarray, claimed: float) -> Verdict:
+def _verdict(found: CertifiedSpectrum, searched: np.ndarray, claimed: float, sealed: bool) -> Verdict:
     """Verdict from the modes in the region that every study searches, up to the frequency that is claimed."""
     count = found.count
     verdict = Verdict.of(
@@ -429,6 +429,7 @@ def _verdict(found: CertifiedSpectrum, searched: np.ndarray, claimed: float) -> 
         line=count.line,
         band=min(count.band, claimed),
         statement="" if found.agrees else found.statement,
+        sealed=sealed,
     )
     if np.isinf(count.band) or verdict.outcome != STABLE:
         return verdict

@@ -23,7 +23,7 @@ from eigen import Column as Cells
 from eigen import Spectrum
 
 from ...case.parameters import Mu
-from ...errors import CaseError, NotValidError, SolveError
+from ...errors import CaseError, JumpError, NotValidError, SolveError
 from .place import is_surrounding
 from .samples import WATCHED, Sample, SampleKey
 from .walk import StabilityWalk
@@ -32,6 +32,8 @@ from .walk import StabilityWalk
 HALVINGS = 6
 #: A vertex of the parabola this close to zero, as a share of the values around it, calls for a closer look.
 MARGIN = 0.35
+#: Share of a bracket within which a growth rate that is continuous changes by less than the second share of its change.
+NARROW, STEEP = 1e-3, 0.5
 
 
 @dataclass(frozen=True)
@@ -197,18 +199,37 @@ def locate(scan: Scan, crossing: Crossing, tolerance: float) -> tuple[float, com
     ------
     SolveError
         If an equilibrium inside the bracket was not found.
+    JumpError
+        If the growth rate jumps there, as it does with a state that passes a limit point or loses contact.
     """
+    growth = {end.value: float(end.growth[crossing.index]) for end in (crossing.low, crossing.high)}
+    low, high = crossing.low.value, crossing.high.value
 
-    def sample(value: float) -> Sample:
+    def rate(value: float) -> float:
         found = scan.within(value)
         if found is None:
             raise SolveError(scan.failures[float(value)])
-        return found
+        growth[value] = float(found.growth[crossing.index])
+        _check_jump(growth, low, high)
+        return growth[value]
 
-    low, high = crossing.low.value, crossing.high.value
     accuracy = {"xtol": tolerance * max(abs(low), abs(high)), "rtol": 8.9e-16, "maxiter": 80}
-    value = float(brentq(lambda v: float(sample(v).growth[crossing.index]), low, high, **accuracy))
-    return value, complex(sample(value).eigenvalues[crossing.index])
+    value = float(brentq(rate, low, high, **accuracy))
+    return value, complex(scan.within(value).eigenvalues[crossing.index])
+
+
+def _check_jump(growth: dict[float, float], low: float, high: float) -> None:
+    """Refuse a bracket of a growth rate that has narrowed while the rates at its ends stayed apart."""
+    sign = growth[high] > 0
+    below = max(value for value, rate in growth.items() if (rate > 0) != sign)
+    above = min(value for value, rate in growth.items() if value > below)
+    if above - below > NARROW * (high - low):
+        return
+    if abs(growth[above] - growth[below]) > STEEP * abs(growth[high] - growth[low]):
+        raise JumpError(
+            f"The state jumps between {below:.6g} and {above:.6g}, where a growth rate goes from {growth[below]:.4g} "
+            f"to {growth[above]:.4g} 1/s: no mode is neutral there."
+        )
 
 
 #: Growth rate over the size of the eigenvalue up to which an onset counts as neutral.
@@ -418,7 +439,7 @@ class ParameterLine:
         Raises
         ------
         SolveError
-            If a steady state was not found.
+            If a steady state that all of them share was not found.
         """
         try:
             for i, value in enumerate(self.values if self.column is not None else ()):
@@ -427,9 +448,8 @@ class ParameterLine:
             refused = {v: Sample(v, refusal=self.walk.refusal(self.place(v)), key=self.key) for v in self.values}
             self.samples |= refused
         found = [self.sample(value) for value in self.values]
-        for sample in found:
-            if sample.failure:
-                raise SolveError(sample.failure)
+        if self.stays and any(sample.failure for sample in found):
+            raise SolveError(next(sample.failure for sample in found if sample.failure))
         return found
 
     def sample(self, value: float, spectrum: Spectrum | None = None) -> Sample:

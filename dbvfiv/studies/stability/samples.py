@@ -55,6 +55,8 @@ class Sample:
         The count followed its phase, and what both rest on is accurate enough.
     line, band : float, 1/s, Hz
         Growth rate counted from, and frequency up to which the sample is a verdict.
+    sealed : bool
+        The faces of a bill that is moulded shut hold each other, and nothing flows.
     how : int
         `eigen.columns.REDUCED`, `DIRECT` or `MISSING`.
     failure : str
@@ -71,17 +73,18 @@ class Sample:
     certain: bool = False
     line: float = 0.0
     band: float = np.inf
+    sealed: bool = False
     how: int = MISSING
     failure: str = ""
     refusal: str = ""
     key: SampleKey = SampleKey()
 
     @classmethod
-    def of(cls, value: float, cells: Cells, cell: int, claimed: float) -> Sample:
+    def of(cls, value: float, cells: Cells, cell: int, claimed: float, sealed: bool = False) -> Sample:
         """Sample of a cell of a column; `claimed` is the frequency, Hz, up to which the search speaks for the state."""
         own = cells.certificate(cell)
         band, counts = min(own.band, claimed), (own.unstable, own.counted, own.certain)
-        return cls(value, np.asarray(cells.leading[cell])[:KEPT], *counts, own.line, band, int(cells.how[cell]))
+        return cls(value, np.asarray(cells.leading[cell])[:KEPT], *counts, own.line, band, sealed, int(cells.how[cell]))
 
     @cached_property
     def growth(self) -> np.ndarray:
@@ -113,11 +116,11 @@ class Sample:
         if self.failure:
             return Verdict.undecided(self.failure)
         counts, region = (self.unstable, self.counted, self.certain), {"line": self.line, "band": self.band}
-        return Verdict.of(self.eigenvalues, *counts, proven=self.how == DIRECT, **region)
+        return Verdict.of(self.eigenvalues, *counts, proven=self.how == DIRECT, sealed=self.sealed, **region)
 
     def number(self, name: str) -> float:
         """A quantity by its name, for tables over several parameters: growth_rate, frequency (of the leading mode),
-        second (growth rate of the next), unstable, counted, certified, how or outcome.
+        second (growth rate of the next), unstable, counted, certified, sealed, how or outcome.
         """
         if name == "outcome":
             return OUTCOMES.index(self.verdict.outcome)
@@ -143,6 +146,7 @@ _OWN = (
     Column("certain", "", "Whether that count, and what both rest on, can be relied on", "bool"),
     Column("line", "1/s", "Growth rate counted from"),
     Column("band", "Hz", "Frequency up to which the sample is a verdict; infinite for all"),
+    Column("sealed", "", "Whether the faces of a bill that is moulded shut hold each other, and nothing flows", "bool"),
     Column("how", "", "0 on the reduced-order model, 1 with the full matrices, 2 none; a note says why", "i8"),
 )
 _FURTHER = (

@@ -20,6 +20,8 @@ from ...texts import shortly
 STABLE, FLUTTERS, DIVERGES, NOT_VALID, UNDECIDED = "stable", "flutters", "diverges", "not valid", "undecided"
 #: Outcomes, the one that decides about several motions of a state first.
 OUTCOMES = (NOT_VALID, DIVERGES, FLUTTERS, UNDECIDED, STABLE)
+#: Beginning of the reason of a verdict on a bill whose faces hold each other.
+SEALED = "Sealed, so that nothing flows."
 #: Size of a growth rate over that of its eigenvalue below which its sign is that of rounding.
 NEUTRAL = 1e-9
 
@@ -71,6 +73,7 @@ class Verdict:
         line: float = 0.0,
         band: float = np.inf,
         statement: str = "",
+        sealed: bool = False,
     ) -> Verdict:
         """Verdict from a list of leading eigenvalues and the independent count.
 
@@ -89,6 +92,8 @@ class Verdict:
         band : float, Hz
         statement : str
             What to say of the two counts instead of the standard sentence.
+        sealed : bool
+            The faces of a bill that is moulded shut hold each other.
 
         Examples
         --------
@@ -101,6 +106,7 @@ class Verdict:
         values = values[np.isfinite(values.real)]
         agrees = certain and unstable == counted
         statement = statement or describe_counts(unstable, counted, certain, line, band)
+        statement = f"{SEALED} {statement}" if sealed else statement
         if not values.size:
             return cls(UNDECIDED, f"No mode was found in the search, which says nothing of the state. {statement}")
         modes = oscillates(values)

@@ -457,7 +457,8 @@ class StabilityWalk:
         """Sample of a place from its cell of a column; `value` is that of the parameter of a line."""
         if refusal := self.refusal(place):
             return Sample(value, refusal=refusal)
-        return Sample.of(value, column, cell, self.search(place).claimed)
+        sealed = self.family(place).linear.seal is not None
+        return Sample.of(value, column, cell, self.search(place).claimed, sealed)
 
     def verdict(self, place: Mu, spectrum=None) -> Verdict:
         """Verdict on one place; its leading modes with the full pencil may be known.
