@@ -21,7 +21,7 @@ def site(tmp_path_factory):
 
 def test_a_valve_is_described_and_asked(site, tmp_path, capsys):
     server, driver = site
-    assert server.seconds < 15  # five on a machine that does nothing else; a slow test holds that
+    assert server.seconds < 15  # with room for a machine that is shared
     tab = Tab(driver, server.address)
     tab.fill("valve.duckbill_length", "-3 mm")
     tab.wait(lambda: "greater than 0" in tab.at("wrong").text)

@@ -194,6 +194,6 @@ def test_answers_come_in_the_time_of_a_thought(tmp_path, moves):
             print(f"\nstate stays: median {quick[0]:.3f} s, 95 % {quick[1]:.3f} s")
             print(f"state moves: median {slow[0]:.2f} s, 95 % {slow[1]:.2f} s; memory {sizes} MB")
             assert sizes[-1] < 1.25 * sizes[0] + 200
-            assert quick[0] < 0.5 and slow[0] < 5.0  # 0.2 and 2 s on a machine that does nothing else
+            assert quick[0] < 0.5 and slow[0] < 5.0  # 0.2 and 2 s are the aim; this leaves room for a shared machine
     finally:
         driver.quit()
