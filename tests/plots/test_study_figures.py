@@ -202,6 +202,17 @@ def test_cells_that_are_not_valid_are_hatched_named_and_in_no_colour_scale():
     assert any("constants of the rubber are unstable there" in text for text in texts(figure))
 
 
+def test_sealed_cells_are_named_and_stand_apart_from_the_other_stable_ones():
+    result = map_result()
+    grid, sealed = result.grid, np.zeros(result.grid("sealed").shape)
+    sealed[..., 4:] = 1.0
+    result.grid = lambda name: sealed if name == "sealed" else grid(name)
+    axes = map_figures.stability_map(result).axes[0]
+    assert {t.get_text() for t in axes.texts} >= {"sealed", "stable", "unstable"}
+    (flat,) = [c for c in axes.collections if getattr(c.cmap, "N", 0) == 1]
+    assert flat.get_array().count() == 10
+
+
 def test_cells_without_a_certificate_are_hatched_and_not_called_stable():
     certified = np.ones((5, 6), bool)
     certified[:, 3:] = False
