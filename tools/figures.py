@@ -82,12 +82,6 @@ ALL = (
         {"stability-map.png": "stability-map-loss-factors.png"},
     ),
     Made(
-        "moulded",
-        'dbvfiv map cases/dbv6-moulded.toml --set mesh.around=10 --set mesh.along=20 --x "pressure=0.02 m:1 m:14:log" '
-        '--y "sealing=400:2400:8:log" --both --set map.curve=false --set map.refine=0',
-        {"stability-map.png": "moulded-map.png"},
-    ),
-    Made(
         "line-length",
         "dbvfiv map cases/dbv12-in-line.toml --set mesh.around=14 --set mesh.along=24 --set upstream.roughness=0 "
         "--set upstream.loss=1.52 --x pressure=0.5e3:40e3:10:log --y pipe_length=0.5:100:16:log --both",

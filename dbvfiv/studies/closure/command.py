@@ -81,10 +81,8 @@ class Keys(Section):
     )
     measured: Annotated[tuple[Path, ...], MEASURED_FILES] = key(
         (),
-        "CSV of measured points that figures and tables show beside the computed ones, one file or several, relative "
-        "to the case file. The first line names the columns with units: a back pressure with the area of the narrowest "
-        "passage left (pressure [kPa], area [mm2]), or with points of sections of the wall (pressure [kPa], z [mm], "
-        "face, x [mm], y [mm]; without z at the lip, without face on the inner one).",
+        "Measured points as in steady.measured, here a back pressure with the area of the narrowest passage left (pressure "
+        "[kPa], area [mm2]), or with points of sections of the wall.",
     )
     reversal_time: Time = key(
         0.2, "Time in which the drive turns from open_pressure to as much back pressure.", gt=0, le=1e3

@@ -24,8 +24,8 @@ class Keys(Section):
 
     over: StabilityRange = key(
         "density=20:60:9",
-        f"The parameter to move: {listed(notes=True)}; with =START:STOP:COUNT[:log] behind it for another range than "
-        "the usual one. Cycles are given at these values, and at those that the branch needs between them.",
+        "The parameter to move, as in onset.over. Cycles are given at these values, and at those that the branch needs "
+        "between them.",
     )
     start: Literal["last", "first", "file"] = key(
         "last",
