@@ -81,7 +81,7 @@ class Keys(Section):
     )
     measured: Annotated[tuple[Path, ...], MEASURED_FILES] = key(
         (),
-        "Measured points as in steady.measured, here a back pressure with the area of the narrowest passage left (pressure "
+        "Measured points as in steady.measured: a back pressure with the area of the narrowest passage left (pressure "
         "[kPa], area [mm2]), or with points of sections of the wall.",
     )
     reversal_time: Time = key(
