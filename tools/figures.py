@@ -64,11 +64,14 @@ ALL = (
         "dbvfiv map cases/dbv12.toml --x pressure=300:20000:64 --y density=1:1000:64:log --both --set damping.alpha=0",
         {"stability-map.png": "stability-map.png"},
     ),
-    Made(
-        "moulded-12",
-        'dbvfiv map cases/dbv12-moulded.toml --x "pressure=0.02 m:1 m:14:log" --y sealing=400:2400:8:log --both '
-        "--set mesh.around=10 --set mesh.along=20 --set map.curve=false --set map.refine=0 --set map.checks=2",
-        {"stability-map.png": "moulded-12-inch.png"},
+    *(
+        Made(
+            f"moulded-{size}",
+            f'dbvfiv map cases/dbv{size}-moulded.toml --x "pressure=0.02 m:1 m:14:log" --y sealing=400:2400:8:log --both '
+            "--set mesh.around=10 --set mesh.along=20 --set map.curve=false --set map.refine=0 --set map.checks=2",
+            {"stability-map.png": f"moulded-{size}-inch.png"},
+        )
+        for size in (12, 6)
     ),
     Made(
         "tongue",
