@@ -68,7 +68,8 @@ ALL = (
         Made(
             f"moulded-{size}",
             f'dbvfiv map cases/dbv{size}-moulded.toml --x "pressure=0.02 m:1 m:14:log" --y sealing=400:2400:8:log '
-            "--both --set mesh.around=10 --set mesh.along=20 --set map.curve=false --set map.refine=0 --set map.checks=2",
+            "--both --set mesh.around=10 --set mesh.along=20 --set map.curve=false --set map.refine=0 "
+            "--set map.checks=2",
             {"stability-map.png": f"moulded-{size}-inch.png"},
         )
         for size in (12, 6)
