@@ -86,6 +86,15 @@ def key_point_inlet(path: Path) -> float | None:
     return math.fsum(math.hypot(x, y) for x, y, _ in last) / len(last)
 
 
+def key_point_lip(path: Path) -> float | None:
+    """Largest distance from the axis, m, along the lip of a file of key points; None where it cannot be read."""
+    try:
+        first = read_key_points(path)[0].points
+    except ValueError:
+        return None
+    return max(abs(x) for x, _, _ in first)
+
+
 def has_whole_sections(path: Path) -> bool:
     """True where the profiles of a file of key points run from side edge to side edge; False for an unreadable file."""
     try:

@@ -115,6 +115,14 @@ class Case(Section):
                         f"{', '.join(SHIPPED_LOSSES)}), loss_data, relaxation_data or prony, or damping.model be "
                         "'rayleigh'",
                     )
+        radius = self.valve.as_given.inlet_radius
+        for i, layer in enumerate(self.layers):
+            if layer.thickness > radius:
+                raise BrokenRule(
+                    f"layers.{i}.thickness",
+                    f"{1e3 * layer.thickness:.4g} mm in a valve with a radius of {1e3 * radius:.4g} mm",
+                    "no wall has such a layer, so it must be less",
+                )
         if len(self.layers) * self.mesh.layer_points < 2:
             raise BrokenRule(
                 "mesh.layer_points",
@@ -142,7 +150,7 @@ class Case(Section):
         self._check_compression()
         inlet = 2 * (self.valve.inlet_radius - self.valve.flange_wall_deduction)
         self.upstream.check_pipes(inlet)
-        self.downstream.check_pipe(inlet)
+        self.downstream.check_pipe(inlet, self.valve.bill_width)
         self.outside.check_pipe(self.valve.outer_diameter)
         return self
 

@@ -186,8 +186,8 @@ class Downstream(Section):
     pipe_diameter: Length | None = key(
         None,
         "Inner diameter of a full pipe in which the valve stands and its jet widens, which recovers pressure; at least "
-        "that of the valve's flow section at the flange. Where not given the discharge is free or submerged and the "
-        "energy of the jet is lost.",
+        "that of the valve's flow section at the flange and the width of its bill. Where not given the "
+        "discharge is free or submerged and the energy of the jet is lost.",
         gt=0,
         le=100,
     )
@@ -213,9 +213,9 @@ class Downstream(Section):
         le=1,
     )
 
-    def check_pipe(self, inlet: float) -> None:
-        """Refuse what belongs to a pipe where there is none, and a pipe that the valve does not stand in; `inlet` is
-        the diameter of the valve's flow section at the flange, m.
+    def check_pipe(self, inlet: float, bill: float) -> None:
+        """Refuse a pipe that the valve does not stand in; `inlet` is the diameter of its flow section at the flange and
+        `bill` the width of the bill over its outer faces, m.
 
         Raises
         ------
@@ -226,6 +226,12 @@ class Downstream(Section):
                 "downstream.pipe_diameter",
                 f"{1e3 * self.pipe_diameter:g} mm around a valve with a flow section of {1e3 * inlet:.4g} mm",
                 f"it must be at least {1e3 * inlet:.4g} mm, for the valve stands in it",
+            )
+        if self.pipe_diameter is not None and self.pipe_diameter < bill:
+            raise BrokenRule(
+                "downstream.pipe_diameter",
+                f"{1e3 * self.pipe_diameter:g} mm around a bill that is {1e3 * bill:.4g} mm wide",
+                f"it must be at least {1e3 * bill:.4g} mm, or the bill does not go into the pipe",
             )
 
     @model_validator(mode="after")

@@ -9,7 +9,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import PrivateAttr, ValidationInfo, field_validator, model_serializer, model_validator
 
-from .key_points import has_whole_sections, key_point_inlet, read_key_points
+from .key_points import has_whole_sections, key_point_inlet, key_point_lip, read_key_points
 from .parameters import PARAMETERS
 from .quantity import Length, LineForce, Number, Pressure, Quantity
 from .section import BrokenRule, Section, key
@@ -512,13 +512,20 @@ class Valve(Section):
         return self.flange_radius if found is None else factor * found
 
     @property
+    def bill_width(self) -> float:
+        """Twice the distance in m from the axis that the outer face of the lip reaches at rest."""
+        aside = None if self.key_points is None else key_point_lip(self.key_points)
+        factor = 1.0 if self._given is None else self.scale
+        aside = self.lip.widest + abs(self.bill_shift) if aside is None else factor * aside
+        return 2 * aside + self.thickness_at(0.0)
+
+    @property
     def outer_diameter(self) -> float:
-        """Largest extent in m of the outer face at rest across the axis, of the parametric shape."""
+        """Largest extent in m of the outer face at rest across the axis, of flange, lip and parametric cuff."""
         flange = 2 * self.inlet_radius + self.thickness_at(self.length)
-        if self.key_points is not None:
-            return flange
-        cuff = 2 * self.cuff_radius + self.thickness_at(self.length) if self.cuff_length + self.flare_length > 0 else 0
-        return max(flange, cuff, 2 * (self.lip.widest + abs(self.bill_shift)) + self.thickness_at(0.0))
+        has_cuff = self.key_points is None and self.cuff_length + self.flare_length > 0
+        cuff = 2 * self.cuff_radius + self.thickness_at(self.length) if has_cuff else 0
+        return max(flange, cuff, self.bill_width)
 
     @field_validator("key_points", mode="after")
     @classmethod

@@ -295,7 +295,14 @@ def oddities(case: Case) -> Iterator[str]:
     bore, pipe = 2.0 * case.valve.inlet_radius, case.upstream.diameter
     if case.has_line and not case.upstream.pieces and pipe is not None and not 0.5 < pipe / bore < 2.0:
         yield f"upstream.diameter is {1e3 * pipe:.4g} mm before a valve of {1e3 * bore:.4g} mm."
+    valve, given = case.valve.as_given, 0.5 * case.valve.as_given.length
+    wall = max(valve.thickness_at(place) for place in (0.0, given, 2 * given))
     for i, layer in enumerate(case.layers):
+        if layer.thickness > 3 * wall and len(case.layers) > 1:
+            yield (
+                f"layers.{i}.thickness is {1e3 * layer.thickness:.4g} mm in a wall of {1e3 * wall:.4g} mm; all layers "
+                "are scaled until they fill the wall."
+            )
         if 0 < abs(layer.angle) <= math.pi and layer.angle % 1:
             yield f'layers.{i}.angle is {layer.angle:g} degrees; radians are given as "{layer.angle:g} rad".'
 

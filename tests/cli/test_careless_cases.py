@@ -31,6 +31,8 @@ CARELESS = [
     (["valve.duckbill_length=-10 mm"], "duckbill_length"),
     (["valve.lenght=1 m"], "length"),
     (["downstream.pipe_diameter=100 mm"], "pipe_diameter"),
+    (["downstream.pipe_diameter=270 mm"], "a bill that is 274.4 mm wide"),
+    (["layers.0.thickness=12 in"], "no wall has such a layer"),
     (["outside.fluid=same", "outside.pipe_diameter=200 mm"], "pipe_diameter"),
     (["layers.0.material=rubber"], "rubber"),
     (["damping.model=structural"], "damping.model"),
@@ -82,6 +84,7 @@ def test_studies_refuse_contradictions_before_they_solve(command_line, one_sente
     [
         (["valve.lip_half_width=250 mm"], "half the width of the bill"),
         (["layers.2.angle=0.785"], "0.785 rad"),
+        (["layers.0.thickness=60 mm"], "scaled until they fill the wall"),
         (["upstream.length=30 m", "upstream.diameter=45 mm"], "45 mm before a valve of 278"),
     ],
 )

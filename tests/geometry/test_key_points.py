@@ -99,6 +99,7 @@ def test_a_smooth_skin_goes_through_its_profiles_and_needs_no_row_on_them(tmp_pa
     a, b = 0.15 - 0.05 * np.sin(np.pi * mesh.z / 1.12), 0.01 + 0.09 * np.sin(np.pi * mesh.z / 1.12) ** 2
     assert mesh.rest_area == pytest.approx(np.pi / 4 * a * b, rel=3e-3)
     assert case.valve.inlet_radius == pytest.approx(0.1, rel=1e-6)
+    assert case.valve.bill_width == pytest.approx(0.3 + case.valve.thickness_at(0.0), rel=1e-9)
     with pytest.raises(ValueError, match="the surface has 20 pieces and each needs an element"):
         ruled = Case().replace(given)
         valve_mesh(ruled.valve, ruled.mesh)

@@ -104,7 +104,7 @@ def random_downstream(rng) -> dict:
     keys = {"downstream.pressure": float(rng.choice([0.0, 10 ** rng.uniform(2, 5)]))}
     if rng.random() < 0.8:
         keys |= {
-            "downstream.pipe_diameter": float(rng.uniform(0.27, 0.9)),
+            "downstream.pipe_diameter": float(rng.uniform(0.28, 0.9)),
             "downstream.length": float(rng.choice([0.0, 10 ** rng.uniform(-1, 2.5)])),
             "downstream.loss": float(rng.choice([0.0, rng.uniform(0, 20)])),
         }

@@ -55,7 +55,7 @@ def random_installation(rng) -> dict:
     keys["downstream.pressure"] = float(rng.choice([0.0, 10 ** rng.uniform(2, 5)]))
     if rng.random() < 0.3:
         keys |= {
-            "downstream.pipe_diameter": float(rng.uniform(0.27, 0.9)),
+            "downstream.pipe_diameter": float(rng.uniform(0.28, 0.9)),
             "downstream.length": float(rng.choice([0.0, 10 ** rng.uniform(-1, 2)])),
             "downstream.loss": float(rng.choice([0.0, rng.uniform(0, 10)])),
         }
