@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..case.parameters import Mu
+from ..case.units import Units
 from ..drawing.views import deformed, layer_stress, valve_figure
 from ..effects import explained, without_numbers
 from ..errors import CaseError
@@ -197,25 +198,26 @@ def cycle_part(found: Gathered) -> Part | None:
         return (
             not_there(found, "cycle", _CYCLES) if "cycle" in found.missing and "cycle" not in found.not_asked else None
         )
-    row, here = found.case.units.parameter(result.parameter), Mu.of(found.case)[result.parameter]
+    units, here = found.case.units, Mu.of(found.case)[result.parameter]
+    row, size, unit = units.parameter(result.parameter), units.factor("size"), units.name("size")
     rows = tuple(
         (
             f"{p.value / row.scale:.4g}",
-            f"{1e3 * p.amplitude:.3g}",
+            f"{p.amplitude / size:.3g}",
             f"{p.frequency:.4g}",
-            f"{1e3 * p.lip_least:.3g} to {1e3 * p.lip_largest:.3g}",
+            f"{p.lip_least / size:.3g} to {p.lip_largest / size:.3g}",
             {True: "yes", False: "no", None: "not asked"}[p.stable],
         )
         for p in result.points
     )
-    head = (f"{row.title}, {row.shown_unit}", "amplitude of a lip, mm", "frequency, Hz", "lip from .. to, mm", "stable")
+    head = (f"{row.title}, {row.shown_unit}", f"amplitude of a lip, {unit}", "frequency, Hz", f"lip from .. to, {unit}", "stable")
     point = result.nearest(here)
     if abs(point.value - here) > 1e-6 * abs(here):
         said = f"The limit cycle was followed to {row.text(point.value)} and not to {row.text(here)}: {result.reason}."
     else:
         kind = {True: "A stable", False: "An unstable", None: "A"}[point.stable]
-        size = f"{1e3 * point.amplitude:.3g} mm of each lip, half its swing"
-        said = f"{kind} limit cycle of {size}, at {point.frequency:.4g} Hz."
+        swing = units.text_of("size", point.amplitude, 3)
+        said = f"{kind} limit cycle of {swing} of each lip, half its swing, at {point.frequency:.4g} Hz."
     pictures = pictures_of(result, {"branch": "Amplitude and frequency of the cycle; dashed where it is unstable."})
     return Part("cycle", _CYCLES, (said,), (Table(head, rows),), pictures, result.failures)
 
@@ -265,10 +267,11 @@ def valve_part(found: Gathered) -> Part | None:
     damping = _damping_table(found)
     levels = case.materials.levels({layer.material for layer in case.layers})
     told = listed(f"{name} {100 * level:.3g} %" for name, level in levels.items())
-    size = case.units.text_of("size", float(np.ptp(mesh.z)), 4)
-    sentences = [f"{size} long; the wall is {_range(mesh.thickness * 1e3)} mm thick, layers from inside to outside."]
+    units = case.units
+    size, wall = units.text_of("size", float(np.ptp(mesh.z)), 4), _range(mesh.thickness / units.factor("size"))
+    sentences = [f"{size} long; the wall is {wall} {units.name('size')} thick, layers from inside to outside."]
     sentences += [case.units.say(found.levels) or f"Strain levels of the rubbers: {told}."] if levels else []
-    tables = (_layers(mesh), *damping)
+    tables = (_layers(mesh, units), *damping)
     caption = "As the case describes it: faces, measures, wall and layers."
     return Part(
         "layers",
@@ -306,12 +309,12 @@ def _range(values: np.ndarray) -> str:
     return f"{low:.4g}" if high - low < 1e-6 * high else f"{low:.4g} to {high:.4g}"
 
 
-def _layers(mesh: MeshData) -> Table:
+def _layers(mesh: MeshData, units: Units) -> Table:
     rows = []
     for i, name in enumerate(mesh.layer_names):
         share, angle = mesh.layer_fractions[i], mesh.layer_angles[i]
-        rows.append((str(i + 1), name, _range(mesh.thickness * share * 1e3), f"{angle:g}"))
-    return Table(("layer", "material", "thickness, mm", "angle from the valve's axis, degrees"), tuple(rows))
+        rows.append((str(i + 1), name, _range(mesh.thickness * share / units.factor("size")), f"{angle:g}"))
+    return Table(("layer", "material", f"thickness, {units.name('size')}", "angle from the valve's axis, degrees"), tuple(rows))
 
 
 def warnings_part(found: Gathered) -> Part | None:
