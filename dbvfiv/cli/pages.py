@@ -57,6 +57,10 @@ def report(
         raise CaseError(
             f"-o is given as {str(output)!r}, and the page is HTML; give -o {output.stem}.html --pdf for both."
         )
+    if output is not None and (not output.suffix or output.is_dir()):
+        raise CaseError(
+            f"-o is given as {str(output)!r}, which names a folder; the page is a file, {output.name}.html."
+        )
     case = load_case(case_file, overrides or ())
     require_consistent(case)
     from ..report import gather, write_page, write_pdf  # drawing libraries, which a mistake need not wait for

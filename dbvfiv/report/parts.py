@@ -210,7 +210,13 @@ def cycle_part(found: Gathered) -> Part | None:
         )
         for p in result.points
     )
-    head = (f"{row.title}, {row.shown_unit}", f"amplitude of a lip, {unit}", "frequency, Hz", f"lip from .. to, {unit}", "stable")
+    head = (
+        f"{row.title}, {row.shown_unit}",
+        f"amplitude of a lip, {unit}",
+        "frequency, Hz",
+        f"lip from .. to, {unit}",
+        "stable",
+    )
     point = result.nearest(here)
     if abs(point.value - here) > 1e-6 * abs(here):
         said = f"The limit cycle was followed to {row.text(point.value)} and not to {row.text(here)}: {result.reason}."
@@ -314,7 +320,9 @@ def _layers(mesh: MeshData, units: Units) -> Table:
     for i, name in enumerate(mesh.layer_names):
         share, angle = mesh.layer_fractions[i], mesh.layer_angles[i]
         rows.append((str(i + 1), name, _range(mesh.thickness * share / units.factor("size")), f"{angle:g}"))
-    return Table(("layer", "material", f"thickness, {units.name('size')}", "angle from the valve's axis, degrees"), tuple(rows))
+    return Table(
+        ("layer", "material", f"thickness, {units.name('size')}", "angle from the valve's axis, degrees"), tuple(rows)
+    )
 
 
 def warnings_part(found: Gathered) -> Part | None:
