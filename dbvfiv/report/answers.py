@@ -111,7 +111,9 @@ def chatters(found: Gathered) -> Answer:
         worst = verdicts[max(bad, key=lambda p: verdicts[p].growth_rate)]
         kind = "flutters" if worst.outcome == "flutters" else "diverges, without oscillating,"
         text = f"It {kind} at {listed(units.pressure(p, 3) for p in bad)}"
-        text += f", at {worst.frequency:.3g} Hz at most" if worst.frequency else ""
+        swings = [verdicts[p].frequency for p in bad if verdicts[p].frequency > 0]
+        ends = dict.fromkeys(f"{end(swings):.3g}" for end in (min, max)) if swings else ()
+        text += f", at {' to '.join(ends)} Hz" if ends else ""
         return Answer(question, YES, f"{text}. {_onsets(found)}".strip(), _factor(verdicts), _sure(found, verdicts))
     if unknown:
         p = unknown[0]
@@ -232,7 +234,8 @@ def _collapse(result, rated: float) -> str:
     at, units = result.critical_pressure, result.case.units
     if at is None or at >= rated:
         return ""
-    return f"{_gives_way(result)} at {units.pressure(at, 3)}, below the rated back pressure"
+    below = "rated back pressure" if result.case.closure.rated_pressure is not None else "largest one examined"
+    return f"{_gives_way(result)} at {units.pressure(at, 3)}, below the {below}"
 
 
 def _gives_way(result) -> str:

@@ -242,7 +242,7 @@ def closure_part(found: Gathered) -> Part:
             "yes" if s.closed else "no",
             f"{s.sealed_length / units.factor('size'):.3g}",
             f"{s.leak * 3.6e6:.3g}",
-            f"{s.contact_force:.3g}",
+            _plain(s.contact_force),
             f"{s.max_displacement / units.factor('size'):.3g}",
         )
         for s in sorted(result.states, key=lambda s: s.pressure)
@@ -257,7 +257,9 @@ def closure_part(found: Gathered) -> Part:
     )
     caption = "Sealed length, largest displacement and stiffness of the wall over the back pressure."
     curve = picture("closure", caption, lambda: closure_figure(result), units=units)
-    sentences = tuple(units.say(line) for line in result.remarks() if not line.startswith("Forces balance"))
+    rated = found.case.closure.rated_pressure is not None  # a factor of safety is one over the rated pressure
+    left = ("Forces balance",) if rated else ("Forces balance", "Safety factor")
+    sentences = tuple(units.say(line) for line in result.remarks() if not line.startswith(left))
     trust = tuple(
         units.say(line) for line in (*result.failures, *(l for l in result.remarks() if l.startswith("Forces")))
     )

@@ -81,6 +81,16 @@ def test_page_one_answers_the_four_questions(made):
         assert given in words
 
 
+def test_chatter_is_told_with_all_its_frequencies(made):
+    """From the least to the largest frequency of the heads that flutter, whichever grows fastest."""
+    found, _ = made
+    swings = [result.verdict.frequency for result in found.modes.values() if result.verdict.stable is False]
+    told = next(one.text for one in answers(found) if "chatter" in one.question)
+    ends = re.search(r", at ([\d.]+)(?: to ([\d.]+))? Hz", told)
+    assert float(ends[1]) == pytest.approx(min(swings), rel=5e-3)
+    assert float(ends[2] or ends[1]) == pytest.approx(max(swings), rel=5e-3)
+
+
 def test_nothing_asked_is_missing(made):
     found, page = made
     for name in ("answers", "steady", "heads", "onset", "closure", "strains", "layers", "law", "case"):
