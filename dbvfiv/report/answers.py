@@ -170,7 +170,8 @@ def _sure(found: Gathered, verdicts: dict) -> tuple[str, ...]:
     factors = [v.critical_damping_factor for v in verdicts.values() if np.isfinite(v.critical_damping_factor)]
     if spread is not None:
         low, high = spread
-        holds = not any(low <= factor <= high for factor in factors)
+        always = any(v.stable is False for v in verdicts.values()) and max(factors, default=0.0) > high
+        holds = always or not any(low <= factor <= high for factor in factors)  # one head that chatters is enough
         word = "holds" if holds else "does not hold"
         said.append(f"over the range of the loss factors, {low:.2g} to {high:.2g} times: the verdict {word}")
     else:

@@ -91,6 +91,15 @@ def test_chatter_is_told_with_all_its_frequencies(made):
     assert float(ends[2] or ends[1]) == pytest.approx(max(swings), rel=5e-3)
 
 
+@pytest.mark.parametrize("end, word", [(0.9, "verdict holds"), (1.1, "does not hold")])
+def test_chatter_holds_while_one_head_chatters_at_the_most_damping(made, monkeypatch, end, word):
+    found, _ = made
+    factor = max(result.verdict.critical_damping_factor for result in found.modes.values())
+    monkeypatch.setattr("dbvfiv.report.answers.loss_range", lambda _: (0.01, end * factor))
+    told = next(one.uncertainty for one in answers(found) if "chatter" in one.question)
+    assert any(word in line for line in told)
+
+
 def test_nothing_asked_is_missing(made):
     found, page = made
     for name in ("answers", "steady", "heads", "onset", "closure", "strains", "layers", "law", "case"):
