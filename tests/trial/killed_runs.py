@@ -43,6 +43,7 @@ RUNS = {
     "design": lambda valve, path: valve.replace({"design.evaluations": 3, "design.finer": 1}).design(
         {"thickness": "0.7:1.4"}, aim="flow at 2 kPa up", constraints=["mass at most 8 kg"], output=path
     ),
+    "response": lambda valve, path: valve.replace({"response.count": 16, "fluid.density": 1000}).response(output=path),
     "transient": lambda valve, path: valve.transient("20 ms", output=path),
     "levels": lambda valve, path: valve.levels([1e3, 2e3], output=path),
     "cycle": lambda valve, path: valve.replace(OSCILLATING).cycle("density=236:260:2", output=path),
