@@ -1,10 +1,9 @@
-"""A server of the page as its user starts it, and a browser before it."""
+"""A server of the page as its user starts it, and a tab of it."""
 
 from __future__ import annotations
 
 import os
 import re
-import shutil
 import signal
 import subprocess
 import sys
@@ -12,9 +11,6 @@ import time
 from contextlib import contextmanager
 from pathlib import Path
 
-import pytest
-
-NEEDED = ("chromium", "chromedriver")
 #: The 6-inch valve on a mesh that answers at once; damping by stiffness, which compiles least.
 COARSE = """[valve]
 duckbill_length = "105 mm"
@@ -76,23 +72,6 @@ class Served:
                 os.killpg(self.process.pid, signal.SIGKILL)
                 self.process.wait()
         return self.process.returncode
-
-
-def browser(width: int = 1440, height: int = 1000, downloads: Path | None = None):
-    """A headless Chromium; the test is skipped where there is none."""
-    missing = [name for name in NEEDED if shutil.which(name) is None]
-    if missing:
-        pytest.skip(f"{' and '.join(missing)} not found; `apt-get install chromium chromium-driver` brings them")
-    webdriver = pytest.importorskip("selenium.webdriver")
-    options = webdriver.ChromeOptions()
-    options.binary_location = shutil.which("chromium")
-    for flag in ("headless", "no-sandbox", "disable-gpu", "no-first-run", "enable-unsafe-swiftshader"):
-        options.add_argument(f"--{flag}")
-    options.add_argument(f"--window-size={width},{height}")
-    options.set_capability("goog:loggingPrefs", {"browser": "ALL"})
-    if downloads is not None:
-        options.add_experimental_option("prefs", {"download.default_directory": str(downloads)})
-    return webdriver.Chrome(options=options, service=webdriver.ChromeService(shutil.which("chromedriver")))
 
 
 class Tab:

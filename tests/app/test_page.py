@@ -8,7 +8,8 @@ import pytest
 
 pytest.importorskip("nicegui", reason="NiceGUI is not installed; `pip install 'dbvfiv[app]'` brings it")
 from dbvfiv.cli import run
-from tests.app.server import COARSE, Tab, browser, served
+from tests.app.server import COARSE, Tab, served
+from tests.browser import browser
 
 
 @pytest.fixture(scope="module")

@@ -13,7 +13,8 @@ import pytest
 
 pytest.importorskip("nicegui", reason="NiceGUI is not installed; `pip install 'dbvfiv[app]'` brings it")
 from dbvfiv.studies.case import load_case
-from tests.app.server import COARSE, Served, Tab, browser, served
+from tests.app.server import COARSE, Served, Tab, served
+from tests.browser import browser
 
 pytestmark = pytest.mark.slow
 WIDE, NARROW = (1440, 1000), (390, 844)

@@ -8,26 +8,16 @@ import shutil
 import pytest
 
 from dbvfiv.report import write_pdf
+from tests.browser import browser as open_browser
 from tests.report.test_report import made as made
 
 pytestmark = pytest.mark.slow
-NEEDED = ("chromium", "chromedriver")
 
 
 @pytest.fixture(scope="module")
 def browser(made):
     """A headless Chromium with the page of a coarse valve in it."""
-    missing = [name for name in NEEDED if shutil.which(name) is None]
-    if missing:
-        pytest.skip(f"{' and '.join(missing)} not found; `apt-get install chromium chromium-driver` brings them")
-    webdriver = pytest.importorskip("selenium.webdriver")
-    options = webdriver.ChromeOptions()
-    options.binary_location = shutil.which("chromium")
-    for flag in ("headless", "no-sandbox", "disable-gpu", "no-first-run", "enable-unsafe-swiftshader"):
-        options.add_argument(f"--{flag}")
-    options.add_argument("--window-size=1280,1000")
-    options.set_capability("goog:loggingPrefs", {"browser": "ALL"})
-    driver = webdriver.Chrome(options=options, service=webdriver.ChromeService(shutil.which("chromedriver")))
+    driver = open_browser(1280)
     driver.set_page_load_timeout(120)
     driver.get(made[1].as_uri())
     yield driver
