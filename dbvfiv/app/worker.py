@@ -84,7 +84,7 @@ class Desk:
         return self._explorer.predict(**values).summary()
 
     def bounded(self, values: dict[str, float]) -> dict[str, Any]:
-        """The same with its bound."""
+        """Prediction of the reduced operator with its bound."""
         return self._explorer.bounded(**values).summary()
 
     def confirm(self, values: dict[str, float]) -> dict[str, Any]:

@@ -6,12 +6,11 @@ name several bounds, ``margin at 2 m at least 2 %:8 %:4``: a design is then soug
 
 from __future__ import annotations
 
-import math
 import re
 from dataclasses import dataclass, replace
 
 from .parameters import PARAMETERS
-from .quantity import Quantity
+from .quantity import Quantity, number_or_text
 
 #: What designs are judged by, and how it is shown.
 QUANTITIES = {
@@ -130,14 +129,7 @@ def parse_span(text: str, quantity: Quantity) -> tuple[float, float]:
     parts = [part.strip() for part in text.split(":")]
     if len(parts) != 2:
         raise ValueError("which is not LOW:HIGH")
-    low, high = (quantity.parse(float(part) if _is_number(part) else part) for part in parts)
+    low, high = (quantity.parse(number_or_text(part)) for part in parts)
     if not low < high:
         raise ValueError("whose bounds do not rise")
     return low, high
-
-
-def _is_number(text: str) -> bool:
-    try:
-        return math.isfinite(float(text))
-    except ValueError:
-        return False

@@ -10,7 +10,7 @@ change places, and it is never above the least one, by at most ln(modes) / rho b
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -113,7 +113,7 @@ def statements_of(case: Case) -> tuple[Statement, ...]:
 
 @dataclass(frozen=True)
 class AtHead:
-    """What a valve does at a pressure: values by quantity, and their derivatives (n,) by the variables."""
+    """Performance of a valve at a pressure: values by quantity, and their derivatives (n,) by the variables."""
 
     values: dict[str, float]
     slopes: dict[str, np.ndarray]
@@ -126,14 +126,16 @@ class DesignProblem:
     ----------
     case : Case
     known : mapping, optional
-        Found earlier, by values of the variables and pressure: what the valve does, or the sentence why it does not.
+        Found earlier, by values of the variables, pressure and whether modes were asked: what the valve does, or the
+        sentence why it does not.
+    keep : callable, optional
+        Called with the key and what is found under it, as soon as it is.
     """
 
-    def __init__(self, case: Case, known: Mapping[tuple, AtHead | str] = {}):
+    def __init__(self, case: Case, known: Mapping[tuple, AtHead | str] = {}, keep: Callable = lambda key, found: None):
         self.case, self.variables = case, variables_of(case)
         self.known: dict[tuple, AtHead | str] = dict(known)
-        self._near: dict[float, np.ndarray] = {}
-        self._walk: tuple[tuple, StabilityWalk] | None = None
+        self._keep = keep
 
     def values_at(self, share: np.ndarray) -> tuple[float, ...]:
         """Values of the variables from their shares (n,) of the way between the bounds."""
@@ -159,7 +161,7 @@ class DesignProblem:
         return case
 
     def at(self, values: tuple[float, ...], pressure: float, margin: bool) -> AtHead:
-        """What the valve with these values does at a pressure.
+        """Performance of the valve with these values at a pressure.
 
         Raises
         ------
@@ -169,9 +171,11 @@ class DesignProblem:
         key = (values, pressure, margin)
         if key not in self.known:
             try:
-                self.known[key] = self._solved(values, pressure, margin)
+                found: AtHead | str = self._solved(values, pressure, margin)
             except (SolveError, CaseError, ValueError) as error:
-                self.known[key] = str(error)
+                found = str(error)
+            self._keep(key, found)
+            self.known[key] = found
         found = self.known[key]
         if isinstance(found, str):
             raise SolveError(found)
@@ -186,13 +190,9 @@ class DesignProblem:
         return None
 
     def _solved(self, values: tuple[float, ...], pressure: float, margin: bool) -> AtHead:
-        if self._walk is None or self._walk[0] != values:
-            self._walk = values, StabilityWalk(self.case_at(values), Observer())
-        walk = self._walk[1]
+        walk = StabilityWalk(self.case_at(values), Observer())
         place = Mu.of(walk.case).at(pressure=pressure)
-        walk.settle(place, self._near.get(pressure))
-        q, model = walk.equilibrium(place), walk.built(place).model
-        self._near[pressure] = q
+        q, model = walk.equilibrium(place), walk.built(place).model  # from rest: it depends on no other state
         modes = self._modes(walk, place) if margin else ()
         beside = Neighbourhood(model, q, pressure, place, modes, self.case.sensitivity.step)
         found = {name: beside.performance[theirs] for name, theirs in _PERFORMANCE.items()}

@@ -57,6 +57,11 @@ class Design:
         return self.violation <= HELD
 
 
+def best_of(designs: Sequence[Design], aim: Statement) -> Design | None:
+    """Design that holds and aims best, or misses least where none holds; None of none."""
+    return min(designs, key=lambda one: (0.0, -aim.sign * one.aim) if one.holds else (one.violation, 0.0), default=None)
+
+
 class Search:
     """Designs of a problem for an aim and constraints with one bound each.
 
@@ -93,7 +98,7 @@ class Search:
         return best
 
     def _by_aim(self) -> list[tuple]:
-        """What was tried and held, the best aim first."""
+        """Evaluations that were tried and held, the best aim first."""
         held = [found for found in self._seen.values() if found is not None and found[4].holds]
         return sorted(held, key=lambda found: found[0])
 
@@ -139,10 +144,7 @@ class Search:
                 options={"ftol": GAIN, "maxiter": evaluations},
             )
         designs = [found[4] for found in self._seen.values() if found is not None]
-        held_ones = [design for design in designs if design.holds]
-        if held_ones:
-            return min(held_ones, key=lambda design: -self.aim.sign * design.aim)
-        return min(designs, key=lambda design: design.violation, default=None)
+        return best_of(designs, self.aim)
 
     def _scale(self, share: np.ndarray) -> float:
         """Size of the aim at the start.

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import asdict, replace
-from functools import cached_property
+from functools import cached_property, partial
 from pathlib import Path
 from typing import Any
 
@@ -28,7 +28,7 @@ from ..stability.walk import StabilityWalk
 from ..study import Study, nothing_to_resume
 from . import figures
 from .problem import AtHead, DesignProblem, Variable, statements_of, variables_of
-from .search import LOOK, Design, Search, starts_of
+from .search import LOOK, Design, Search, best_of, starts_of
 
 DESIGNS, VERIFIED, _STATE, _DESIGN = "designs", "verified", "state", "design"
 #: Number of a design in tables: the case itself.
@@ -88,9 +88,9 @@ def run(session: Session, record: GrowingRecord, cases: Path | None = None) -> N
     if case.has_pump:
         raise CaseError("Behind a pump a head is no input; give drive.pressure and no upstream.pump.", "upstream.pump")
     aim, *constraints = statements_of(case)
-    problem = DesignProblem(case, _known(record))
-    _keep_states(problem, record)
-    bounds = max((one.bounds for one in constraints), key=len, default=(np.nan,))
+    problem = DesignProblem(case, _known(record), partial(_keep, record))
+    result = DesignResult(record, session)
+    bounds = result.bounds
     starts = starts_of(problem, case.design.starts)
     record.begin("design", len(bounds) * len(starts) * case.design.evaluations)
     best: Design | None = None
@@ -109,7 +109,7 @@ def run(session: Session, record: GrowingRecord, cases: Path | None = None) -> N
             record.note(_DESIGN, design=number, start=i, **asdict(design))
             row = {"design": number, "start": i, "bound": bound, "aim": design.aim, "violation": design.violation}
             record.append(DESIGNS, row)
-        best = _best(found, aim) if found else None
+        best = best_of(found, aim)
         if best is None:
             continue
         if not best.holds:
@@ -117,19 +117,13 @@ def run(session: Session, record: GrowingRecord, cases: Path | None = None) -> N
                 f"No design holds all constraints{_for(bound, bounds)}: the nearest misses one by {best.violation:.2%}."
             )
         if cases is not None:
-            _write(problem.case_at(best.values), cases / f"design-{number + 1}.toml", best)
-    result = DesignResult(record, session)
+            _write(problem.case_at(best.values), cases / f"design-{number + 1}.toml")
     for number, design in [(CASE, None), *result.best.items()]:
         _verify(problem, case, number, design, result.pressures, record)
 
 
 def _for(bound: float, bounds) -> str:
     return f" with the bound {bound:g}" if len(bounds) > 1 else ""
-
-
-def _best(found: list[Design], aim: Statement) -> Design:
-    """Design that holds and aims best, or misses least."""
-    return min(found, key=lambda one: (0.0, -aim.sign * one.aim) if one.holds else (one.violation, 0.0))
 
 
 def _tell(tried: Design | str, record: GrowingRecord) -> None:
@@ -151,21 +145,15 @@ def _known(record: GrowingRecord) -> dict[tuple, AtHead | str]:
     return found
 
 
-def _keep_states(problem: DesignProblem, record: GrowingRecord) -> None:
-    """Keep each state in the record as soon as it is known."""
-
-    class Kept(dict):
-        def __setitem__(self, key, found):
-            values, pressure, margin = key
-            told = found if isinstance(found, str) else found.values
-            slopes = {} if isinstance(found, str) else {name: list(map(float, s)) for name, s in found.slopes.items()}
-            record.note(_STATE, values=list(values), pressure=pressure, margin=margin, found=told, slopes=slopes)
-            super().__setitem__(key, found)
-
-    problem.known = Kept(problem.known)
+def _keep(record: GrowingRecord, key: tuple, found: AtHead | str) -> None:
+    """Keep a state in the record as soon as it is known."""
+    values, pressure, margin = key
+    told = found if isinstance(found, str) else found.values
+    slopes = {} if isinstance(found, str) else {name: list(map(float, s)) for name, s in found.slopes.items()}
+    record.note(_STATE, values=list(values), pressure=pressure, margin=margin, found=told, slopes=slopes)
 
 
-def _write(case: Case, path: Path, design: Design) -> None:
+def _write(case: Case, path: Path) -> None:
     path.parent.mkdir(parents=True, exist_ok=True)
     path.write_text(case_toml(case, comments=False) + "\n")
 
@@ -250,7 +238,7 @@ class DesignResult(StudyResult):
         for note in self.found:
             design = Design(tuple(note["values"]), note["aim"], tuple(note["constraints"]), note["violation"])
             found.setdefault(note["design"], []).append(design)
-        return {number: _best(designs, self.statements[0]) for number, designs in found.items()}
+        return {number: best_of(designs, self.statements[0]) for number, designs in found.items()}
 
     def case_of(self, number: int = 0) -> Case:
         """Case of a design."""
@@ -264,7 +252,7 @@ class DesignResult(StudyResult):
         return {name: column[here] for name, column in rows.items()}
 
     def evidence(self, number: int) -> str:
-        """What the finer mesh says of a design, as a sentence."""
+        """Verdicts on a design on the finer mesh, as a sentence."""
         rows = self.verified(number)
         if not len(rows["pressure"]):
             return "not verified"
@@ -310,8 +298,7 @@ class DesignResult(StudyResult):
         aim, *constraints = self.statements
         lines = [f"Aim: {aim.text}; {'; '.join(one.text for one in constraints) or 'no constraints'}."]
         for number, design in self.best.items():
-            front = len(self.bounds) > 1
-            lines.append(f"Design {number + 1}{_for(self.bounds[number], self.bounds) if front else ''}:")
+            lines.append(f"Design {number + 1}{_for(self.bounds[number], self.bounds)}:")
             for one, value in zip(self.variables, design.values):
                 change = f"{100 * (value / one.start - 1):+.1f} %" if one.start else ""
                 lines.append(f"  {one.name:<34}{one.start:12.5g} -> {value:<12.5g}{one.unit:<8}{change}")

@@ -64,7 +64,7 @@ class Sensitivity:
 
     @property
     def derivative(self) -> complex:
-        """Of the eigenvalue of the first mode, 1/s per unit."""
+        """Derivative of the eigenvalue of the first mode, 1/s per unit."""
         return self.eigenvalues[0]
 
     @property

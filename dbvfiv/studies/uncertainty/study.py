@@ -141,7 +141,7 @@ def _found(sampler: Sampler, first: int, numbers: np.ndarray) -> list[Found]:
 
 
 def _performance(outcome: int, damping_ratio: float) -> float:
-    """How far a sample is beyond flutter; NaN where it is undecided."""
+    """Distance of a sample beyond flutter; NaN where it is undecided."""
     return np.nan if OUTCOMES[outcome] == UNDECIDED else -damping_ratio
 
 
