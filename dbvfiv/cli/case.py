@@ -69,7 +69,7 @@ def case(
 
 def _print_inputs(case, as_json: bool) -> None:
     """Print the uncertain inputs of a case with their sources."""
-    from ..studies.uncertainty.inputs import inputs_of
+    from ..studies.inputs import inputs_of
 
     inputs = inputs_of(case)
     if as_json:

@@ -229,10 +229,9 @@ def compare(
 
 def _recognise(files: list[Path], columns: Sequence[str], within: float) -> Recognition:
     """A measured record beside a result."""
-    from ..studies.recognition import Recognition
+    from ..studies.recognition import Reading, Recognition, judge_file
     from ..studies.session import load_result
     from ..verdict import JudgeOptions
-    from .verdict import Reading, judge_file
 
     if len(files) != 2:
         raise CaseError(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -100,15 +101,18 @@ def judge_record(
         If the samples are no series.
     """
     time, values = check_samples(time, values)
-    level = judge(time, values, options, closed_below=closed_below)
-    part, _ = longest_part(time)
-    if level.name == "closed" or len(time[part]) < _FEWEST or not np.ptp(values[part]):
+    part, notes = longest_part(time)
+    judged = partial(judge, time, values, options, closed_below=closed_below)
+    if len(time[part]) < _FEWEST or not np.ptp(values[part]):
+        return judged()
+    if closed_below is not None and (level := judged()).name == "closed":
         return level
     series = Series.of(time[part], values[part])
     found = find_motion(series, detrend, MAINS)
     if found.name not in _LINES:
         if found.returns:
-            return replace(level, name="irregular", decided=True, reason=found.reason)
+            return replace(judged(), name="irregular", decided=True, reason=found.reason)
+        level = judged()
         if found.name == "steady" and level.name != "steady":
             words = "Nothing stands out of its noise."
             return replace(level, name="steady", decided=True, reason=words, noise=found.noise, cycles=0, period=np.nan)
@@ -117,7 +121,7 @@ def judge_record(
         return replace(level, name="irregular", decided=True, reason=found.reason)
     line = found.lines[0]
     if line.frequency * series.step > _FASTEST or line.amplitude > 2.0 * np.ptp(series.values):
-        return level  # a level that moves without noise is met by the fastest or the largest of oscillations
+        return judged()  # a level that moves without noise is met by the fastest or the largest of oscillations
     cycles = int(series.duration * line.frequency)
     count = round(cycles / (line.frequency * series.step))  # samples of whole cycles
     swung = series.values[-count:] if cycles else series.values
@@ -139,11 +143,11 @@ def judge_record(
         amplitude_trend=float(np.expm1(line.rate / line.frequency)),
         harmonics=shape,
         rms=float(swung.std()),
-        smallest=level.smallest,
-        largest=level.largest,
+        smallest=float(values.min()),
+        largest=float(values.max()),
         noise=found.noise,
-        judged=level.judged,
-        notes=(*level.notes, *found.notes),
+        judged=(float(time[part][0]), float(time[part][-1])),
+        notes=(*notes, *found.notes),
         lines=told,
         modulation=spacing,
     )

@@ -3,21 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
-from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from eigen import ColumnSolver
 
-from ...case.parameters import PARAMETERS, Mu
 from ...errors import CaseError, SolveError
 from ...observer import Observer
-from ..case import Case
+from ..inputs import Plan
 from ..stability.verdict import OUTCOMES, Verdict
 from ..stability.walk import StabilityWalk
-from .inputs import Input, correlation_of, inputs_of
 
 
 class Found(NamedTuple):
@@ -55,68 +51,6 @@ class Found(NamedTuple):
         numbers = verdict.growth_rate, verdict.frequency, verdict.damping_ratio
         why = "" if verdict.stable is not None else verdict.reason
         return cls(sample, value, OUTCOMES.index(verdict.outcome), *numbers, *read, why)
-
-
-@dataclass(frozen=True)
-class Plan:
-    """Inputs and places of a case whose probability is asked.
-
-    Attributes
-    ----------
-    case : Case
-    """
-
-    case: Case
-
-    @cached_property
-    def inputs(self) -> list[Input]:
-        return inputs_of(self.case)
-
-    @cached_property
-    def _turn(self) -> np.ndarray:
-        return correlation_of(self.case, self.inputs)
-
-    @property
-    def parameter(self) -> str:
-        """Parameter of the range; the pressure where there is none."""
-        axis = self.case.uncertainty.axis
-        return "pressure" if axis is None else axis.parameter
-
-    @property
-    def values(self) -> tuple[float, ...]:
-        """Values of the range, SI."""
-        axis = self.case.uncertainty.axis
-        return (self.case.drive.pressure,) if axis is None else axis.values
-
-    @property
-    def is_surrounding(self) -> bool:
-        """True where no input moves a steady state, so that all samples share those of the case."""
-        return all(one.surrounding for one in self.inputs)
-
-    def scores_of(self, independent: np.ndarray) -> np.ndarray:
-        """Scores (n, d) of the inputs, correlated as the case says."""
-        return independent @ self._turn.T
-
-    def numbers(self, independent: np.ndarray) -> np.ndarray:
-        """Values (n, d) of the inputs, SI, from independent standard normal scores."""
-        scores = self.scores_of(independent)
-        return np.column_stack([one.distribution.at(scores[:, i]) for i, one in enumerate(self.inputs)])
-
-    def place(self, case: Case, value: float, row: np.ndarray) -> Mu:
-        """Parameter point of a sample."""
-        named = {one.name: x for one, x in zip(self.inputs, row) if one.name in PARAMETERS}
-        return Mu.of(case).at(**(named | {self.parameter: value}))
-
-    def redescribed(self, row: np.ndarray) -> Case:
-        """Case of a sample, without the parameters of the table.
-
-        Raises
-        ------
-        CaseError
-            For numbers that do not go together.
-        """
-        keys = {one.name: float(x) for one, x in zip(self.inputs, row) if one.name not in PARAMETERS}
-        return self.case.replace(keys) if keys else self.case
 
 
 class Sampler:

@@ -1,12 +1,13 @@
-"""Samples of independent standard normal scores, probabilities with their intervals, and shares of variance."""
+"""Densities of samples, probabilities with their intervals, and shares of variance."""
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
+
+from ..inputs import quasi_random
 
 #: Confidence of intervals.
 CONFIDENCE = 0.95
@@ -19,16 +20,6 @@ STEPS = 12
 DEFENSIVE = 0.1
 #: Regions of a rare event that are told apart.
 REGIONS = 2
-
-
-def quasi_random(count: int, dimension: int, seed: int) -> np.ndarray:
-    """Scores (count, dimension) of a scrambled Sobol sequence; the first are those of a shorter one."""
-    from scipy.special import ndtri
-    from scipy.stats import qmc
-
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", UserWarning)  # counts that are no power of two are balanced a little less
-        return ndtri(np.clip(qmc.Sobol(dimension, seed=seed).random(count), 1e-12, 1 - 1e-12))
 
 
 @dataclass(frozen=True)

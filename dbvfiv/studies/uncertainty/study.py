@@ -15,6 +15,7 @@ from ...record.mesh import MeshData
 from ...record.record import GrowingRecord, Record
 from ...record.table import Column, TableSpec
 from ..case import Case
+from ..inputs import Plan, quasi_random
 from ..result import StudyResult
 from ..session import Session
 from ..stability.place import check_scan, describe_fixed, fixed_conditions
@@ -23,8 +24,8 @@ from ..stability.walk import StabilityWalk
 from ..study import Study, nothing_to_resume
 from ..workers import Lost, Work, Workers
 from . import figures
-from .sampler import Found, Plan, Sampler
-from .sampling import CONFIDENCE, Probability, Shifted, approach, counted, quasi_random, shares, weighted
+from .sampler import Found, Sampler
+from .sampling import CONFIDENCE, Probability, Shifted, approach, counted, shares, weighted
 
 SAMPLES, NUMBERS, _WHY = "samples", "numbers", "undecided sample"
 _SAMPLES = (

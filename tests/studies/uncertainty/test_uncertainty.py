@@ -10,9 +10,9 @@ import pytest
 import dbvfiv
 from dbvfiv.errors import CaseError
 from dbvfiv.observer import Observer
+from dbvfiv.studies.inputs import inputs_of
 from dbvfiv.studies.session import load_result
 from dbvfiv.studies.stability.verdict import OUTCOMES
-from dbvfiv.studies.uncertainty.inputs import inputs_of
 from tests.small_valves import SMALL, load_small
 
 LINE = "cases/dbv12-in-line.toml"

@@ -1,22 +1,24 @@
-"""Uncertain inputs of a case: those that it names, or the shipped ones of what it is made of."""
+"""Uncertain inputs of a case: those that it names, or the shipped ones of what it is made of; and samples of them."""
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
-from ...case.damping import LARGEST_LOSS
-from ...case.describe import numeric_limits, quantity_of
-from ...case.distribution import ALLOWED, FORMS, Distribution
-from ...case.parameters import PARAMETERS, Mu
-from ...case.quantity import Quantity
-from ...errors import CaseError
-from ...materials.shipped import shipped_loss, shipped_loss_names
-from ..case import Case
-from ..stability.place import design_value, is_surrounding, number_of, require_parameter
-from ..stability.verdict import lowered
+from ..case.damping import LARGEST_LOSS
+from ..case.describe import numeric_limits, quantity_of
+from ..case.distribution import ALLOWED, FORMS, Distribution
+from ..case.parameters import PARAMETERS, Mu
+from ..case.quantity import Quantity
+from ..errors import CaseError
+from ..materials.shipped import shipped_loss, shipped_loss_names
+from .case import Case
+from .stability.place import design_value, is_surrounding, number_of, require_parameter
+from .stability.verdict import lowered
 
 #: Hardness of a compound lies within 5 Shore A of what was ordered (trade practice with ISO 48-4), a fifth of its shear
 #: modulus (Gent, Rubber Chem. Technol. 31, 1958, 896); read as 95 %.
@@ -129,6 +131,78 @@ def correlation_of(case: Case, inputs: Sequence[Input]) -> np.ndarray:
             f"correlations has the eigenvalue {np.linalg.eigvalsh(matrix)[0]:.3g}, and all must be greater than 0.",
             key="uncertainty.correlation",
         ) from None
+
+
+def quasi_random(count: int, dimension: int, seed: int) -> np.ndarray:
+    """Scores (count, dimension) of a scrambled Sobol sequence; the first are those of a shorter one."""
+    from scipy.special import ndtri
+    from scipy.stats import qmc
+
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", UserWarning)  # counts that are no power of two are balanced a little less
+        return ndtri(np.clip(qmc.Sobol(dimension, seed=seed).random(count), 1e-12, 1 - 1e-12))
+
+
+@dataclass(frozen=True)
+class Plan:
+    """Inputs and places of a case whose probability is asked.
+
+    Attributes
+    ----------
+    case : Case
+    """
+
+    case: Case
+
+    @cached_property
+    def inputs(self) -> list[Input]:
+        return inputs_of(self.case)
+
+    @cached_property
+    def _turn(self) -> np.ndarray:
+        return correlation_of(self.case, self.inputs)
+
+    @property
+    def parameter(self) -> str:
+        """Parameter of the range; the pressure where there is none."""
+        axis = self.case.uncertainty.axis
+        return "pressure" if axis is None else axis.parameter
+
+    @property
+    def values(self) -> tuple[float, ...]:
+        """Values of the range, SI."""
+        axis = self.case.uncertainty.axis
+        return (self.case.drive.pressure,) if axis is None else axis.values
+
+    @property
+    def is_surrounding(self) -> bool:
+        """True where no input moves a steady state, so that all samples share those of the case."""
+        return all(one.surrounding for one in self.inputs)
+
+    def scores_of(self, independent: np.ndarray) -> np.ndarray:
+        """Scores (n, d) of the inputs, correlated as the case says."""
+        return independent @ self._turn.T
+
+    def numbers(self, independent: np.ndarray) -> np.ndarray:
+        """Values (n, d) of the inputs, SI, from independent standard normal scores."""
+        scores = self.scores_of(independent)
+        return np.column_stack([one.distribution.at(scores[:, i]) for i, one in enumerate(self.inputs)])
+
+    def place(self, case: Case, value: float, row: np.ndarray) -> Mu:
+        """Parameter point of a sample."""
+        named = {one.name: x for one, x in zip(self.inputs, row) if one.name in PARAMETERS}
+        return Mu.of(case).at(**(named | {self.parameter: value}))
+
+    def redescribed(self, row: np.ndarray) -> Case:
+        """Case of a sample, without the parameters of the table.
+
+        Raises
+        ------
+        CaseError
+            For numbers that do not go together.
+        """
+        keys = {one.name: float(x) for one, x in zip(self.inputs, row) if one.name not in PARAMETERS}
+        return self.case.replace(keys) if keys else self.case
 
 
 def _input(case: Case, name: str, text: str, source: str) -> Input:
