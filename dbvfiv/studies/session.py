@@ -20,7 +20,7 @@ from ..record.mesh import MeshData
 from ..record.record import GrowingRecord, Record, StoredRecord
 from . import KINDS
 from .case import Case, require_consistent
-from .study import Study, find_study, nothing_to_resume
+from .study import Study, find_study
 
 #: Keyword arguments of the Python interface and the keys of the case that they stand for.
 KEYWORDS = {row.name: row.key for row in PARAMETERS.values() if row.swept} | {
@@ -285,8 +285,8 @@ def resume_result(path: str | Path, observer: Observer | None = None, changes: M
     """
     check_writable(path)  # what another process is about to add must not be missed
     study, known = _find(path), _read(path)
-    if study.rows_to_keep is None and known.complete and not changes:
-        raise nothing_to_resume(study.kind, path)
+    if known.complete and not study.extends:
+        raise CaseError(f"The {study.kind} run in {str(path)!r} is complete; there is nothing to resume.")
     session = Session(known.header.rebuildable_case(), known.header.name).replace(changes)
     if study.rows_to_keep is not None:
         known.cut(study.rows_to_keep(known, session.case))

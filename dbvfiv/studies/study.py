@@ -5,10 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from importlib import import_module
-from pathlib import Path
 from typing import Any
 
-from ..errors import CaseError
 from ..record.mesh import MeshData
 from ..record.record import Record
 from ..record.table import Column, TableSpec, printed_head, printed_row
@@ -33,8 +31,10 @@ class Study:
         `StudyResult` of its records.
     rows_to_keep : callable, optional
         From what an earlier attempt kept and the case as it is to go on, to how many rows of each table the run goes on
-        from; it refuses with a `CaseError` if there is nothing left to do. Without it a run goes on from all rows, and
-        a complete one is refused.
+        from. Without it a run goes on from all rows.
+    extends : bool, optional
+        A complete run can go on, to a later end; ``rows_to_keep`` refuses one without it by a `CaseError`. Other
+        studies that are complete are refused.
     live : callable, optional
         From the case to what writes an item that was found as a line of a table, as soon as it is; the first line has
         the head of the table above it. Without it everything is printed at the end.
@@ -47,6 +47,7 @@ class Study:
     run: Callable[..., None]
     result: type[Any]
     rows_to_keep: Callable[[Record, Case], Mapping[str, int]] | None = None
+    extends: bool = False
     live: Callable[[Case], Callable[[Any], str]] | None = None
     compare: Callable[[Sequence[Any]], Any] | None = None
 
@@ -65,11 +66,6 @@ def print_rows(columns: Iterable[Column]) -> Callable[[Any], str]:
         return "\n".join(lines)
 
     return write
-
-
-def nothing_to_resume(kind: str, path: str | Path | None) -> CaseError:
-    """Error for a complete run that is asked to resume."""
-    return CaseError(f"The {kind} run in {str(path)!r} is complete; there is nothing to resume.")
 
 
 def find_study(kind: str) -> Study:

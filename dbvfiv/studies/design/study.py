@@ -25,7 +25,7 @@ from ..session import Session
 from ..stability.place import check_scan
 from ..stability.verdict import OUTCOMES, STABLE
 from ..stability.walk import StabilityWalk
-from ..study import Study, nothing_to_resume
+from ..study import Study
 from . import figures
 from .problem import AtHead, DesignProblem, Variable, statements_of, variables_of
 from .search import LOOK, Design, Search, best_of, starts_of
@@ -58,15 +58,7 @@ def tables_of(_mesh: MeshData) -> tuple[TableSpec, ...]:
 
 
 def rows_to_keep(known: Record, _case: Case) -> dict[str, int]:
-    """Rows that a run goes on from: none, because designs follow from the states, which are kept.
-
-    Raises
-    ------
-    CaseError
-        If the run is complete.
-    """
-    if known.complete:
-        raise nothing_to_resume("design", known.path)
+    """Rows that a run goes on from: none, because designs follow from the states, which are kept."""
     return {DESIGNS: 0, VERIFIED: 0}
 
 

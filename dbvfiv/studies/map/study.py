@@ -27,7 +27,7 @@ from ..stability.place import check_scan, describe_fixed, fixed_conditions
 from ..stability.samples import SAMPLE_TABLE, SAMPLES, Sample, keep_samples, read_samples
 from ..stability.verdict import DIVERGES, FLUTTERS, NOT_VALID, OUTCOMES, STABLE, Verdict
 from ..stability.walk import StabilityWalk
-from ..study import Study, nothing_to_resume
+from ..study import Study
 from . import cycles, figures
 from .column import ColumnTask, MapColumn, MapPlan, grid_of
 from .curves import OnsetCurve, Web, doubts, linked
@@ -261,14 +261,7 @@ def read_columns(record: Record, plan: MapPlan) -> list[MapColumn]:
 def rows_to_keep(known: Record, case: Case) -> dict[str, int]:
     """Rows that a map goes on from: samples, onsets and cycles of a column that was cut off before what vouches for
     them are left out.
-
-    Raises
-    ------
-    CaseError
-        If the map is complete.
     """
-    if known.complete:
-        raise nothing_to_resume("map", known.path)
     samples, onsets = (int(known.column(COLUMNS, name).sum()) for name in ("sample_count", "onset_count"))
     return {SAMPLES: samples, ONSETS: onsets, cycles.ROWS: cycles.vouched_rows(known, MapPlan(case))}
 

@@ -26,7 +26,7 @@ from ..stability.dimensions import Variant, compare_states, own_variant, variant
 from ..stability.verdict import Verdict
 from ..stability.walk import StabilityWalk
 from ..state import State, states_of
-from ..study import Study, nothing_to_resume
+from ..study import Study
 from . import figures
 from .figures import animate_mode
 from .search import CURVE, MODE, Certificate, FoundModes, ModeShape, ModesOptions, critical_damping_factor, run_modes
@@ -103,15 +103,7 @@ def _rows(record: Record, table: str, variant: Variant) -> np.ndarray:
 
 
 def rows_to_keep(known: Record, case: Case) -> dict[str, int]:
-    """Rows of the variants that were found; of one that was cut off the rows are found again.
-
-    Raises
-    ------
-    CaseError
-        If the run is complete.
-    """
-    if known.complete:
-        raise nothing_to_resume("modes", known.path)
+    """Rows of the variants that were found; of one that was cut off the rows are found again."""
     found = _notes(known)
     return {table: sum(len(_rows(known, table, variant)) for variant in found) for table in (MODES, COUNT)}
 

@@ -28,7 +28,7 @@ from ..stability.place import is_surrounding, require_parameter
 from ..stability.samples import SAMPLE_TABLE, SAMPLES, Sample, read_samples
 from ..stability.verdict import Verdict
 from ..stability.walk import StabilityWalk, name_state_in_failures
-from ..study import Study, nothing_to_resume
+from ..study import Study
 from . import figures
 from .branches import BRANCHES, STATES, Tracking
 
@@ -102,15 +102,7 @@ def run(session: Session, record: GrowingRecord) -> None:
 
 
 def rows_to_keep(known: Record, _case: Case) -> dict[str, int]:
-    """No rows: a sweep that was ended starts anew.
-
-    Raises
-    ------
-    CaseError
-        If the sweep is complete.
-    """
-    if known.complete:
-        raise nothing_to_resume("sweep", known.path)
+    """No rows: a sweep that was ended starts anew."""
     return dict.fromkeys((SAMPLES, BRANCHES, STATES), 0)
 
 

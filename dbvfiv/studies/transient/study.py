@@ -332,4 +332,4 @@ def compare(results: Sequence[TransientResult]) -> Together:
     return Together(results, labels(results, figures.QUIET))
 
 
-STUDY = Study("transient", tables_of, run, TransientResult, rows_to_keep=rows_to_keep, compare=compare)
+STUDY = Study("transient", tables_of, run, TransientResult, rows_to_keep=rows_to_keep, extends=True, compare=compare)

@@ -21,7 +21,7 @@ from ..session import Session
 from ..stability.place import check_scan, describe_fixed, fixed_conditions
 from ..stability.verdict import DIVERGES, FLUTTERS, NOT_VALID, OUTCOMES, STABLE, UNDECIDED
 from ..stability.walk import StabilityWalk
-from ..study import Study, nothing_to_resume
+from ..study import Study
 from ..workers import Lost, Work, Workers
 from . import figures
 from .sampler import Found, Sampler
@@ -62,15 +62,7 @@ def tables_of(_mesh: MeshData) -> tuple[TableSpec, ...]:
 
 
 def rows_to_keep(known: Record, _case: Case) -> dict[str, int]:
-    """Rows that a run goes on from: those of whole samples.
-
-    Raises
-    ------
-    CaseError
-        If the run is complete.
-    """
-    if known.complete:
-        raise nothing_to_resume("uncertainty", known.path)
+    """Rows that a run goes on from: those of whole samples."""
     return {name: known.rows(name) for name in (SAMPLES, NUMBERS)}
 
 
