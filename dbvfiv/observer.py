@@ -90,7 +90,7 @@ class Progress(Observer):
 
     def progress(self, text: str) -> None:
         if self._bar is not None:
-            self._bar.set_postfix_str(text)
+            self._bar.set_postfix_str(self._say(text))
 
     def item(self, result: object) -> None:
         if self._row is not None:

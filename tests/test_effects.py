@@ -6,7 +6,7 @@ from dbvfiv.effects import EFFECTS, explained
 from dbvfiv.fit import outside_band
 from dbvfiv.model import ValveModel
 from dbvfiv.model.equilibria import model_warnings
-from dbvfiv.studies.case import load_case
+from dbvfiv.studies.case import load_case, oddities
 from dbvfiv.studies.closure.valve import closure_model
 from dbvfiv.studies.session import Session
 from tests.small_valves import SMALL
@@ -62,6 +62,12 @@ MENDED = {
         + ["closure.rated_pressure=2 kPa"],
         "400 Pa",
     ),
+    "half the diameter is its radius": (oddities, ["valve.flange_radius=12 in"], "139 mm"),
+    "more than any that is sold": (oddities, ["valve.scale=12"], "1"),
+    "it is half the width of the bill": (oddities, ["valve.lip_half_width=250 mm"], "125 mm"),
+    "before a valve of": (oddities, ["upstream.length=3 m", "upstream.diameter=45 mm"], "300 mm"),
+    "and its jet of": (oddities, ["fluid.density=1"], "343 m/s"),
+    "a gas, of which": (oddities, ["fluid.density=1", "drive.pressure=1 m"], "1 mH2O"),
     "held shut by its supports": (of_closed, ["closure.supports=held-lips"], "contact"),
     "asks for all symmetry classes": (of_closed, ["closure.supports=held-lips", "closure.symmetry=all"], "SS"),
 }

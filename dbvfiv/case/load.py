@@ -19,7 +19,7 @@ from typing import Any, TypeVar
 from pydantic import ValidationError
 
 from ..errors import CaseError
-from .describe import allowed_words, element_model, synonym
+from .describe import allowed_words, element_model, quantity_of, synonym
 from .materials import KINDS, Materials
 from .section import BrokenRule, Section
 
@@ -124,7 +124,8 @@ def sentence(
     else:
         reason = f", {cause}" if isinstance(cause, ValueError) else ""
         allowed = allowed_words(field) if field is not None else "a table of the case"
-        body = f"{_dotted(path)} is given as {_show(problem['input'])}{reason}; it must be {allowed}."
+        given = _with_unit(problem["input"], field) if problem["type"] in _OUT_OF_BOUNDS else problem["input"]
+        body = f"{_dotted(path)} is given as {_show(given)}{reason}; it must be {allowed}."
     line = line_of(path, lines)
     if any(path[: len(o)] == o or o[: len(path)] == path for o in overridden):
         line, where = None, "In an override, "
@@ -184,6 +185,17 @@ def _elsewhere(key: str, case: type[Section]) -> str | None:
         if model and key in model.model_fields and typing.get_origin(field.annotation) is not tuple:
             return f"{section}.{key}"
     return None
+
+
+#: Kinds of error of a number that was read, SI, and is too small or too large.
+_OUT_OF_BOUNDS = ("greater_than", "greater_than_equal", "less_than", "less_than_equal")
+
+
+def _with_unit(value: Any, field: Any) -> Any:
+    """A number, SI, in the unit of its field; a text as it is, and a number too large for one."""
+    is_plain = isinstance(value, float) and abs(value) < 1e15
+    quantity = quantity_of(field) if field is not None and is_plain else None
+    return value if quantity is None else quantity.show(value)
 
 
 def _show(value: Any) -> str:

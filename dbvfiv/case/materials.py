@@ -119,6 +119,7 @@ class Ogden(Relaxing):
 
 #: Shore A hardness for which Gent's relation holds (Qi, Joyce and Boyce, Rubber Chem. Technol. 76, 2003, 419-435).
 SOFTEST, HARDEST = 20.0, 80.0
+_RANGE = f"a modulus follows from {SOFTEST:g} to {HARDEST:g} Shore A alone"
 _SHORE = re.compile(r"\s*(\d+(?:\.\d*)?)\s*(?:°\s*)?sh(?:ore)?[\s-]*a\s*", re.IGNORECASE)
 
 
@@ -134,7 +135,7 @@ def _by_hardness(given: Any) -> Any:
     if match is None:
         return given
     if not SOFTEST <= float(match[1]) <= HARDEST:
-        raise ValueError(f"while hardness tells the modulus from {SOFTEST:g} to {HARDEST:g} Shore A")
+        raise ValueError(f"and {_RANGE}")
     return float(f"{shear_modulus_of(float(match[1])):.15g}")
 
 
@@ -314,6 +315,10 @@ class Materials(Section):
             if isinstance(value, dict) and "hardness" in value and "shear_modulus" not in value:
                 given = value["hardness"]
                 modulus = f"{given} Shore A" if isinstance(given, (int, float)) else given
+                if not isinstance(modulus, str) or not _SHORE.fullmatch(modulus):
+                    raise BrokenRule(f"{name}.hardness", repr(given), 'it must be such as "60 Shore A"')
+                if not SOFTEST <= float(_SHORE.fullmatch(modulus)[1]) <= HARDEST:
+                    raise BrokenRule(f"{name}.hardness", modulus, _RANGE)
                 rest = {key: one for key, one in value.items() if key != "hardness"}
                 named[name] = {"kind": "neo-hookean", "shear_modulus": modulus} | rest
             elif name in BUILT_IN and isinstance(value, dict):

@@ -129,6 +129,19 @@ def check_key_points(valve: Valve) -> None:
 
 def check_sections(valve: Valve) -> None:
     """Refuse sections that leave no passage, and shapes that cannot be meshed."""
+    half_wall = 0.5 * valve._wall_at(0.0)
+    if 2 * valve.lip.height < half_wall:
+        raise BrokenRule(
+            "lip_radius",
+            f"{valve.lip_radius:g} m, so that the middle of one lip lies inside the other",
+            f"half the wall, {half_wall:g} m, lets their faces touch at rest",
+        )
+    if valve.initial_gap > valve.lip.height:
+        raise BrokenRule(
+            "initial_gap",
+            f"{valve.initial_gap:g} m, while the middle of a lip's wall stands {valve.lip.height:g} m above the slit",
+            "the gap is that between faces at rest",
+        )
     if valve.lip_rise > valve.lip_half_width:
         raise BrokenRule(
             "lip_rise", f"{valve.lip_rise:g} m", f"it must be at most lip_half_width = {valve.lip_half_width:g} m"
@@ -148,8 +161,7 @@ def check_sections(valve: Valve) -> None:
             )
     lip, flange = valve.rest_areas
     if lip >= flange:
-        name = "initial_gap" if lip - valve.lip_half_width * valve.initial_gap < flange else "lip_radius"
-        name = name if valve.lip_rise == 0 else "lip_rise"
+        name = "lip_radius" if valve.lip_rise == 0 else "lip_rise"
         raise BrokenRule(
             name,
             f"{getattr(valve, name):g} m, which leaves {4e4 * lip:.4g} cm2 between the lips at rest",

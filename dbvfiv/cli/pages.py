@@ -9,7 +9,7 @@ import typer
 
 from ..errors import CaseError, SolveError
 from ..observer import Progress
-from .terminal import AsJson, CaseFile, Override, print_json
+from .terminal import AsJson, CaseFile, Override, in_units, print_json
 
 
 def report(
@@ -73,7 +73,8 @@ def report(
     name = case_file.stem if case_file else "dbv12"
     page = output or Path(f"{name}-report.html")
     leave_out = (*(without or ()), *(() if cycle else ("cycle",)))
-    found = gather(case, name, runs or page.with_suffix(""), leave_out, workers or min(4, processors()), as_json)
+    with in_units(case.units):
+        found = gather(case, name, runs or page.with_suffix(""), leave_out, workers or min(4, processors()), as_json)
     write_page(found, page)
     written = [page, *([write_pdf(page, page.with_suffix(".pdf"))] if pdf else [])]
     answered = answers(found)
@@ -88,7 +89,8 @@ def report(
         print(f"{found.seconds:.0f} s of processor time. {' and '.join(map(str, written))} written.")
     failed = found.failed
     if failed:
-        raise SolveError("; ".join(f"no result of {name}: {why.rstrip('.')}" for name, why in failed.items()) + ".")
+        said = "; ".join(f"no result of {name}: {why.rstrip('.')}" for name, why in failed.items()) + "."
+        raise SolveError(case.units.say(said))
 
 
 def reproduce(

@@ -74,7 +74,7 @@ def _describe(result: Any) -> list[str]:
     said = [header.case.units.say(line) for line in (*result.lines(), *settled)]
     lines = [f"{name:<10}{value}" for name, value in facts] + ["", *said]
     notes = [("Warning", text) for text in result.warnings] + [("Failure", text) for text in result.failures]
-    return lines + [""] * bool(notes) + [f"{kind}: {text}" for kind, text in notes]
+    return lines + [""] * bool(notes) + [f"{kind}: {header.case.units.say(text)}" for kind, text in notes]
 
 
 class FigureFormat(StrEnum):

@@ -15,7 +15,7 @@ from ..errors import CaseError, SolveError
 from ..observer import Progress
 from ..studies import KINDS
 from ..studies.request import is_sheet
-from .terminal import AsJson, CaseFile, Output, Override, PlotFolder, ResultFile, print_answer
+from .terminal import AsJson, CaseFile, Output, Override, PlotFolder, ResultFile, in_units, print_answer
 
 #: Arguments that the command of a study may take from those that all share.
 _SHARED = ("case", "plots", "output")
@@ -42,7 +42,8 @@ def _make_command(kind: str, module: ModuleType) -> Callable[..., None]:
         case = load_case(case_file, overrides or ())
         shared = {"case": case, "plots": plots, "output": output}
         request = module.command(**{name: shared[name] for name in _SHARED if name in asked}, **given)
-        case = _in_units_asked(case, given.get("pressures") or [given.get("pressure")])
+        ranges = [text for text in map(given.get, ("over", "x", "y")) if text and text.startswith("pressure=")]
+        case = _in_units_asked(case, given.get("pressures") or [given.get("pressure")] + ranges)
         perform(kind, case, request, case_file.stem if case_file else "dbv12", output, plots, as_json)
 
     shared_last = (("output", Output, None), ("plots", PlotFolder, None), ("overrides", Override, None))
@@ -66,7 +67,7 @@ def _in_units_asked(case, pressures):
     """The case, read in the unit in which the command line has its pressure."""
     from ..case.units import unit_of, with_pressure_in
 
-    unit = unit_of(pressures[0])
+    unit = next(filter(None, map(unit_of, pressures)), "")
     if unit in ("", case.units.name("pressure")):
         return case
     return case.replace({"project.units": with_pressure_in(case.project.units, unit)})
@@ -85,20 +86,21 @@ def perform(kind: str, case, request, name: str, output: Path | None, plots: Pat
     case = case.replace({"project.units": changes.pop("project.units", case.project.units)})
     choices = {key: value for key, value in request.choices.items() if value is not None}
     session = Session(case, name).replace(changes)
-    session.mesh  # a case that gives no model fails before a table begins
-    live = None if as_json else find_study(kind).live
-    progress = Progress(quiet=as_json, row=live and live(session.case), say=case.units.say)
-    result = session.perform(kind, output if request.sheet is None else None, progress, **choices)
-    if request.sheet is not None:
-        found = [result]
-        try:
-            for variant in request.variants:
-                if found[-1].interrupted:
-                    break
-                found.append(session.replace(variant).perform(kind, None, progress, **choices))
-        finally:  # what was found is kept
-            request.sheet(found)
-    _report(result, output, plots, as_json, further=request.further, printed=live is not None)
+    with in_units(case.units):
+        session.mesh  # a case that gives no model fails before a table begins
+        live = None if as_json else find_study(kind).live
+        progress = Progress(quiet=as_json, row=live and live(session.case), say=case.units.say)
+        result = session.perform(kind, output if request.sheet is None else None, progress, **choices)
+        if request.sheet is not None:
+            found = [result]
+            try:
+                for variant in request.variants:
+                    if found[-1].interrupted:
+                        break
+                    found.append(session.replace(variant).perform(kind, None, progress, **choices))
+            finally:  # what was found is kept
+                request.sheet(found)
+        _report(result, output, plots, as_json, further=request.further, printed=live is not None)
 
 
 def resume(
@@ -124,6 +126,7 @@ def resume(
     from ..case.quantity import Quantity, number_or_text
     from ..record.files import kind_of
     from ..resuming import resume
+    from ..studies.session import load_result
 
     kind = kind_of(file)
     if animate is not None and kind != "transient":
@@ -134,9 +137,11 @@ def resume(
             end = Quantity("s", "s").parse(number_or_text(duration))
         except ValueError as error:
             raise CaseError(f"--duration is given as {duration!r}, {error}.") from None
-    result = resume(file, duration=end, workers=workers, observer=Progress(quiet=as_json))
-    films = animate is not None and result.drawable
-    _report(result, file, plots, as_json, further=(lambda run: [run.animate(animate)]) if films else None)
+    units = load_result(file).case.units
+    with in_units(units):
+        result = resume(file, duration=end, workers=workers, observer=Progress(quiet=as_json, say=units.say))
+        films = animate is not None and result.drawable
+        _report(result, file, plots, as_json, further=(lambda run: [run.animate(animate)]) if films else None)
 
 
 def _report(

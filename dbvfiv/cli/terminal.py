@@ -5,14 +5,16 @@ from __future__ import annotations
 import json
 import math
 import sys
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import asdict, is_dataclass
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 
-from ..errors import CaseError
+from ..case.units import Units
+from ..errors import CaseError, SolveError
 from ..studies.request import is_sheet
 
 
@@ -46,6 +48,16 @@ Output = Annotated[
 PlotFolder = Annotated[
     Path | None, typer.Option("--plots", metavar="DIR", help="Draw all figures into this folder.", callback=_folder)
 ]
+
+
+@contextmanager
+def in_units(units: Units) -> Iterator[None]:
+    """Context whose failures are told in the units of a case."""
+    try:
+        yield
+    except (CaseError, SolveError) as error:
+        error.args = (units.say(str(error)),)
+        raise
 
 
 def print_json(document: Any) -> None:

@@ -9,6 +9,16 @@ import numpy as np
 from .valve import ValveModel
 
 
+def hoop_strain(model: ValveModel, pressure: float) -> float:
+    """Strain of the round wall at the inlet by an inner pressure, Pa, of a thin cylinder that is free along its axis
+    and keeps the stiffness it has at rest.
+    """
+    valve, stiffness = model.case.valve, model.shell.at_rest.plane_stiffness
+    a = stiffness if stiffness.ndim == 2 else stiffness[-1]  # the zone at the inlet
+    around = a[1, 1] - a[0, 1] ** 2 / a[0, 0]
+    return float(pressure * valve.inlet_radius / (valve.thickness_at(valve.length) * around))
+
+
 @dataclass(frozen=True)
 class ValveSizes:
     """Derived sizes.

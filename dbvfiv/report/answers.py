@@ -66,7 +66,9 @@ def opens(found: Gathered) -> Answer:
         why = found.why("steady") if found.case.drive.kind == "flow" else "No fluid flows: drive.kind is 'uniform'."
         return Answer(question, UNKNOWN, why if steady is None or not steady.failures else steady.failures[0])
     crack = steady.cracking
-    if crack is None or crack.pressure is None:
+    if crack is None:
+        return Answer(question, UNKNOWN, "No cracking head was found below the heads examined.")
+    if crack.pressure is None:
         return Answer(question, NO, f"The lips do not crack up to {units.pressure(top)}.")
     text = (
         f"Cracks at {units.pressure(crack.pressure, 3)}; at {units.pressure(top)} the opening is "

@@ -12,6 +12,8 @@ from ..drawing.style import COMPUTED, DANGER, PUBLISHED, STABLE, UNSTABLE, new_f
 from .answers import loss_range
 from .gather import Gathered
 
+_LEAST_DAMPED = "Damping ratio of\nthe least damped mode, %"
+
 
 def headloss_figure(found: Gathered) -> Figure:
     """Head loss and opening over the flow."""
@@ -40,7 +42,7 @@ def vibration_figure(found: Gathered) -> Figure:
         look = {True: ("o", STABLE), False: ("X", UNSTABLE)}.get(verdict.stable, ("s", "0.6"))
         ratio.plot(at, value, look[0], color=look[1], ms=8 if verdict.stable is False else 6)
     ratio.axhspan(min(0.0, np.nanmin(damping, initial=0.0)) - 0.5, 0.0, color=DANGER, lw=0)
-    ratio.set_ylabel("Damping ratio of the least damped mode, %")
+    ratio.set_ylabel(_LEAST_DAMPED)
     _factors(found, factor, head, [v.critical_damping_factor for v in verdicts.values()])
     for axes in (ratio, factor):
         axes.set_xlabel("Head, kPa" if found.case.units.heads else "Inlet pressure, kPa")
@@ -86,7 +88,7 @@ def pipe_figure(found: Gathered, sweeps: dict) -> Figure:
     axes.set_xscale("log")
     axes.xaxis.set_major_formatter(lambda value, _: f"{value:g}")
     axes.set_xlabel("Length of the pipe, m")
-    axes.set_ylabel("Damping ratio of\nthe least damped mode, %")
+    axes.set_ylabel(_LEAST_DAMPED)
     axes.legend(loc="best", fontsize=8)
     return figure
 

@@ -10,10 +10,8 @@ import os
 import sys
 import time
 from collections.abc import Callable, Iterator
-from concurrent.futures import ProcessPoolExecutor, as_completed
 from contextlib import suppress
 from dataclasses import dataclass, field
-from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
 
@@ -27,6 +25,7 @@ from ..observer import Observer, is_watched
 from ..studies.case import Case
 from ..studies.session import Session, kept_run, load_result
 from ..studies.stability.place import why_it_moves
+from ..studies.workers import Work, Workers
 
 #: What a report can leave out.
 PARTS = ("steady", "heads", "pipe", "onset", "law", "mesh", "levels", "closure", "cycle")
@@ -356,22 +355,16 @@ class _Studies:
 
     def _share(self, runs: list[Run]) -> None:
         """Let several processes fill the files of runs; what fails there is told when the run is made here."""
-        longest_first = sorted(runs, key=lambda run: -run.share)
-        with ProcessPoolExecutor(min(self.workers, len(runs)), get_context("spawn")) as pool:
-            try:
-                jobs = {}
-                for run in longest_first:
-                    with suppress(CaseError):
-                        jobs[pool.submit(_fill, run.kind, self._asked(run), self._path(run))] = run.name
-                for job in as_completed(jobs):
-                    self.bar.done(jobs[job])
-            except BaseException:  # what runs on would be waited for
-                for worker in list(pool._processes.values()):
-                    worker.terminate()
-                raise
+        asked = {}
+        for run in sorted(runs, key=lambda run: -run.share):  # longest first
+            with suppress(CaseError):
+                asked[run.name] = Work(_fill, (run.kind, self._asked(run), self._path(run)))
+        with Workers(min(self.workers, len(asked)), str, (), self.bar.warn) as team:
+            for name, _ in team.share(asked, asked.__getitem__):
+                self.bar.done(name)
 
 
-def _fill(kind: str, session: Session, path: Path) -> None:
+def _fill(_context: str, kind: str, session: Session, path: Path) -> None:
     """Make a run in a process of its own."""
     with suppress(CaseError, SolveError):
         kept_run(kind, session, path)

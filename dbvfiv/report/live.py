@@ -50,8 +50,9 @@ def valve(state: State, units: Units) -> str:
         flatshading=True,
         hovertemplate="z %{x:.3g}, x %{y:.3g}, y %{z:.3g}<br>displacement %{intensity:.3g} " + f"{mm}<extra></extra>",
     )
-    axes = {f"{axis}axis": {"title": f"{name}, {mm}"} for axis, name in zip("xyz", "zxy")}
-    figure.update_scenes(aspectmode="data", camera={"eye": {"x": -1.8, "y": -1.9, "z": 1.1}}, **axes)
+    look = {"nticks": 4, "tickfont": {"size": 11}}  # of short axes seen aslant more labels meet
+    axes = {f"{axis}axis": {"title": f"{name}, {mm}"} | look for axis, name in zip("xyz", "zxy")}
+    figure.update_scenes(aspectmode="data", camera={"eye": {"x": -2.2, "y": -2.3, "z": 1.3}}, **axes)
     return _html(figure, "valve-live")
 
 

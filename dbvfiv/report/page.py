@@ -58,7 +58,16 @@ def write_page(found: Gathered, path: Path) -> Path:
     """
     first = First(sheet(found), tuple(answers(found)), tuple(trade(found)), unanswered(found), first_pictures(found))
     parts = _told_once([part for part in (make(found) for make in MAKERS) if part is not None])
-    return write_parts(path, found.name, setting(found), parts, case_toml(found.case), first)
+    return write_parts(path, found.name, setting(found), _in_units(found, parts), case_toml(found.case), first)
+
+
+def _in_units(found: Gathered, parts: list[Part]) -> list[Part]:
+    """Parts with the sentences of studies in the units of the case."""
+
+    def said(lines: tuple[str, ...]) -> tuple[str, ...]:
+        return tuple(map(found.case.units.say, lines))
+
+    return [replace(part, sentences=said(part.sentences), trust=said(part.trust)) for part in parts]
 
 
 def write_parts(

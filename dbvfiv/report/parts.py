@@ -74,7 +74,7 @@ def steady_part(found: Gathered) -> Part:
         *result.failures,
     )
     pictures = pictures_of(result, _MEASURED)
-    sentences = () if result.cracking is None else (units.say(result.cracking.sentence(states[-1].pressure)),)
+    sentences = () if result.cracking is None else (result.cracking.sentence(states[-1].pressure),)
     return Part("steady", _STEADY, sentences, (Table(tuple(head), tuple(map(row, states))),), pictures, trust)
 
 
@@ -153,12 +153,18 @@ def onset_part(found: Gathered) -> Part | None:
     if result is None:
         return not_there(found, "onset", title) if "onset" in found.missing and "onset" not in found.not_asked else None
     row = found.case.units.parameter("pressure")
-    head = (f"{_pressure_title(found)}, {row.shown_unit}", "+- (second mesh)", "frequency, Hz", "what changes", "how")
+    head = (
+        f"{_pressure_title(found)}, {row.shown_unit}",
+        f"+- (second mesh), {row.shown_unit}",
+        "frequency, Hz",
+        "what changes",
+        "how",
+    )
     kinds = {"super": "softly (supercritical)", "sub": "hard (subcritical)"}
     rows = tuple(
         (
             f"{p['value'] / row.scale:.4g}",
-            "-" if p["uncertainty"] is None else f"{p['uncertainty'] / row.scale:.2g}",
+            "no such onset there" if p["uncertainty"] is None else f"{p['uncertainty'] / row.scale:.2g}",
             f"{p['frequency']:.4g}",
             ("unstable" if p["gains"] else "stable") + " above",
             kinds.get(p["criticality"], "-"),
@@ -259,10 +265,8 @@ def closure_part(found: Gathered) -> Part:
     curve = picture("closure", caption, lambda: closure_figure(result), units=units)
     rated = found.case.closure.rated_pressure is not None  # a factor of safety is one over the rated pressure
     left = ("Forces balance",) if rated else ("Forces balance", "Safety factor")
-    sentences = tuple(units.say(line) for line in result.remarks() if not line.startswith(left))
-    trust = tuple(
-        units.say(line) for line in (*result.failures, *(l for l in result.remarks() if l.startswith("Forces")))
-    )
+    sentences = tuple(line for line in result.remarks() if not line.startswith(left))
+    trust = (*result.failures, *(line for line in result.remarks() if line.startswith("Forces")))
     return Part("closure", _CLOSURE, sentences, (Table(head, rows),), (curve, *pictures_of(result, _MEASURED)), trust)
 
 
@@ -278,7 +282,7 @@ def valve_part(found: Gathered) -> Part | None:
     units = case.units
     size, wall = units.text_of("size", float(np.ptp(mesh.z)), 4), _range(mesh.thickness / units.factor("size"))
     sentences = [f"{size} long; the wall is {wall} {units.name('size')} thick, layers from inside to outside."]
-    sentences += [case.units.say(found.levels) or f"Strain levels of the rubbers: {told}."] if levels else []
+    sentences += [found.levels or f"Strain levels of the rubbers: {told}."] if levels else []
     tables = (_layers(mesh, units), *damping)
     caption = "As the case describes it: faces, measures, wall and layers."
     return Part(

@@ -278,14 +278,45 @@ def _forgotten_units(case: Case, kind: str | None) -> Iterator[str]:
         given |= {f"{kind}, pressure": max(axis.values) for axis in axes if axis and axis.parameter == "pressure"}
     for name, value in given.items():
         if 0 < value < _NO_PRESSURE:
+            ends = "is" if name in ("drive.pressure", "closure.rated_pressure") else "ends at"
             yield (
-                f"{name} is {value:g} Pa, {1e3 * head_of(value, case.fluid.density):.2g} mm of the fluid; a number "
+                f"{name} {ends} {value:g} Pa, {1e3 * head_of(value, case.fluid.density):.2g} mm of the fluid; a number "
                 f'alone is in Pa, give "{value:g} m" or "{value:g} kPa".'
             )
 
 
+#: Share of the bore below which a bill is narrower than any that passes what its pipe brings, and bore, m, above that
+#: of all duckbill valves on sale (96 in).
+_NARROW, _LARGEST_BORE = 0.5, 2.5
+#: Speed of sound in air, m/s, and Mach number from which a gas is compressed by more than 5 % (density M^2/2).
+_SOUND_OF_AIR, _FAST = 343.0, 0.3
+
+
 def oddities(case: Case) -> Iterator[str]:
     """Sentences on keys that are allowed and seldom meant: half widths that are whole, degrees that are radians."""
+    yield from _sizes_seldom_meant(case)
+    yield from _gas(case)
+
+
+def _gas(case: Case) -> Iterator[str]:
+    """A density of a gas, with heads of it or a jet that compresses it."""
+    density, over = case.fluid.density, case.drive.pressure - case.downstream.pressure
+    if density >= _LIQUID or case.drive.kind != "flow" or case.has_pump:
+        return
+    if case.units.heads:
+        yield (
+            f"Heads are those of the fluid of {density:g} kg/m3, a gas, of which {case.units.pressure(over)} carry "
+            f'{over:.4g} Pa; give "1 mH2O" for heads of water, or fluid.density = 1000 for water.'
+        )
+    jet = math.sqrt(2.0 * max(over, 0.0) / density)
+    if case.fluid.sound_speed is None and jet > _FAST * _SOUND_OF_AIR:
+        yield (
+            f"fluid.density is {density:g} kg/m3, that of a gas, and its jet of {jet:.3g} m/s compresses it; give "
+            f"fluid.sound_speed, {_SOUND_OF_AIR:g} m/s in air, or fluid.density = 1000 for water."
+        )
+
+
+def _sizes_seldom_meant(case: Case) -> Iterator[str]:
     flat, half = 0.5 * math.pi * case.valve.inlet_radius, case.valve.lip_half_width
     if half > flat and not case.valve.key_points:
         yield (
@@ -293,6 +324,17 @@ def oddities(case: Case) -> Iterator[str]:
             "all; it is half the width of the bill."
         )
     bore, pipe = 2.0 * case.valve.inlet_radius, case.upstream.diameter
+    if case.valve.bill_width < _NARROW * bore:
+        key = "key_points make a pipe" if case.valve.key_points else "valve.flange_radius makes a pipe"
+        yield (
+            f"{key} of {1e3 * bore:.4g} mm before a bill that is {1e3 * case.valve.bill_width:.4g} mm wide; half the "
+            "diameter is its radius."
+        )
+    if bore > _LARGEST_BORE:
+        yield (
+            f"The valve has a bore of {bore:.3g} m, more than any that is sold; valve.scale is {case.valve.scale:g}, "
+            "which multiplies all its lengths."
+        )
     if case.has_line and not case.upstream.pieces and pipe is not None and not 0.5 < pipe / bore < 2.0:
         yield f"upstream.diameter is {1e3 * pipe:.4g} mm before a valve of {1e3 * bore:.4g} mm."
     valve, given = case.valve.as_given, 0.5 * case.valve.as_given.length

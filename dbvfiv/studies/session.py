@@ -7,10 +7,12 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
+from ..case.materials import HIGHEST_LEVEL
 from ..case.parameters import PARAMETERS
 from ..errors import CaseError
 from ..model import ValveModel
 from ..model.equilibria import find_equilibrium, operating_pressure, redescribe, rest_state, sealing_for_cracking
+from ..model.sizes import hoop_strain
 from ..model.state import SteadyState
 from ..model.strain_level import SettledLevels, settle_levels
 from ..observer import Observer
@@ -19,7 +21,7 @@ from ..record.header import Header
 from ..record.mesh import MeshData
 from ..record.record import GrowingRecord, Record, StoredRecord
 from . import KINDS
-from .case import Case, require_consistent
+from .case import Case, oddities, require_consistent
 from .study import Study, find_study
 
 #: Keyword arguments of the Python interface and the keys of the case that they stand for.
@@ -116,8 +118,23 @@ class Session:
 
     @cached_property
     def described(self) -> ValveModel:
-        """The model before anything is solved: rubbers whose strain levels are sought have the lowest tested ones."""
-        return _attempt(lambda: ValveModel(self.case))
+        """The model before anything is solved: rubbers whose strain levels are sought have the lowest tested ones.
+
+        Raises
+        ------
+        CaseError
+            If the case gives no model, or asks for a pressure that no wall like it bears.
+        """
+        model = _attempt(lambda: ValveModel(self.case))
+        for name, pressure in zip(("drive.pressure", "closure.rated_pressure"), self.case.straining_pressures()):
+            if pressure and (strain := hoop_strain(model, pressure)) > HIGHEST_LEVEL:
+                said = (
+                    f"{name} is {pressure / 1e3:.4g} kPa at most, which strains the round wall at the inlet by "
+                    f"{strain:.0%} around, more than the {HIGHEST_LEVEL:.0%} of the tests of rubber; give what it "
+                    "bears."
+                )
+                raise CaseError(self.case.units.say(said), key=name)
+        return model
 
     @cached_property
     def mesh(self) -> MeshData:
@@ -228,6 +245,8 @@ class Session:
         mesh = self.mesh  # a case that gives no model is told before a file is touched
         with GrowingRecord(header, mesh, study.tables(mesh), output, observer, known) as record:
             complete = False
+            for sentence in oddities(self.case):
+                record.warn(sentence)
             if self.settled is not None:
                 record.note("settled", text=str(self.settled))
                 for sentence in self.settled.warnings:

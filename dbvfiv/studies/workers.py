@@ -226,6 +226,8 @@ class Workers:
         self._pool = None
         for process in processes:
             process.kill()
+        for process in processes:  # processor time of a process counts when it has ended
+            process.join()
 
 
 #: Errors of a Dask cluster that mean that a worker died; the names, since its package is optional.

@@ -36,10 +36,13 @@ class SafetyFactor:
         For a loss of seal the last pressure on the path at which some section was shut; 0 if none ever was. For faces
         that cross the last at which they had not.
     rated_pressure : float, Pa
+        That of the case, else the largest one asked for.
     followed_to : float, Pa
         Largest back pressure of an equilibrium before arclength takes over.
     seal_assumed : bool
         The supports hold the lips shut, so that a loss of seal cannot be seen.
+    is_rated : bool
+        The case names a rated back pressure.
     """
 
     factor: float
@@ -49,21 +52,23 @@ class SafetyFactor:
     rated_pressure: float
     followed_to: float
     seal_assumed: bool = False
+    is_rated: bool = False
 
     def summary(self) -> dict[str, Any]:
         """Plain SI numbers for JSON."""
-        return vars(self) | {"meaning": MEANING}
+        return {name: value for name, value in vars(self).items() if name != "is_rated"} | {"meaning": MEANING}
 
     @property
     def sentence(self) -> str:
         """Sentence on the factor of safety and the limit that it refers to."""
-        rated = f"over the rated {self.rated_pressure / 1e3:.6g} kPa"
+        rated = "rated" if self.is_rated else "largest asked, as none is rated:"
+        rated = f"over the {rated} {self.rated_pressure / 1e3:.6g} kPa"
         if self.at_least:
             seal = "its seal is an assumption of the supports," if self.seal_assumed else "does not lose its seal,"
             return (
                 f"Safety factor at least {self.factor:.3g}: up to {self.followed_to / 1e3:.6g} kPa, {rated}, it does "
                 f"not buckle within the symmetry of the model, {seal} and its faces do not cross; "
-                "higher pressures tell more, with closure.rated_pressure for the rated one."
+                "higher pressures tell more" + (", and so does closure.rated_pressure." if not self.is_rated else ".")
             )
         if self.limit == SEAL and not self.limit_pressure:
             return f"Safety factor 0: no section was shut at any back pressure up to {self.followed_to / 1e3:.6g} kPa."
@@ -79,7 +84,7 @@ def find_safety(result: StudyResult) -> SafetyFactor | None:
     if not rising:
         return None
     closure = result.case.closure
-    rated = closure.rated_pressure or max(closure.pressures)
+    rated, is_rated = closure.rated_pressure or max(closure.pressures), closure.rated_pressure is not None
     followed = rising[-1].pressure
     limits = [(b.pressure, BUCKLING) for b in result.buckling[:1]]
     held = result.supports == HELD_LIPS
@@ -91,9 +96,9 @@ def find_safety(result: StudyResult) -> SafetyFactor | None:
     if result.walk_failure is not None and not result.buckling:
         limits.append((followed, END))
     if not limits:
-        return SafetyFactor(followed / rated, True, None, None, rated, followed, held)
+        return SafetyFactor(followed / rated, True, None, None, rated, followed, held, is_rated)
     pressure, limit = min(limits, key=lambda found: found[0])
-    return SafetyFactor(pressure / rated, False, limit, pressure, rated, followed, held)
+    return SafetyFactor(pressure / rated, False, limit, pressure, rated, followed, held, is_rated)
 
 
 def rated_verdict(result: StudyResult) -> dict[str, Any] | None:

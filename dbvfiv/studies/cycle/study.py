@@ -508,7 +508,7 @@ class CycleResult(StudyResult):
         return [f"At {describe_fixed(self.case, self.parameter)}:", *printed_head(COLUMNS), *rows, *self.remarks()]
 
     def remarks(self) -> list[str]:
-        row = PARAMETERS[self.parameter]
+        row = self.case.units.parameter(self.parameter)
         said = []
         if self.onset:
             at = row.text(self.onset["value"])

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
-from ...case.parameters import PARAMETERS
+from ...case.parameters import PARAMETERS, Parameter
 from ...observer import Observer
 from ...record.mesh import MeshData
 from ...record.record import GrowingRecord, Record
@@ -250,7 +250,7 @@ class OnsetResult(StudyResult):
     def _table(self, fixed: str, points) -> list[str]:
         if not points:
             return [fixed, self._without_onset()]
-        unit = PARAMETERS[self.parameter].shown_unit
+        unit = self._row.shown_unit
         head = (
             f"{self.parameter + (f', {unit}' if unit else ''):>16} {'+-':>9} {'Hz':>8}  "
             f"{'':<28}{'below, 1/s':>11}{'above, 1/s':>11}"
@@ -272,12 +272,17 @@ class OnsetResult(StudyResult):
         ]
 
     @property
+    def _row(self) -> Parameter:
+        """The parameter, with a pressure in the units of the case."""
+        return self.case.units.parameter(self.parameter)
+
+    @property
     def _own(self) -> str:
         """Class of the equilibria."""
         return self.own.variant.symmetry
 
     def _without_onset(self) -> str:
-        row = PARAMETERS[self.parameter]
+        row = self._row
         low, high = (self.values[[0, -1]] / row.scale) if len(self.values) else (math.nan, math.nan)
         scanned = f"from {low:.6g} to {high:.6g} {row.shown_unit}".rstrip()
         if not self.complete:
@@ -299,7 +304,7 @@ class OnsetResult(StudyResult):
         return f"No onset: the valve is {state} {scanned}{which}."
 
     def _line(self, point: dict[str, Any]) -> str:
-        scale = PARAMETERS[self.parameter].scale
+        scale = self._row.scale
         becomes = "unstable above" if point["gains"] else "stable above"
         which = CRITICALITY.get(point["criticality"], point["criticality"])
         words = becomes + (f", {which}" if which else "") if point["edge"] else f"a further mode {becomes}"

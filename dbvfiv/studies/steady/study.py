@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import replace
-from functools import cached_property, partial
+from functools import cache, cached_property, partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -54,6 +54,8 @@ STATES, CRACKING, LIMIT, FURTHER, PARTED = "states", "cracking", "limit point", 
 MEASURED = {DISCHARGE: FLOW, AREA: LIP_AREA, SHAPE: None, TAPS: None}
 #: Relative accuracy of the cracking pressure, and difference of two displacements below which they are of one state.
 _ACCURACY, _SAME = 1e-5, 1e-4
+#: Pressures at which a passage that has grown is looked for, over the first at which it has: from one on, so many.
+_FIRST, _STEPS = 2.0**-8, 9
 
 
 def tables_of(mesh: MeshData) -> tuple[TableSpec, ...]:
@@ -166,6 +168,7 @@ def find_cracking(model: ValveModel, states: Iterable[SteadyState], area_ratio: 
     path = LoadPath(model, SteadyOptions.of(model.case))
     back = model.flow.back
 
+    @cache
     def missing(drive: float) -> float:
         """Logarithm of the passage over the one wanted, at a pressure over that downstream."""
         if drive == 0.0 and model.weight is None:
@@ -174,7 +177,11 @@ def find_cracking(model: ValveModel, states: Iterable[SteadyState], area_ratio: 
 
     if missing(0.0) >= 0.0:  # the weight alone has opened it
         return Cracking(area_ratio, 0.0, 0.0)
-    drive = float(brentq(missing, 0.0, upper.pressure - back, xtol=1e-12, rtol=_ACCURACY))
+    steps = [0.0, *np.geomspace(_FIRST, 1.0, _STEPS) * (upper.pressure - back)]  # far down at once lips may cross
+    number = next((i for i, drive in enumerate(steps[1:], 1) if missing(drive) >= 0.0), None)
+    if number is None:
+        raise SolveError("Rising pressures lead to another equilibrium than the one that was found.")
+    drive = float(brentq(missing, steps[number - 1], steps[number], xtol=1e-12, rtol=_ACCURACY))
     return Cracking(area_ratio, drive, head_of(drive, model.case.fluid.density))
 
 

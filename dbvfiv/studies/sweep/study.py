@@ -308,15 +308,16 @@ class SweepResult(StudyResult):
 
     def lines(self) -> list[str]:
         crossings = [crossing_line(self, crossing) for crossing in self.crossings()]
-        places = ", ".join(f"{check['value']:.4g}" for check in self.checks)
+        unit, scale = _shown(self.case, self.parameter)
+        places = ", ".join(f"{check['value'] / scale:.4g}" for check in self.checks)
         word = "Certified" if self.certified else "Not certified"
         checked = (
-            [f"{word}: checked at {self.parameter} {places} {self.units}".rstrip() + "."]
+            [f"{word}: checked at {self.parameter} {places} {unit}".rstrip() + "."]
             if self.checks
             else ["Not certified: no value was checked."]
         )
         return [
-            *head(self.parameter),
+            *head(self.parameter, unit),
             *rows_of_sweep(self),
             "",
             *crossings,
@@ -325,23 +326,31 @@ class SweepResult(StudyResult):
         ]
 
 
-def head(parameter: str) -> tuple[str, str]:
+def _shown(case: Case, parameter: str) -> tuple[str, float]:
+    """Unit of a table over a parameter, and its SI value: SI, or heads where pressures are given so."""
+    if parameter == "pressure" and case.units.heads:
+        return case.units.name("pressure"), case.units.factor("pressure")
+    return PARAMETERS[parameter].quantity.si, 1.0
+
+
+def head(parameter: str, unit: str) -> tuple[str, str]:
     """Names and units above the table."""
     return (
         f"{parameter:>12} {'growth rate':>12} {'frequency':>11} {'unstable':>9}",
-        f"{PARAMETERS[parameter].quantity.si:>12} {'1/s':>12} {'Hz':>11}",
+        f"{unit:>12} {'1/s':>12} {'Hz':>11}",
     )
 
 
 def print_live(case: Case) -> Callable[[Any], str]:
     """Lines of the table as values are solved: the leading mode and the number of unstable eigenvalues."""
-    top = list(head(case.sweep.axis.parameter))
+    unit, scale = _shown(case, case.sweep.axis.parameter)
+    top = list(head(case.sweep.axis.parameter, unit))
 
     def write(item: Sample | SteadyState) -> str:
         if isinstance(item, SteadyState):
             return f"Steady state at {item.pressure:.6g} Pa."
         leading = item.eigenvalues[0] if len(item.eigenvalues) else complex(np.nan, np.nan)
-        lines = [*top, _row(item.value, leading.real, abs(leading.imag) / (2 * np.pi), item.unstable)]
+        lines = [*top, _row(item.value / scale, leading.real, abs(leading.imag) / (2 * np.pi), item.unstable)]
         top.clear()
         return "\n".join(lines)
 
@@ -350,19 +359,19 @@ def print_live(case: Case) -> Callable[[Any], str]:
 
 def rows_of_sweep(result: SweepResult) -> list[str]:
     """One line for each value: the leading branch."""
-    rows = []
+    rows, (_, scale) = [], _shown(result.case, result.parameter)
     for i, value in enumerate(result.values):
         there = [b for b in result.branches if np.isfinite(b.growth_rate[i])]
         leading = max(there, key=lambda b: b.growth_rate[i], default=None)
         growth, frequency = (leading.growth_rate[i], leading.frequency[i]) if leading else (np.nan, np.nan)
         outcome = result.verdicts[i].outcome if result.verdicts else ""
-        rows.append(f"{_row(value, growth, frequency, result.unstable_count[i])}  {outcome}".rstrip())
+        rows.append(f"{_row(value / scale, growth, frequency, result.unstable_count[i])}  {outcome}".rstrip())
     return rows
 
 
 def crossing_line(result: SweepResult, crossing: Crossing) -> str:
     """One sentence on a crossing of zero growth."""
-    shown = PARAMETERS[result.parameter]
+    shown = result.case.units.parameter(result.parameter)
     becomes = "unstable" if crossing.to_unstable else "stable"
     how = f"at {crossing.frequency:.4g} Hz" if crossing.frequency > 0 else "without oscillation"
     place = f"{crossing.value / shown.scale:.4g} {shown.shown_unit}".rstrip()
