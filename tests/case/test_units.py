@@ -4,7 +4,9 @@ import json
 
 import pytest
 
-from dbvfiv.errors import CaseError
+from dbvfiv.cli.terminal import in_units
+from dbvfiv.errors import CaseError, SolveError
+from dbvfiv.observer import Progress
 from dbvfiv.studies.case import load_case
 from tests.small_valves import THESIS_SET
 
@@ -47,3 +49,29 @@ def test_a_table_speaks_in_heads_and_json_in_si(command_line):
     assert units[:4] == ["static", "m", "kg/s", "gpm"]
     assert float(row[0]) == 1.0
     assert float(row[2]) == pytest.approx(point["volume_flow"] * 60 / 3.785411784e-3, rel=1e-3)
+
+
+@pytest.mark.parametrize("kind", [CaseError, SolveError])
+def test_a_failure_speaks_in_heads(kind):
+    units = load_case(None, ["drive.pressure=2 m"]).units
+    with pytest.raises(kind, match="^No equilibrium was found between 1 m, the last one, and 2 m[.]$"), in_units(units):
+        raise kind("No equilibrium was found between 9806.65 Pa, the last one, and 19613.3 Pa.")
+
+
+def test_a_bar_speaks_in_heads():
+    class Bar:
+        def set_postfix_str(self, text):
+            self.text = text
+
+    progress = Progress(say=load_case(None, ["drive.pressure=2 m"]).units.say)
+    progress._bar = Bar()
+    progress.progress("equilibrium at 9806.65 Pa, 3 iterations")
+    assert progress._bar.text == "equilibrium at 1 m, 3 iterations"
+
+
+def test_a_range_of_heads_makes_a_table_of_heads(command_line):
+    keys = [*THESIS_SET, "--set=mesh.around=6", "--set=mesh.along=8", "--set=damping.alpha=5"]
+    said = command_line("sweep", *keys, "--over", "pressure=0.5 m:2 m:2").out.splitlines()
+    unit = next(i for i, line in enumerate(said) if line.split()[:2] == ["m", "1/s"])
+    assert [float(line.split()[0]) for line in said[unit + 1 : unit + 3]] == [0.5, 2.0]
+    assert any(line.endswith("checked at pressure 0.5, 2 m.") for line in said), said

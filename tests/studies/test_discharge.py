@@ -45,6 +45,13 @@ def test_the_valve_is_cracked_where_its_passage_has_grown_as_stated(ratio, back)
     assert found.head == pytest.approx(found.pressure / (1000.0 * GRAVITY))
 
 
+def test_how_far_the_valve_was_found_open_does_not_move_its_cracking_head():
+    """A single step from wide open to nearly shut lets the lips cross, and the state there hides the one looked for."""
+    valve = dbvfiv.load("cases/dbv12-in-line.toml", SMALL)
+    heads = [results(valve, [head * 1000 * GRAVITY]).cracking.head for head in (0.04, 0.5)]
+    assert heads[1] == pytest.approx(heads[0], rel=1e-4) and heads[0] < 0.04
+
+
 def test_a_valve_that_stays_nearly_shut_is_not_cracked():
     found = results(load(), [10.0])
     assert found.cracking.pressure is None and found.summary()["cracking"]["pressure"] is None
