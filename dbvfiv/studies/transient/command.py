@@ -15,7 +15,7 @@ from ..request import Request
 
 ORDER = 40
 
-Verdict = Literal["steady", "decaying", "limit cycle", "growing", "closed", "irregular"]
+Verdict = Literal["steady", "decaying", "limit cycle", "growing", "closed", "chatters", "irregular"]
 
 
 class Keys(Section):
@@ -78,7 +78,8 @@ class Keys(Section):
     restart_every: StrictInt = key(500, "Steps between restart points.", ge=1, le=10_000_000)
     stop_when: tuple[Verdict, ...] = key(
         (),
-        "Verdicts that end the run once they are certain: steady, decaying, limit cycle, growing, closed, irregular.",
+        "Verdicts that end the run once they are certain: steady, decaying, limit cycle, growing, closed, chatters, "
+        "irregular.",
     )
 
     @field_validator("drive_table", mode="after")
@@ -126,7 +127,8 @@ Animation = Annotated[
 
 
 def command(animate: Animation = None) -> Request:
-    """Time history of the coupled valve and a verdict: steady, decaying, limit cycle, growing, closed or irregular.
+    """Time history of the coupled valve and a verdict: steady, decaying, limit cycle, growing, closed, chatters or
+    irregular.
 
     How the run starts, what drives it, its steps and what ends it are keys of the section transient; `dbvfiv case
     --explain transient` lists them. With -o everything is kept while the run goes on; `dbvfiv resume` continues it

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -24,15 +24,15 @@ from ...record.header import Header
 from ...record.mesh import MeshData
 from ...record.record import GrowingRecord, Record, StoredRecord
 from ...record.states import state_table
-from ...verdict import JudgeOptions, Verdict, judge
+from ...verdict import JudgeOptions, Shuttings, Verdict, judge
 from ..case import Case
 from .history import HISTORY, STATES, Keeper, Progress, Reader, tables_of
 
 #: Columns of a history by name.
 Columns = Mapping[str, np.ndarray]
-#: Smallest area over that of the lip gap at rest up to which a valve is closed: where the pressure drives fluid out,
-#: and where nothing does; of a bill that is moulded shut, where its faces part.
-SHUT, UNOPENED = 0.5, 2.0
+#: Smallest area over that of the lip gap at rest up to which faces shut a valve; those of a bill that is moulded shut
+#: part at another.
+SHUT = 0.5
 #: Pascal; no fluid's pressure falls further below that of the surroundings.
 ATMOSPHERE = 101_325.0
 #: Numbers of the mass flow that stand in the document of a verdict itself.
@@ -54,6 +54,8 @@ class RunVerdict:
         Unbalanced force at the end over pressure force; not a number while the pressure changes.
     steps : int
     time : float, s
+    chatter : dict
+        Numbers of the shuttings of a valve that chatters; empty of others.
     """
 
     mass_flow: Verdict
@@ -62,6 +64,7 @@ class RunVerdict:
     residual: float
     steps: int
     time: float
+    chatter: Mapping[str, Any] = field(default_factory=dict)
 
     @property
     def name(self) -> str:
@@ -94,10 +97,10 @@ class RunVerdict:
             "mass_flow": flow,
             "lip_opening": self.lip_opening.summary(),
             "lip_displacement": self.lip_displacement.summary(),
-        }
+        } | ({"chatter": dict(self.chatter)} if self.chatter else {})
 
 
-_LIVELINESS = ("closed", "steady", "decaying", "limit cycle", "growing", "undecided", "irregular")
+_LIVELINESS = ("closed", "steady", "decaying", "limit cycle", "growing", "undecided", "irregular", "chatters")
 
 
 def assess(
@@ -109,8 +112,8 @@ def assess(
 ) -> RunVerdict:
     """Verdict on a history.
 
-    A valve is closed where its lips shut the gap they have at rest, or where nothing drives fluid out and they do not
-    open; one that stands at its gap under a pressure lets flow what passes there.
+    A valve is closed where its lips are shut and nothing flows, see `openness`. Faces that part and meet again and
+    again chatter, periodically or not.
 
     Parameters
     ----------
@@ -127,13 +130,45 @@ def assess(
     known = residual if np.isfinite(residual) else None
     signals = ("mass_flow", "lip_displacement", "lip_opening")
     found = [judge(time[chosen], history[name][chosen], options, residual=known) for name in signals]
-    driven = history["inlet_pressure"] > model.case.rest_pressure
-    shut = model.parting if model.case.valve.is_preset else SHUT
-    area = history["smallest_area"] / (np.where(driven, shut, UNOPENED) * lip_gap(model))
-    if judge(time[chosen], area[chosen], options, closed_below=1.0).name == "closed":
-        reason = "The lips shut the gap that they have at rest, or nothing drives fluid out and they do not open."
-        found = [Verdict(**{**vars(v), "name": "closed", "decided": True, "reason": reason}) for v in found]
-    return RunVerdict(*found, residual, len(time) - 1, float(time[-1]))
+    given = time[chosen], openness(history, model)[chosen], options
+    chatter: dict[str, Any] = {}
+    if judge(*given, closed_below=1.0).name == "closed":
+        reason = "Its lips are shut, and nothing flows."
+        found = [replace(v, name="closed", decided=True, reason=reason) for v in found]
+    elif model.contact is not None:
+        area = history["smallest_area"][chosen] / (shut_share(model) * lip_gap(model))
+        shuttings = Shuttings.of(time[chosen], area, 1.0)
+        if shuttings.chatters:
+            opens = judge(time[chosen], area, options, closed_below=1.0)
+            signals = (history[name][chosen] for name in ("lip_opening", "lip_velocity", "mass_flow"))
+            chatter = shuttings.evidence(time[chosen], *signals)
+            told = {name: getattr(opens, name) for name in ("decided", "reason", "period", "cycles")}
+            found = [replace(v, name="chatters", **told) for v in found]
+    return RunVerdict(*found, residual, len(time) - 1, float(time[-1]), chatter)
+
+
+def shut_share(model: ValveModel) -> float:
+    """Smallest area over that of the lip gap at rest up to which the faces of a valve are shut."""
+    return model.parting if model.case.valve.is_preset else SHUT
+
+
+def openness(history: Columns, model: ValveModel) -> np.ndarray:
+    """How far a valve is from shut (k,), 1 and less where it is: passage and flows over those of a shut one.
+
+    Faces shut it where they leave at most `shut_share` of the gap at rest. Stops hold lips where they are at rest; they
+    shut it where nothing drives fluid out and as many as a row has hold. A shut valve leaks at most what a jet through
+    that gap carries.
+    """
+    gap = lip_gap(model)
+    area = history["smallest_area"] / (shut_share(model) * gap)
+    drive = history["inlet_pressure"] - model.case.rest_pressure
+    if model.contact is None:
+        row = max(len(model.stops.unknowns) / np.count_nonzero(model.mesh.z <= model.case.valve.duckbill_length), 1.0)
+        held = (history["stops"] >= row) & (drive <= 0) & (history["smallest_area"] <= gap)
+        area = np.where(held, 1.0, area)
+    leak = shut_share(model) * gap * np.sqrt(2.0 * model.case.fluid.density * np.maximum(abs(drive), model.load_unit))
+    flow = np.maximum(abs(history["mass_flow"]), abs(history["inlet_mass_flow"]))
+    return np.maximum(area, flow / leak)
 
 
 def lip_gap(model: ValveModel) -> float:
@@ -413,6 +448,8 @@ class Runner:
         inlet, residual, since = self.drive(state.time), np.nan, 0.0
         if self.drive.constant_after(state.time):
             since = self.drive.times[-1]
+            if model.pump is not None and self.motion.fluid.moves:
+                inlet = model.pump.pressure(inlet, self._pumped(state))
             if inlet > model.flow.back:
                 scale = model.force_scale(state.q, inlet)
                 residual = float(np.linalg.norm(model.residual(state.q, inlet)) / scale)
@@ -423,14 +460,17 @@ class Runner:
         self.record.progress(f"{verdict.name}{'' if verdict.decided else '?'} at {state.time:.4g} s")
         return verdict
 
+    def _pumped(self, state: MotionState) -> float:
+        """Flow rate at the pump, m3/s."""
+        velocity, mesh = self.model.flow.far_velocity(state.fluid.inner), self.model.mesh
+        return mesh.part.copies * float(mesh.rest_area[-1] - mesh.wall_deduction[-1]) * velocity
+
     def _beyond_pump(self, state: MotionState) -> str:
         """Sentence where the flow has left the pump's table; empty otherwise."""
         pump = self.model.pump
         if pump is None or not self.motion.fluid.moves:
             return ""
-        velocity = self.model.flow.far_velocity(state.fluid.inner)
-        mesh = self.model.mesh
-        flow = mesh.part.copies * float(mesh.rest_area[-1] - mesh.wall_deduction[-1]) * velocity
+        flow = self._pumped(state)
         if pump.holds(flow):
             return ""
         return (

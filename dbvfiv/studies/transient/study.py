@@ -35,7 +35,7 @@ def run(session: Session, record: GrowingRecord) -> None:
         raise KeyboardInterrupt
 
 
-_STABILITY = {"steady": STABLE, "decaying": STABLE, "limit cycle": FLUTTERS, "growing": FLUTTERS}
+_STABILITY = {"steady": STABLE, "decaying": STABLE} | dict.fromkeys(("limit cycle", "growing", "chatters"), FLUTTERS)
 
 
 def stability_of(summary: Mapping[str, Any]) -> Verdict:
@@ -248,6 +248,16 @@ class TransientResult(StudyResult):
             cells = "".join(_cell(value, 13, ".5g") for value in (*numbers, found["frequency"]))
             error = _cell(found["periodicity_error"], 20, ".2g")
             lines.append(f"{name.replace('_', ' '):<16}{cells}{found['cycles_observed']:>9}{error}   {unit}, Hz")
+        if chatter := verdict.get("chatter"):
+            lines += [
+                "",
+                f"{chatter['shuttings']} shuttings, {chatter['rate']:.4g} a second (scatter of the intervals "
+                f"{100 * chatter['interval_scatter']:.2g} %), shut {100 * chatter['shut_share']:.0f} % of the time; "
+                f"mean flow {chatter['mean_flow']:.4g} kg/s",
+                f"opening before them {1e3 * chatter['opening']:.3g} mm (largest "
+                f"{1e3 * chatter['largest_opening']:.3g} mm), a lip meets the other at "
+                f"{chatter['impact_speed']:.3g} m/s (at most {chatter['largest_impact_speed']:.3g} m/s)",
+            ]
         if self.mesh.relaxing:
             lost = ", ".join(f"{value:.4g} J in {name}" for name, value in self.dissipated().items() if value)
             lines += ["", f"dissipated since the start: {lost or 'nothing'}"]
