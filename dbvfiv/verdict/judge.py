@@ -350,10 +350,10 @@ def _judge(series: Series, options: JudgeOptions, residual: float | None, closed
 
 
 def _chatter(series: Series, shuttings: Shuttings, options: JudgeOptions) -> Verdict:
-    """Verdict on a signal that opens and shuts."""
+    """Verdict on a signal that opens and shuts, without a period."""
     kept, even = shuttings.kept(options.cycles), shuttings.is_settled(options.cycles)
     part = series.last(series.end - series.times()[shuttings.shut[-len(kept) - 1]])
-    words = f"It opens and shuts {len(shuttings.shut)} times, the last {len(kept) + 1} of them"
+    words = f"It parts and meets {len(shuttings.shut)} times, the last {len(kept) + 1} of them"
     words += f" {kept.mean():.3g} s apart (standard deviation {kept.std():.2g} s)"
     return Verdict(
         "chatters",

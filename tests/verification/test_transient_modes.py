@@ -25,6 +25,7 @@ from dbvfiv.studies.transient.run import Runner
 PUSH = 1e-8  # m; at 2 kPa, where stops at the corners of the lips part, 1e-6 m changes the frequency by 0.5 %
 BETA = 0.003
 QUASI, STORAGE = "quasi-steady", "storage"
+MESH = {"mesh.around": 6, "mesh.along": 8}
 #: Continuity law, pressure (Pa), density (kg/m3), and the sign of the growth rate.
 STATES = [
     (QUASI, 2e3, 10.0, +1),
@@ -153,6 +154,23 @@ def test_three_routes_with_the_default_mesh():
     valve = dbvfiv.load(thesis_case(), changes | {"fluid.density": density, "drive.pressure": pressure})
     consistent = next(m for m in valve.modes(count=8).modes if m.frequency > 0)
     assert abs(found["full"].imag) / (2 * np.pi) < 0.99 * consistent.frequency
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("law", [QUASI, STORAGE])
+@pytest.mark.parametrize("pressure, touching", [(1.6e3, 3), (1.7e3, 2), (1.8e3, 2), (2.2e3, 0)])
+def test_three_routes_of_a_bill_that_is_moulded_shut(law, pressure, touching):
+    """From 0.2 to 3 mm of opening, in water: faces that touch in the state do so in spectra and in time."""
+    keys = {"valve.sealing_pressure": 800.0, "damping.beta": 1e-3}
+    state = dbvfiv.load(thesis_case(), MESH | keys).steady(pressure=pressure)
+    assert state.stops == touching and state.mass_flow > 0
+    found = three_routes(law, pressure, 1000.0, mesh=tuple(MESH.values()), further=keys)
+    full = found["full"]
+    print(f"\n{law} {pressure:g}: full {full:.5f} limit {found['limit']:.5f} in time {found['in time']}")
+    assert np.sign(full.real) == (1 if law == QUASI else -1)
+    assert abs(found["reduced"] - full) < 1e-5 * abs(full)
+    growth, frequency = errors(found["limit"], full)
+    assert growth < 1e-3 and frequency < 1e-3
 
 
 @pytest.mark.slow

@@ -136,10 +136,10 @@ def assess(
         reason = "Its lips are shut, and nothing flows."
         found = [replace(v, name="closed", decided=True, reason=reason) for v in found]
     elif model.contact is not None:
-        area = history["smallest_area"][chosen] / (shut_share(model) * lip_gap(model))
-        shuttings = Shuttings.of(time[chosen], area, 1.0)
+        parted = parting(history, model)[chosen]
+        shuttings = Shuttings.of(time[chosen], parted, 1.0)
         if shuttings.chatters:
-            opens = judge(time[chosen], area, options, closed_below=1.0)
+            opens = judge(time[chosen], parted, options, closed_below=1.0)
             signals = (history[name][chosen] for name in ("lip_opening", "lip_velocity", "mass_flow"))
             chatter = shuttings.evidence(time[chosen], *signals)
             told = {name: getattr(opens, name) for name in ("decided", "reason", "period", "cycles")}
@@ -150,6 +150,18 @@ def assess(
 def shut_share(model: ValveModel) -> float:
     """Smallest area over that of the lip gap at rest up to which the faces of a valve are shut."""
     return model.parting if model.case.valve.is_preset else SHUT
+
+
+def parting(history: Columns, model: ValveModel) -> np.ndarray:
+    """How far the faces of a valve have parted (k,), 1 and less where they meet in the middle of the lips or shut the
+    passage.
+    """
+    share, gap = shut_share(model), model.case.valve.initial_gap
+    if model.case.valve.is_preset:  # drawn without a gap
+        middle = 0.5 * history["lip_opening"] / ((share - 1.0) * gap)
+    else:
+        middle = (gap + history["lip_displacement"]) / (share * gap)
+    return np.minimum(history["smallest_area"] / (share * lip_gap(model)), middle)
 
 
 def openness(history: Columns, model: ValveModel) -> np.ndarray:
