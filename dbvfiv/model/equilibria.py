@@ -418,9 +418,9 @@ def operating_pressure(model: ValveModel, observer: Observer | None = None) -> f
     if abs(beyond(pressure)) > _JUMP * top:
         below, above = (max(p for p in known if beyond(p) <= 0), min(p for p in known if beyond(p) > 0))
         raise SolveError(
-            f"There is no operating point: at {pressure:.6g} Pa the valve's flow jumps from {1e3 * known[below]:.4g} to "
-            f"{1e3 * known[above]:.4g} L/s, and the pump delivers a flow between them at that head. A run in time says "
-            "what the valve does."
+            f"There is no operating point: at {pressure:.6g} Pa the valve's flow jumps from {1e3 * known[below]:.4g} "
+            f"to {1e3 * known[above]:.4g} L/s, and the pump delivers a flow between them at that head. A run in time "
+            "says what the valve does."
         )
     if not pump.holds(known[pressure]):
         raise _outside(known[pressure], pump, f"where the curves would meet, at {pressure / unit:.4g} m")
