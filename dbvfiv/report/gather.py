@@ -25,7 +25,7 @@ from ..observer import Observer, is_watched
 from ..studies.case import Case
 from ..studies.session import Session, kept_run, load_result
 from ..studies.stability.place import why_it_moves
-from ..studies.workers import Work, Workers
+from ..studies.workers import Lost, Work, Workers
 
 #: What a report can leave out.
 PARTS = ("steady", "heads", "pipe", "onset", "law", "mesh", "levels", "closure", "cycle")
@@ -182,9 +182,10 @@ def planned(case: Case) -> Iterator[Run]:
 
 
 def _other_levels(case: Case) -> dict[float, dict[str, Any]]:
-    """Keys of other strain levels for all rubbers that have levels; nothing without such rubbers."""
+    """Keys of strain levels other than its own for all rubbers that have levels; nothing without such rubbers."""
     used = case.materials.levels({layer.material for layer in case.layers})
-    return {level: case.materials.at_levels(dict.fromkeys(used, level)) for level in _LEVELS} if used else {}
+    other = [level for level in _LEVELS if used and set(used.values()) != {level}]
+    return {level: case.materials.at_levels(dict.fromkeys(used, level)) for level in other}
 
 
 def closure_keys(case: Case) -> dict[str, Any]:
@@ -326,10 +327,12 @@ class _Studies:
         for run in first:
             self._make(run)
         rest = [run for run in runs if run not in first]
-        if self.workers > 1 and len(rest) > 1:
-            self._share(rest)
+        lost = self._share(rest) if self.workers > 1 and len(rest) > 1 else ()
         for run in rest:
-            self._make(run)
+            if run.name in lost:
+                self.found.missing[run.name] = Lost.sentence
+            else:
+                self._make(run)
 
     def _asked(self, run: Run) -> Session:
         """Session of a run, with the steady state it starts from where that is known."""
@@ -353,15 +356,24 @@ class _Studies:
             self.found.missing[run.name] = str(error)
         self.bar.done(run.name)
 
-    def _share(self, runs: list[Run]) -> None:
-        """Let several processes fill the files of runs; what fails there is told when the run is made here."""
+    def _share(self, runs: list[Run]) -> list[str]:
+        """Let several processes fill the files of runs; what fails there is told when the run is made here.
+
+        Returns
+        -------
+        list of str
+            Names of runs over which workers died.
+        """
         asked = {}
         for run in sorted(runs, key=lambda run: -run.share):  # longest first
             with suppress(CaseError):
                 asked[run.name] = Work(_fill, (run.kind, self._asked(run), self._path(run)))
         with Workers(min(self.workers, len(asked)), str, (), self.bar.warn) as team:
-            for name, _ in team.share(asked, asked.__getitem__):
+            lost = []
+            for name, result in team.share(asked, asked.__getitem__):
                 self.bar.done(name)
+                lost += [name] * (result is Lost)
+            return lost
 
 
 def _fill(_context: str, kind: str, session: Session, path: Path) -> None:

@@ -16,9 +16,9 @@ if TYPE_CHECKING:
 
 _LAYOUT = {
     "template": "plotly_white",
-    "margin": {"l": 64, "r": 16, "t": 40, "b": 56},
+    "margin": {"l": 0, "r": 0, "t": 30, "b": 0},
     "font": {"family": "DejaVu Sans, Arial, sans-serif", "size": 13},
-    "height": 460,
+    "height": 400,
 }
 _CONFIG = {"displaylogo": False, "responsive": True}
 
@@ -36,7 +36,7 @@ def valve(state: State, units: Units) -> str:
     quads = skin.quads
     triangles = np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]])
     moved = np.tile(np.linalg.norm(state.nodal[:, :3], axis=1)[skin.valve.node], 2) * size
-    figure = go.Figure(layout=_LAYOUT | {"height": 420})
+    figure = go.Figure(layout=_LAYOUT)
     figure.add_mesh3d(
         x=_short(points[:, 0]),
         y=_short(points[:, 1]),

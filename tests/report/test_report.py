@@ -9,6 +9,7 @@ import json
 import os
 import re
 import signal
+import sys
 import time
 
 import numpy as np
@@ -20,8 +21,9 @@ from dbvfiv.case.units import UNITS
 from dbvfiv.errors import CaseError
 from dbvfiv.report import gather, write_page, write_pdf
 from dbvfiv.report.answers import UNKNOWN, answers
-from dbvfiv.report.gather import heads_of
+from dbvfiv.report.gather import heads_of, planned
 from dbvfiv.studies.case import load_case
+from dbvfiv.studies.workers import Lost, Workers
 from tests.child import start
 from tests.small_valves import THESIS_SET
 
@@ -177,6 +179,27 @@ def test_a_study_that_fails_is_named_on_page_one(command_line, one_sentence, tmp
     answered = json.loads(outcome.out)["answers"]
     assert {one["answer"] for one in answered} == {UNKNOWN}
     assert "The study heads-1 failed" in text_of(page)
+
+
+def test_a_study_over_which_workers_died_is_named_on_page_one(monkeypatch, tmp_path):
+    class Dying(Workers):
+        def share(self, tasks, ask):
+            return ((task, Lost) for task in tasks)
+
+    monkeypatch.setattr(sys.modules[gather.__module__], "Workers", Dying)
+    without = (*LEFT_OUT, "closure", "law")
+    found = gather(load_case(None, KEYS), "valve", tmp_path / "runs", without, workers=2, quiet=True)
+    assert set(found.failed) == {"heads-1", "heads-2"}
+    assert "The study heads-2 failed: 3 workers died" in text_of(write_page(found, tmp_path / "page.html"))
+
+
+def test_a_strain_level_that_the_case_has_is_no_other_one():
+    def levels(*keys):
+        runs = planned(load_case(None, [*KEYS, *keys]))
+        return [run.name for run in runs if run.part == "levels"]
+
+    assert levels("materials.strain_level=10 %") == ["levels-steady-0.2"]
+    assert levels("materials.strain_level=15 %") == ["levels-steady-0.1", "levels-steady-0.2"]
 
 
 def test_heads_are_those_asked_or_shares_of_the_largest_pressure():
