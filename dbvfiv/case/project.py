@@ -55,7 +55,10 @@ class Report(Section):
     @classmethod
     def _read_range(cls, given: Any, info: ValidationInfo) -> Any:
         if isinstance(given, str) and ":" in given:
-            return parse_axis(f"pressure={given}", density=(info.context or {}).get("density")).values
+            try:
+                return parse_axis(f"pressure={given}", density=(info.context or {}).get("density")).values
+            except ValueError as error:
+                raise ValueError(f"{error}, START:STOP:COUNT") from None
         return [given] if isinstance(given, (str, float, int)) else given
 
 

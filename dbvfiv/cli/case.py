@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from ..errors import CaseError
-from .terminal import AsJson, Override, print_json
+from .terminal import AsJson, Override, in_units, print_json
 
 
 def case(
@@ -95,7 +95,8 @@ def _check(case, name: str) -> None:
     from ..model.sizes import ValveSizes
     from ..studies.session import Session
 
-    model = Session(case).described
+    with in_units(case.units):
+        model = Session(case).described
     print(f"{name} fits.")
     lines = [*ValveSizes.of(model).lines(), *_conditions(case)]
     print("\n".join(f"  {line}" for line in lines))

@@ -54,6 +54,7 @@ CARELESS = [
     (["report.heads=[1 m, 1000 m]"], "drive.pressure is 1000 m at most"),
     (["closure.rated_pressure=1000 m"], "closure.rated_pressure is 9807 kPa"),
     (["valve.initial_gap=2 in"], "valve.initial_gap"),
+    (["report.heads=1 m:10 m"], "START:STOP:COUNT"),
     (["valve.lip_radius=0.1 mm"], "inside the other"),
     (["layers.0.thickness=-1 mm"], 'given as "-1 mm"'),
     (["report.heads=[1, 2]"], "report.heads ends at 2 Pa"),
