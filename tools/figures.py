@@ -138,6 +138,13 @@ ALL = (
         {"eigenvalues.png": "modes-eigenvalues.png", "winding.png": "modes-count.png"},
     ),
     Made("damping", "dbvfiv damping cases/loss-factor.toml --plots {folder}", {"damping.png": "damping.png"}, False),
+    Made(
+        "report",
+        'dbvfiv report cases/dbv36.toml --set drive.pressure="2 m" --set "report.heads=[0.2 m, 0.5 m, 1 m, 2 m]" '
+        '--set project.customer="Harbour board" -o {folder}/dbv36.html --pdf',
+        {"dbv36.pdf": "report-page.png"},
+        study=False,
+    ),
     Made("valve", "dbvfiv plot cases/dbv4-wide.toml -o {folder}", {"valve.png": "valve-described.png"}, False),
     Made(
         "flow",
@@ -166,7 +173,11 @@ def make(one: Made) -> None:
         animate = " --animate 1" if "cycle.gif" in one.figures else ""
         _run(f"dbvfiv plot {result} -o {folder}{animate}")
     for made, name in one.figures.items():
-        shutil.copyfile(folder / made, MANUAL / name)
+        if made.endswith(".pdf"):  # its first page, by the tool of Debian's poppler-utils
+            first = ("-f", "1", "-singlefile", "-r", "90", "-png")
+            subprocess.run(["pdftoppm", *first, folder / made, (MANUAL / name).with_suffix("")], check=True)
+        else:
+            shutil.copyfile(folder / made, MANUAL / name)
         print(f"{MANUAL / name}", flush=True)
 
 

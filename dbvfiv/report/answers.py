@@ -228,7 +228,7 @@ def seals(found: Gathered) -> Answer:
         )
         return Answer(question, UNKNOWN, why)
     still = " at most, as fluid.viscosity is none" if told["leak"] and not case.fluid.dynamic_viscosity else ""
-    text = f"{_seal(told).capitalize()}, leak {told['leak'] * 3.6e6:.3g} L/h{still}."
+    text = f"{_seal(told).capitalize()}, leak {plain(told['leak'] * 3.6e6)} L/h{still}."
     return Answer(question, YES if told["sealed"] else NO, text, _margin(result), _closure_mesh(found))
 
 
@@ -271,7 +271,7 @@ def _closure_mesh(found: Gathered) -> tuple[str, ...]:
     if other is None or other.safety is None:
         return (_not_there(found, "mesh", "mesh"),)
     told = rated_verdict(other)
-    seal = f"{_seal(told)}, leak {told['leak'] * 3.6e6:.2g} L/h, " if told and told["sealed"] is not None else ""
+    seal = f"{_seal(told)}, leak {plain(told['leak'] * 3.6e6, 2)} L/h, " if told and told["sealed"] is not None else ""
     return (f"second mesh ({_mesh(found)}): {seal}{_margin(other)}",)
 
 
@@ -296,9 +296,15 @@ def trade(found: Gathered) -> list[tuple[str, str]]:
     if case.closure.rated_pressure is not None:
         rows += [("rated back pressure", units.pressure(case.closure.rated_pressure, 4))]
         told = None if found.get("closure") is None else rated_verdict(found.get("closure"))
-        leak = "not examined" if told is None or told["leak"] is None else f"{told['leak'] * 3.6e6:.3g} L/h"
+        leak = "not examined" if told is None or told["leak"] is None else f"{plain(told['leak'] * 3.6e6)} L/h"
         rows += [("leak rate there", leak)]
     return rows
+
+
+def plain(value: float, digits: int = 3) -> str:
+    """Digits of a number, a large one without a power of ten."""
+    shown = float(f"{value:.{digits}g}")
+    return f"{shown:.0f}" if 10.0 ** (digits - 1) <= abs(shown) < 1e9 else f"{shown:.{digits}g}"
 
 
 def listed(words: Iterable[str]) -> str:

@@ -15,7 +15,7 @@ from ..materials.stability import StableRange, stable_range
 from ..model.symmetry import symmetry_named
 from ..record.mesh import MeshData
 from . import live
-from .answers import listed, loss_range
+from .answers import listed, loss_range, plain
 from .content import Part, Picture, Table, picture, pictures_of
 from .figures import closure_figure, headloss_figure, pipe_figure, vibration_figure
 from .gather import Gathered, is_on_own_mesh
@@ -63,9 +63,9 @@ def steady_part(found: Gathered) -> Part:
         values = [("pressure", s.pressure, 4), ("flow", s.volume_flow, 4), ("size", s.lip_opening, 3)]
         h = s.hydraulics
         values += [("velocity", s.outlet_velocity, 3), ("head", h.head_loss, 3)] if flowing else []
-        plain = tuple(map(_plain, (h.loss_coefficient, h.kv, h.cv))) if flowing else ()
+        losses = tuple(map(plain, (h.loss_coefficient, h.kv, h.cv))) if flowing else ()
         loss = (f"{h.line_loss / units.factor('head'):.3g}",) if flowing and found.case.has_line else ()
-        return (*(f"{value / units.factor(name):.{n}g}" for name, value, n in values), *plain, *loss)
+        return (*(f"{value / units.factor(name):.{n}g}" for name, value, n in values), *losses, *loss)
 
     worst = max(s.residual for s in result.states)
     trust = (
@@ -76,11 +76,6 @@ def steady_part(found: Gathered) -> Part:
     pictures = pictures_of(result, _MEASURED)
     sentences = () if result.cracking is None else (result.cracking.sentence(states[-1].pressure),)
     return Part("steady", _STEADY, sentences, (Table(tuple(head), tuple(map(row, states))),), pictures, trust)
-
-
-def _plain(value: float) -> str:
-    """Three digits of a number, large ones without a power of ten."""
-    return f"{float(f'{value:.3g}'):.0f}" if 1e3 <= abs(value) < 1e9 else f"{value:.3g}"
 
 
 #: Figures of a study that are there where something was measured.
@@ -247,8 +242,8 @@ def closure_part(found: Gathered) -> Part:
             f"{s.pressure / units.factor('pressure'):.4g}" + (" (beyond the limit)" if s.beyond_limit else ""),
             "yes" if s.closed else "no",
             f"{s.sealed_length / units.factor('size'):.3g}",
-            f"{s.leak * 3.6e6:.3g}",
-            _plain(s.contact_force),
+            plain(s.leak * 3.6e6),
+            plain(s.contact_force),
             f"{s.max_displacement / units.factor('size'):.3g}",
         )
         for s in sorted(result.states, key=lambda s: s.pressure)
