@@ -182,7 +182,11 @@ def pipe_part(found: Gathered) -> Part | None:
         for p, r in sweeps.items()
     )
     caption = "Least damping ratio over the length of the pipe."
-    said = "Verdict and least damping ratio, motions that open and close the lips."
+    mesh = next(iter(sweeps.values())).case.mesh
+    said = (
+        "Verdict and least damping ratio, motions that open and close the lips, on "
+        f"{mesh.around} x {mesh.along} elements."
+    )
     pictures = (picture("pipe", caption, lambda: pipe_figure(found, sweeps), units=units),)
     return Part(
         "pipe", title, (said,), (Table(head, rows),), pictures, tuple(f for r in sweeps.values() for f in r.failures)

@@ -11,6 +11,7 @@ import re
 import signal
 import sys
 import time
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -21,7 +22,7 @@ from dbvfiv.case.units import UNITS
 from dbvfiv.errors import CaseError
 from dbvfiv.report import gather, write_page, write_pdf
 from dbvfiv.report.answers import UNKNOWN, answers
-from dbvfiv.report.gather import heads_of, planned
+from dbvfiv.report.gather import following, heads_of, planned
 from dbvfiv.studies.case import load_case
 from dbvfiv.studies.workers import Lost, Workers
 from tests.child import start
@@ -200,6 +201,14 @@ def test_a_strain_level_that_the_case_has_is_no_other_one():
 
     assert levels("materials.strain_level=10 %") == ["levels-steady-0.2"]
     assert levels("materials.strain_level=15 %") == ["levels-steady-0.1", "levels-steady-0.2"]
+
+
+@pytest.mark.parametrize("name, span, along", [("in-line", "4:100:6:log", None), ("moulded", "4:100:3:log", 24)])
+def test_lengths_of_the_pipe_are_fewer_where_each_has_a_curve_of_equilibria(name, span, along):
+    found = SimpleNamespace(case=load_case(f"cases/dbv12-{name}.toml"), worst=2e3, heads=(1e3, 2e3, 5e3), modes={})
+    (pipe,) = (run.changes for run in following(found) if run.part == "pipe")
+    assert pipe["sweep.over"] == f"pipe_length={span}" and pipe["drive.pressure"] == 2e3
+    assert pipe.get("mesh.along") == along
 
 
 def test_heads_are_those_asked_or_shares_of_the_largest_pressure():
