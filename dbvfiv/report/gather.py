@@ -355,7 +355,7 @@ class _Studies:
             for sentence in result.warnings if is_on_own_mesh(run.name) else ():
                 self.bar.warn(sentence)
         except (CaseError, SolveError) as error:
-            self.found.missing[run.name] = str(error)
+            self.found.missing[run.name] = self.found.case.units.say(str(error))
         self.bar.done(run.name)
 
     def _share(self, runs: list[Run]) -> list[str]:

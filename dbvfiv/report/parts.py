@@ -54,18 +54,20 @@ def steady_part(found: Gathered) -> Part:
     states = sorted(result.states, key=lambda s: s.pressure)
     names = {name: units.name(name) for name in ("pressure", "head", "flow", "velocity", "size")}
     head = [f"{_pressure_title(found)}, {names['pressure']}", f"flow, {names['flow']}", f"opening, {names['size']}"]
-    flowing = all(s.hydraulics is not None for s in states)
+    flowing = any(s.hydraulics is not None for s in states)
     if flowing:
         head += [f"jet, {names['velocity']}", f"head loss, {names['head']}", "K", "Kv, m3/h", "Cv, gpm"]
         head += [f"loss of the pipe, {names['head']}"] if found.case.has_line else []
 
     def row(s) -> tuple[str, ...]:
-        values = [("pressure", s.pressure, 4), ("flow", s.volume_flow, 4), ("size", s.lip_opening, 3)]
-        h = s.hydraulics
-        values += [("velocity", s.outlet_velocity, 3), ("head", h.head_loss, 3)] if flowing else []
-        losses = tuple(map(plain, (h.loss_coefficient, h.kv, h.cv))) if flowing else ()
-        loss = (f"{h.line_loss / units.factor('head'):.3g}",) if flowing and found.case.has_line else ()
-        return (*(f"{value / units.factor(name):.{n}g}" for name, value, n in values), *losses, *loss)
+        values, h = [("pressure", s.pressure, 4), ("flow", s.volume_flow, 4), ("size", s.lip_opening, 3)], s.hydraulics
+        if h is not None:
+            values += [("velocity", s.outlet_velocity, 3), ("head", h.head_loss, 3)]
+        shown = [f"{value / units.factor(name):.{n}g}" for name, value, n in values]
+        if h is None:
+            return (*shown, *["-"] * (len(head) - len(shown)))
+        loss = (f"{h.line_loss / units.factor('head'):.3g}",) if found.case.has_line else ()
+        return (*shown, *map(plain, (h.loss_coefficient, h.kv, h.cv)), *loss)
 
     worst = max(s.residual for s in result.states)
     trust = (
@@ -96,7 +98,7 @@ _HEADS = "Vibration over the head"
 
 def heads_part(found: Gathered) -> Part:
     """Verdict at every head, and the damping at which it would change."""
-    modes, units = found.modes, found.case.units
+    modes, case, units = found.modes, found.case, found.case.units
     if not modes:
         return not_there(found, "heads", _HEADS)
     head = (
@@ -115,11 +117,11 @@ def heads_part(found: Gathered) -> Part:
         if pressure not in modes:
             rows.append((shown, "not examined", *[""] * 6))
             continue
-        v = modes[pressure].verdict
+        v, state = modes[pressure].verdict, found.state(pressure)
+        sealed = state is not None and case.valve.is_preset and state.hydraulics is None
         numbers = (v.growth_rate, v.frequency, 100 * v.damping_ratio, v.critical_damping_factor, v.band)
-        rows.append(
-            (shown, v.outcome, *(f"{x:.3g}" if np.isfinite(x) else "-" for x in numbers), "yes" if v.certain else "no")
-        )
+        said = [f"{x:.3g}" if np.isfinite(x) else "-" for x in numbers]
+        rows.append((shown, v.outcome + " (sealed)" * sealed, *said, "yes" if v.certain else "no"))
     missing = [
         f"{units.pressure(found.heads[int(n.split('-')[1]) - 1])}: {why}"
         for n, why in found.missing.items()

@@ -23,6 +23,7 @@ from dbvfiv.errors import CaseError
 from dbvfiv.report import gather, write_page, write_pdf
 from dbvfiv.report.answers import UNKNOWN, answers
 from dbvfiv.report.gather import following, heads_of, planned
+from dbvfiv.report.parts import heads_part, steady_part
 from dbvfiv.studies.case import load_case
 from dbvfiv.studies.workers import Lost, Workers
 from tests.child import start
@@ -201,6 +202,31 @@ def test_a_strain_level_that_the_case_has_is_no_other_one():
 
     assert levels("materials.strain_level=10 %") == ["levels-steady-0.2"]
     assert levels("materials.strain_level=15 %") == ["levels-steady-0.1", "levels-steady-0.2"]
+
+
+def test_heads_at_which_the_bill_is_sealed_have_rows_without_losses(made):
+    """Those that open keep their losses."""
+    case = load_case("cases/dbv12-moulded.toml")
+    losses = SimpleNamespace(head_loss=0.9, loss_coefficient=1234.0, kv=20.0, cv=23.0, line_loss=0.1)
+    states = [
+        SimpleNamespace(pressure=1e3, volume_flow=0.0, lip_opening=0.0, residual=0.0, hydraulics=None),
+        SimpleNamespace(
+            pressure=1e4, volume_flow=0.02, lip_opening=0.03, residual=0.0, hydraulics=losses, outlet_velocity=4.0
+        ),
+    ]
+    nothing = SimpleNamespace(states=states, cracking=None, failures=(), drawers=dict, case=case)
+    found = SimpleNamespace(
+        case=case,
+        get={"steady": nothing}.get,
+        modes=made[0].modes,
+        heads=tuple(made[0].modes),
+        state=lambda _: states[0],
+        missing={},
+    )
+    (table,) = steady_part(found).tables
+    assert {len(row) for row in table.rows} == {len(table.head)} == {9}
+    assert table.rows[0][3:] == ("-",) * 6 and table.rows[1][5:8] == ("1230", "20", "23")
+    assert [row[1] for row in heads_part(found).tables[0].rows][-1] == "flutters (sealed)"
 
 
 @pytest.mark.parametrize("name, span, along", [("in-line", "4:100:6:log", None), ("moulded", "4:100:3:log", 24)])
