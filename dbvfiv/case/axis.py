@@ -188,3 +188,54 @@ def is_single(pressure: Any) -> bool:
     if pressure is None:
         return False
     return isinstance(pressure, str) or not isinstance(pressure, Iterable) or getattr(pressure, "ndim", None) == 0
+
+
+@dataclass(frozen=True)
+class Level:
+    """Damping that a mode has where it crosses a contour; of neutral modes none.
+
+    Attributes
+    ----------
+    rate : float, 1/s
+        Growth rate.
+    ratio : float
+        Damping ratio, of its own besides a rate of zero.
+    """
+
+    rate: float = 0.0
+    ratio: float = 0.0
+
+    @classmethod
+    def parse(cls, text: str) -> Level:
+        """Level of a text: a growth rate, "-2" or "-2 1/s", or a damping ratio, "5 %".
+
+        Raises
+        ------
+        ValueError
+        """
+        ratio = text.strip().endswith("%")
+        try:
+            number = float(text.strip().removesuffix("%").removesuffix("1/s"))
+        except ValueError:
+            number = math.nan
+        if (ratio and not 0.0 < number < 100.0) or not math.isfinite(number) or number == 0.0:
+            raise ValueError(f"in which {text!r} is neither a growth rate, '-2', nor a damping ratio, '5 %'")
+        return cls(ratio=number / 100.0) if ratio else cls(number)
+
+    @property
+    def words(self) -> str:
+        """The level with its unit."""
+        return f"{100 * self.ratio:g} %" if self.ratio else f"{self.rate:g} 1/s"
+
+    def excess(self, values):
+        """Growth rates of eigenvalues beyond the level, 1/s."""
+        return values.real - self.rate + self.ratio * abs(values)
+
+    def shifted(self, values):
+        """Array of eigenvalues with their excess as growth rate, the largest first."""
+        moved = self.excess(values) + 1j * values.imag
+        return moved[(-moved.real).argsort(kind="stable")]
+
+    def eigenvalue(self, omega: float) -> complex:
+        """Eigenvalue at the level with an imaginary part, rad/s."""
+        return complex(self.rate - self.ratio * omega / math.sqrt(1.0 - self.ratio**2), omega)

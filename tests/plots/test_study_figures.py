@@ -9,6 +9,7 @@ from matplotlib.colors import BoundaryNorm
 from dbvfiv.studies.case import thesis_case
 from dbvfiv.studies.map import figures as map_figures
 from dbvfiv.studies.map.column import MapPlan
+from dbvfiv.studies.map.curves import OnsetCurve
 from dbvfiv.studies.onset import figures as onset_figures
 from dbvfiv.studies.onset.line import known_intervals, uncertain_intervals
 from dbvfiv.studies.stability.verdict import FLUTTERS, NOT_VALID, OUTCOMES, STABLE, UNDECIDED
@@ -149,7 +150,7 @@ def map_result(certified=None):
     decided = np.where(unstable > 0, OUTCOMES.index(FLUTTERS), OUTCOMES.index(STABLE))
     grids["outcome"] = np.where(grids["certified"], decided, OUTCOMES.index(UNDECIDED))
     x = np.full(9, 6500.0) + np.linspace(-500, 500, 9)
-    curve = SimpleNamespace(law=0, x=x, y=np.geomspace(1, 1000, 9), frequency=np.linspace(36, 52, 9), exact=True)
+    curve = OnsetCurve(0, x, np.geomspace(1, 1000, 9), np.linspace(36, 52, 9), exact=True)
     return SimpleNamespace(
         plan=plan,
         columns=[SimpleNamespace(failure="")],

@@ -20,7 +20,8 @@ from ...observer import Observer
 from ..case import Case
 from ..orbits import Onset, onset_at
 from ..session import load_result
-from ..stability.line import ParameterLine, Scan
+from ..stability.line import ParameterLine
+from ..stability.scan import Scan
 from ..stability.walk import StabilityWalk
 
 #: Values of the range that are asked whether the steady state is stable.

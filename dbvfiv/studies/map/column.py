@@ -13,7 +13,7 @@ import numpy as np
 
 from eigen.columns import MISSING
 
-from ...case.axis import Axis
+from ...case.axis import Axis, Level
 from ...case.parameters import Mu
 from ...errors import CaseError, SolveError
 from ...model.symmetry import Symmetry, chosen_symmetries
@@ -91,6 +91,12 @@ class MapPlan:
         own, *others = self.classes
         return [*((law, own) for law in self.laws), *((self.base.storage, other) for other in others)]
 
+    @cached_property
+    def curves(self) -> list[tuple[int, Level]]:
+        """Law and level of each family of curves: onsets under every law first, then the contours asked for."""
+        levels = (Level(), *self.case.map.levels)
+        return [(law, level) for level in levels for law in range(len(self.laws))]
+
     @property
     def transposed(self) -> bool:
         """True where columns run along x: its cells share a steady state, or, where those of neither axis do, a wall
@@ -155,9 +161,9 @@ class MapColumn:
     samples : dict of tuples of Sample
         Cells by the number of their part, where it was asked for.
     onsets : (k, 5) array
-        Part (its number), value along the column, frequency in Hz, +1 where a mode becomes unstable along the column,
-        -1 where it ceases to be, and the growth rate over the size of the eigenvalue that the full matrices leave
-        there, NaN where it was not corrected by them.
+        Number of the family of curves, see `MapPlan.curves`, value along the column, frequency in Hz, +1 where a mode
+        becomes unstable along the column, -1 where it ceases to be, and the growth rate beyond its level over the size
+        of the eigenvalue that the full matrices leave there, NaN where it was not corrected by them.
     error : float
         Largest estimated relative error of a leading eigenvalue.
     failure : str
@@ -225,21 +231,26 @@ def solve_column(plan: MapPlan, walk: StabilityWalk, task: ColumnTask) -> MapCol
         for part in task.parts:
             line = plan.line(walk, task.value, part, task.level > 0)
             samples[part], worst = line.cells(), max(worst, line.error)
-            if part < len(plan.laws) and (line.stays or plan.case.map.curve):
-                onsets += [(part, *row) for row in _onsets(line)]
+            for number, (law, level) in enumerate(plan.curves):
+                if part == law and (line.stays or plan.case.map.curve):
+                    onsets += [(number, *row) for row in _crossings(line, level)]
     except (SolveError, CaseError) as error:
         return MapColumn.gap(task, str(error), time.process_time() - started)
     table, seconds = np.array(onsets, float).reshape(-1, 5), time.process_time() - started
     return MapColumn(task.value, task.level, samples, table, worst, seconds=seconds)
 
 
-def _onsets(line: ParameterLine) -> list[tuple[float, float, float, float]]:
-    """Value, frequency, direction, and what is left of the growth rate over the size of the eigenvalue."""
-    found = []
-    for crossing in line.scan.run(line.values):
+def _crossings(line: ParameterLine, level: Level) -> list[tuple[float, float, float, float]]:
+    """Value, frequency, direction, and the excess that is left over the size of the eigenvalue, where modes become
+    unstable or cease to be, or where the leading one crosses another level.
+    """
+    found, scan = [], line.scan if level == Level() else line.contour(level)
+    for crossing in scan.run(line.values):
+        if level != Level() and crossing.index:
+            continue
         direction = 1.0 if crossing.gains else -1.0
         try:
-            onset = line.locate(crossing, ROUGH if line.is_reduced else LOCATED)
+            onset = line.locate(crossing, ROUGH if line.is_reduced else LOCATED, level, scan)
         except SolveError:  # the state jumps there, or is not found
             if line.stays:
                 raise

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 import typer
-from pydantic import StrictBool, StrictInt, model_validator
+from pydantic import StrictBool, StrictInt, StrictStr, field_validator, model_validator
 
-from ...case.axis import Axis, StabilityRange, parse_stability_axis
+from ...case.axis import Axis, Level, StabilityRange, parse_stability_axis
 from ...case.model import Case
 from ...case.parameters import listed
 from ...case.quantity import number_or_text
@@ -35,6 +35,9 @@ class Keys(Section):
         2, "How often columns are put in between neighbours with different numbers of onsets.", ge=0, le=6
     )
     checks: StrictInt = key(4, "Cells compared with the full pencil, spread over the map.", ge=0, le=1000)
+    contours: tuple[StrictStr, ...] = key(
+        (), 'Curves of constant damping of the leading mode: growth rates, "-2" (1/s), or damping ratios, "5 %".'
+    )
     workers: WorkersKey = key(1, WORKERS_HELP)
     cycles: StrictBool = key(
         False,
@@ -51,6 +54,23 @@ class Keys(Section):
     def axes(self) -> tuple[Axis, Axis]:
         """The parsed ranges."""
         return parse_stability_axis(self.x), parse_stability_axis(self.y)
+
+    @property
+    def levels(self) -> tuple[Level, ...]:
+        """The parsed contours."""
+        return tuple(map(Level.parse, self.contours))
+
+    @field_validator("contours", mode="before")
+    @classmethod
+    def _read_contours(cls, given: Any) -> Any:
+        return [part.strip() for part in given.split(",")] if isinstance(given, str) else given
+
+    @field_validator("contours")
+    @classmethod
+    def _readable_contours(cls, texts: tuple[str, ...]) -> tuple[str, ...]:
+        for text in texts:
+            Level.parse(text)
+        return texts
 
     @model_validator(mode="after")
     def _two_parameters(self) -> Keys:
@@ -83,6 +103,10 @@ def command(
     both: Annotated[bool, typer.Option("--both", help="Both flow models side by side.")] = False,
     workers: WorkersOption = None,
     symmetry: ClassesOption = None,
+    contours: Annotated[
+        str | None,
+        typer.Option("--contours", metavar="LEVELS", help='Curves of constant damping: "-2,-5" (1/s) or "2 %,5 %".'),
+    ] = None,
     cycles: Annotated[
         bool, typer.Option("--cycles", help="Amplitude of the limit cycle in each cell that has one.")
     ] = False,
@@ -95,6 +119,9 @@ def command(
     point of a curve is neutral by the full matrices (map.curve).
 
     With --symmetry all the cells are asked in every symmetry class too, and the most unstable one is named.
+
+    With --contours=-2,-5 curves are drawn on which the leading mode has these growth rates, or damping ratios ("2 %"),
+    found and corrected like the onset curves.
 
     With --cycles branches of limit cycles are followed from the onsets of each column, as the section cycle of the case
     says; that takes seconds a cell.
@@ -115,6 +142,7 @@ def command(
         "map.continuity": "both" if both else None,
         "map.workers": workers,
         "map.symmetry": symmetry,
+        "map.contours": contours,
         "map.cycles": cycles or None,
     }
     return Request(changes)

@@ -11,9 +11,11 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
+from ...case.axis import Level
 from ...texts import shortly
 from ..stability.line import ACCURATE
 from .column import MapColumn, MapPlan
@@ -40,6 +42,7 @@ class Onset:
     frequency: float
     direction: float
     residual: float
+    neutral: bool = True
 
     def apart(self, other: Onset, expected: float = 0.0) -> float:
         """Distance along the columns, less what is expected, and in frequency; infinite for another law or
@@ -50,7 +53,9 @@ class Onset:
         return float(np.hypot(other.y - self.y - expected, self.detuned(other)))
 
     def detuned(self, other: Onset) -> float:
-        """Relative difference of frequencies."""
+        """Relative difference of frequencies; of contours none counts, on which one mode hands over to another."""
+        if not self.neutral:
+            return 0.0
         return abs(self.frequency - other.frequency) / max(self.frequency, other.frequency, 1.0)
 
 
@@ -70,6 +75,8 @@ class Web:
 
     Attributes
     ----------
+    number : int
+        Of the family, see `MapPlan.curves`.
     law : int
         Number of the law.
     columns : list of MapColumn
@@ -84,6 +91,7 @@ class Web:
         Columns with a gap between them and the next.
     """
 
+    number: int
     law: int
     columns: list[MapColumn]
     place: list[float]
@@ -94,15 +102,17 @@ class Web:
     gaps: set[int] = field(default_factory=set)
 
     @classmethod
-    def of(cls, plan: MapPlan, columns, law: int) -> Web:
-        """Web of neutral curves through all columns of a map under a continuity law."""
+    def of(cls, plan: MapPlan, columns, number: int) -> Web:
+        """Web of the curves of a family through all columns of a map."""
+        law = plan.curves[number][0]
         ordered = sorted(columns, key=lambda column: column.value)
         usable = [column for column in ordered if column.has(law)]
         web = cls(
+            number,
             law,
             usable,
             [plan.coordinate(plan.across, column.value) for column in usable],
-            [[_onset(plan, row) for row in column.onsets if int(row[0]) == law] for column in usable],
+            [[_onset(plan, row) for row in column.onsets if int(row[0]) == number] for column in usable],
         )
         lost = [column.value for column in ordered if column.failure]
         web.gaps = {
@@ -246,8 +256,10 @@ class Web:
     def _is_hidden(self, i: int) -> bool:
         """True where curves between two columns must have been missed.
 
-        The number of unstable modes at the lower edge then changes otherwise than the ends of curves there explain.
+        The number of unstable modes at the lower edge then changes otherwise than the ends of onset curves explain.
         """
+        if self.number != self.law:
+            return False
         modes = [self.columns[j].samples[self.law][0].unstable for j in (i, i + 1)]
         if min(modes) < 0:
             return False
@@ -262,13 +274,15 @@ class Web:
 
 def _onset(plan: MapPlan, row) -> Onset:
     law, along, frequency, direction, residual = map(float, row)
-    return Onset(int(law), along, plan.coordinate(plan.along, along), frequency, direction, residual)
+    own = plan.curves[int(law)]
+    neutral = own[1] == Level()
+    return Onset(own[0], along, plan.coordinate(plan.along, along), frequency, direction, residual, neutral)
 
 
 @shortly
 @dataclass(frozen=True)
 class OnsetCurve:
-    """A curve in the plane of the map on which a mode is neutral.
+    """A curve in the plane of the map on which a mode is neutral, or has another damping.
 
     Attributes
     ----------
@@ -284,6 +298,8 @@ class OnsetCurve:
         corrected.
     reason : str
         Why it is not exact.
+    level : str
+        Growth rate or damping ratio of the leading mode along it; empty on an onset curve.
     """
 
     law: int
@@ -293,15 +309,26 @@ class OnsetCurve:
     exact: bool = False
     mismatch: float = float("nan")
     reason: str = ""
+    level: str = ""
+
+    @property
+    def title(self) -> str:
+        """Name of its kind."""
+        return f"contour of {self.level}" if self.level else "onset curve"
 
     def points(self) -> list[list[float]]:
         """[[x, y], ...]."""
         return [[float(a), float(b)] for a, b in zip(self.x, self.y)]
 
+    def summary(self) -> dict[str, Any]:
+        """Numbers of a contour for JSON."""
+        own = {"points": self.points(), "frequencies": self.frequency.tolist(), "exact": bool(self.exact)}
+        return {"level": self.level} | own
+
 
 def linked(plan: MapPlan, columns: tuple[MapColumn, ...]) -> tuple[OnsetCurve, ...]:
     """Curves through the onsets of columns."""
-    webs = (Web.of(plan, columns, law) for law in range(len(plan.laws)))
+    webs = (Web.of(plan, columns, number) for number in range(len(plan.curves)))
     return tuple(_curve(plan, web, chain) for web in webs for chain in _chains(web))
 
 
@@ -310,7 +337,7 @@ def doubts(plan: MapPlan, curves) -> Iterator[str]:
     for curve in curves:
         if not curve.exact:
             yield (
-                f"The onset curve near {plan.x.parameter} = {curve.x[0]:.6g}, {plan.y.parameter} = {curve.y[0]:.6g} "
+                f"The {curve.title} near {plan.x.parameter} = {curve.x[0]:.6g}, {plan.y.parameter} = {curve.y[0]:.6g} "
                 f"is not exact: {curve.reason}."
             )
 
@@ -353,7 +380,9 @@ def _curve(plan: MapPlan, web: Web, chain) -> OnsetCurve:
     mismatch = float(np.max([onset.residual for onset in onsets]))
     reason = _reason(web, chain, mismatch)
     frequency = np.array([onset.frequency for onset in onsets])
-    return OnsetCurve(onsets[0].law, x, y, frequency, not reason, mismatch, reason)
+    level = plan.curves[web.number][1]
+    words = "" if level == Level() else level.words
+    return OnsetCurve(web.law, x, y, frequency, not reason, mismatch, reason, words)
 
 
 def _reason(web: Web, chain, mismatch: float) -> str:

@@ -196,7 +196,9 @@ def _sealed(axes, result: StudyResult, law: int) -> None:
 
 
 def _curves(axes, result: StudyResult, law: int) -> None:
-    """Onset curves in black, dashed where they are interpolated, their frequency written along them."""
+    """Onset curves in black, dashed where they are interpolated, their frequency written along them; contours thin,
+    their level in their middle.
+    """
     for curve in result.curves:
         if curve.law != law:
             continue
@@ -205,9 +207,19 @@ def _curves(axes, result: StudyResult, law: int) -> None:
             axes.plot(*points[0], "o", color="black", ms=4)
             continue
         dashes = "-" if curve.exact else (0, (3, 1.5))
+        if curve.level:
+            axes.plot(*points.T, color="0.15", lw=1.0, ls=dashes)
+            _write_level(axes, points[len(points) // 2], curve.level)
+            continue
         axes.plot(*points.T, color="white", lw=4.6, solid_capstyle="round")
         axes.plot(*points.T, color="black", lw=2.4, ls=dashes, solid_capstyle="round")
         _ticks_along(axes, points, curve.frequency)
+
+
+def _write_level(axes, point: np.ndarray, level: str) -> None:
+    text = level.replace("-", "\N{MINUS SIGN}")
+    style = {"ha": "center", "va": "center", "fontsize": 7.5, "color": "0.15", "path_effects": HALO}
+    axes.annotate(text, point, clip_on=True, **style)
 
 
 def _ticks_along(axes, points: np.ndarray, frequency: np.ndarray) -> None:

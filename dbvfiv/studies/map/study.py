@@ -128,11 +128,11 @@ class _Filling:
 
     def trace(self) -> None:
         """Columns that the onset curves need to be known everywhere."""
-        numbers = range(len(self.plan.laws))
+        numbers, own = range(len(self.plan.curves)), [law for law, _ in self.plan.curves]
         level = max(column.level for column in self.found.values())
         room = max(LEAST_ROOM, len(self.plan.across.values)) * len(numbers)
         for _ in range(ROUNDS):
-            wanted = sorted((place, law) for law in numbers for place in self._web(law).wanted())[:room]
+            wanted = sorted({(place, own[i]) for i in numbers for place in self._web(i).wanted()})[:room]
             if not wanted:
                 return
             room -= len(wanted)
@@ -141,8 +141,8 @@ class _Filling:
             self.record.progress(f"onset curves, {len(tasks)} more columns")
             self.fill(tasks)
 
-    def _web(self, law: int) -> Web:
-        return Web.of(self.plan, self.found.values(), law)
+    def _web(self, number: int) -> Web:
+        return Web.of(self.plan, self.found.values(), number)
 
 
 def _pattern(column: MapColumn, law: int) -> tuple[int, ...]:
@@ -209,11 +209,15 @@ _COLUMNS = (
     Column("seconds", "s", "Processor time"),
 )
 _ONSETS = (
-    Column("law", "", "Number of the flow model", "i8"),
-    Column("along", "SI", "Where a mode is neutral"),
+    Column("law", "", "Number of the family of curves: onsets under each flow model, then each contour", "i8"),
+    Column("along", "SI", "Where a mode is neutral, or has the damping of the contour"),
     Column("frequency", "Hz", "Its frequency"),
     Column("direction", "", "+1 where the mode becomes unstable along the column, -1 where it ceases to be", "i8"),
-    Column("residual", "", "Growth rate over the size of the eigenvalue that the full matrices leave there"),
+    Column(
+        "residual",
+        "",
+        "Growth rate beyond its level over the size of the eigenvalue that the full matrices leave there",
+    ),
 )
 _GAP, _CURVES, _CHECKS = "gap", "curves", "checks"
 
@@ -392,7 +396,8 @@ class MapResult(StudyResult):
         leading = {"leading": self._leading(law)} if self.classes else {}
         followed = cycles.summary_of(self.record, self.plan, law) if self.case.map.cycles else {}
         sealed = {"sealed": self.grid("sealed")[law].astype(bool).tolist()} if self.case.valve.is_preset else {}
-        mine = [curve for curve in self.curves if curve.law == law]
+        mine = [curve for curve in self.curves if curve.law == law and not curve.level]
+        contours = [curve.summary() for curve in self.curves if curve.law == law and curve.level]
         return (
             {key: self.grid(name)[law].tolist() for key, name in _CELLS.items()}
             | {
@@ -403,6 +408,7 @@ class MapResult(StudyResult):
                 "onset_frequencies": [curve.frequency.tolist() for curve in mine],
                 "onset_curves_exact": [bool(curve.exact) for curve in mine],
             }
+            | ({"contours": contours} if self.case.map.levels else {})
             | sealed
             | leading
             | followed
@@ -480,7 +486,7 @@ class MapResult(StudyResult):
     def _curve_line(self, curve: OnsetCurve) -> str:
         kind = "exact" if curve.exact else "not exact"
         return (
-            f"  onset curve, {kind}, {len(curve.x)} points: {self.plan.x.parameter} "
+            f"  {curve.title}, {kind}, {len(curve.x)} points: {self.plan.x.parameter} "
             f"{min(curve.x):.6g} to {max(curve.x):.6g}, "
             f"{self.plan.y.parameter} {min(curve.y):.6g} to {max(curve.y):.6g}, "
             f"{min(curve.frequency):.4g} to {max(curve.frequency):.4g} Hz"

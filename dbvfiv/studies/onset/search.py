@@ -17,9 +17,10 @@ from ...fit import outside_band
 from ...observer import Observer
 from ..case import Case
 from ..stability.dimensions import Variant, own_variant
-from ..stability.line import Crossing, ParameterLine
+from ..stability.line import ParameterLine
 from ..stability.place import check_scan
 from ..stability.samples import Sample, SampleKey
+from ..stability.scan import Crossing
 from ..stability.verdict import not_valid_at
 from ..stability.walk import StabilityWalk
 from .line import FoundOnsets, OnsetPoint, Side

@@ -106,3 +106,17 @@ def test_a_curve_that_is_not_followed_says_so(case, monkeypatch):
     result = run_map(case.replace({"map.curve": True, "map.refine": 0, "map.checks": 0}))
     assert result.curves and not any(curve.exact for curve in result.curves)
     assert all(any(f"= {curve.x[0]:.6g}" in sentence for sentence in result.warnings) for curve in result.curves)
+
+
+def test_contours_are_where_the_leading_mode_has_their_damping(coarse_case):
+    asked = {"map.x": "pressure=3000,6000", "map.y": "density=1:1000:6:log", "map.refine": 0, "map.checks": 0}
+    result = run_map(coarse_case.replace(asked | {"map.contours": ["-2", "2 %"]}))
+    levels = {curve.level: curve for curve in result.curves}
+    assert {"-2 1/s", "2 %"} <= set(levels) and all(curve.exact for curve in levels.values())
+    walk = StabilityWalk(result.case)
+    for words, exceeds in (("-2 1/s", lambda z: z.real + 2.0), ("2 %", lambda z: z.real + 0.02 * abs(z))):
+        x, y = levels[words].points()[0]
+        found = walk.spectrum(result.plan.place(x, y, 0.0)).eigenvalues
+        assert max(map(exceeds, found)) == pytest.approx(0.0, abs=1e-6 * abs(found[0]))
+    (document,) = (row for row in result.summary()["contours"] if row["level"] == "2 %")
+    assert document["exact"] and len(document["points"]) == len(document["frequencies"])

@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 
+from dbvfiv.case.axis import Level
 from dbvfiv.errors import SolveError
-from dbvfiv.studies.stability.line import Scan, locate
+from dbvfiv.studies.stability.scan import Scan, locate
 
 
 def modes(*functions):
@@ -72,3 +73,13 @@ def test_no_crossing_is_claimed_across_a_value_without_a_certificate():
     assert scan.run([0.0, 1.0, 2.0]) == [] and scan.uncertain == [(1.0, 2.0)]
     scan = Scan(modes(lambda x: x - 1.5), certify=lambda x: True)
     assert len(scan.run([0.0, 1.0, 2.0])) == 1 and scan.uncertain == []
+
+
+@pytest.mark.parametrize("text, value", [("-2", 1.0), ("-2.5 1/s", 0.5), ("10 %", 3.0 - 1.0 / np.sqrt(0.99))])
+def test_levels_of_damping_are_crossed_where_the_mode_has_it(text, value):
+    """Growth rate -3 + x at 10 rad/s; of a ratio zeta it is -10 zeta / sqrt(1 - zeta^2)."""
+    level, spectrum = Level.parse(text), modes(lambda x: x - 3.0)
+    scan = Scan(lambda x: level.shifted(spectrum(x)))
+    (crossing,) = scan.run([0.0, 1.2, 2.8])
+    assert locate(scan, crossing, 1e-12)[0] == pytest.approx(value)
+    assert level.excess(level.eigenvalue(10.0)) == pytest.approx(0.0, abs=1e-12)
