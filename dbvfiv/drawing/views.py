@@ -244,7 +244,7 @@ def layer_stress(state: Any) -> Figure:
     values = state.layers.von_mises.T / 1e6
     figure, panels = layer_panels(mesh, values, "Stress, MPa")
     for number, (axes, stress) in enumerate(zip(panels, values)):
-        side = ", inside" if number == 0 else ", outside" if number == len(values) - 1 else ""
+        side = {0: ", inside", len(values) - 1: ", outside"}.get(number, "") if len(values) > 1 else ""
         axes.set_title(axes.get_title(loc="left") + side, loc="left", fontsize=10)
         peak = int(np.argmax(stress))
         middle = [0.25 * (f[:-1, :-1] + f[1:, :-1] + f[:-1, 1:] + f[1:, 1:]).ravel()[peak] * 1e3 for f in (arc, z)]
