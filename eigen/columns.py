@@ -57,6 +57,8 @@ class Column:
         From any parameter point at the same state to its operator on the reduced model.
     leading : list of arrays
         Leading eigenvalues of the cells.
+    tolerance : float
+        Error up to which cells that were found on a reduced model are accurate enough.
     """
 
     growth_rate: np.ndarray
@@ -75,6 +77,7 @@ class Column:
     cell: Callable[[Hashable], Column] | None = None
     at: Callable[[Hashable], CoupledPencil] | None = None
     leading: list[np.ndarray] = field(default_factory=list)
+    tolerance: float = TOLERANCE
 
     @classmethod
     def blank(cls, cells: int) -> Column:
@@ -112,7 +115,7 @@ class Column:
 
     def certificate(self, cell: int) -> Certificate:
         """Certificate of a cell."""
-        accurate = self.how[cell] == DIRECT or self.error <= TOLERANCE
+        accurate = self.how[cell] == DIRECT or self.error <= self.tolerance
         known = bool(np.isfinite(self.growth_rate[cell]))
         return Certificate(
             int(self.unstable[cell]),
@@ -131,6 +134,8 @@ KEPT = 8
 LOSSES = 4
 #: Leading vectors taken at each point: where damping orders the modes, and for a band.
 MOST, MOST_IN_BAND = 4, 12
+#: Leading modes that are found and corrected beside another operator.
+BESIDE = 6
 #: Share of a band up to which eigenvalues are counted, clear of those at its end.
 INSIDE = 0.999
 
@@ -190,6 +195,34 @@ class ColumnSolver:
             cell=lambda mu: self._on(first, fine, [mu], error),
             at=fine.at,
         )
+
+    def beside(self, reduction: FamilyReduction, mu: Hashable, error: float, safety: float) -> Column:
+        """One parameter point of an operator next to another one, see `FamilyReduction.beside`.
+
+        Parameters
+        ----------
+        error : float
+            Relative error of eigenvalues that is known to come from elsewhere.
+        safety : float
+            The cell is accurate enough where all leading growth rates are farther from zero than so many errors.
+
+        Returns
+        -------
+        Column
+            Leading eigenvalues are corrected with the full matrices; what that changes counts as their error. Listed
+            as unstable are those corrected, counted all of the reduced model. Without a certificate where growth rates
+            are not clear of the error.
+        """
+        family, model = reduction.family, reduction.coarse
+        values = model.eigenvalues(mu)
+        places = family.reach(mu).leading(values)[:BESIDE]
+        change = reduction.correction(model.near(mu, places), mu)
+        leading = places + change
+        doubt = np.maximum(np.abs(change), error * np.abs(leading)) / np.abs(leading.real)
+        column = _column(family, [mu], [leading], [leading], float(doubt.max(initial=0.0)))
+        column.counted[0] = _listed(values, 0.0, column.band[0])
+        column.certain[0] = bool(np.isfinite(leading).all())
+        return replace(column, tolerance=1.0 / safety)
 
     def _on(self, first: ReducedFamily, fine: ReducedFamily, points, error: float, edges: bool = False) -> Column:
         """Cells on a reduced model, counted on that of the first stage; those without a certificate directly."""

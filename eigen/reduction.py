@@ -8,7 +8,7 @@ that forty vectors carry seven digits of the eigenvalues; where they do not, its
 from __future__ import annotations
 
 import weakref
-from collections.abc import Iterator
+from collections.abc import Hashable, Iterator
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -188,6 +188,17 @@ class FamilyReduction:
         lowest = TransferBasis(structure, modes=LOWEST).V
         return ReducedFamily(family, np.hstack([lowest, self.coarse.V]), COMPRESSION)
 
+    def beside(self, family: PencilFamily, space: np.ndarray, mu: Hashable) -> FamilyReduction:
+        """Reduced model of an operator next to this one, on a space (n, k) that serves both, without a factorisation;
+        `mu` is a parameter point of this one whose relaxation is that of both by and large.
+        """
+        relaxation = self.family.relaxation(mu)
+        typical, stiffened = (1.0, np.zeros(0)), self.solver
+        if relaxation is not None:
+            typical = self._typical(mu)
+            stiffened = self._stiffened_by(relaxation.factors(1j * typical[0]).real, relaxation)
+        return _ReductionBeside(family, space, self.solver, typical, stiffened)
+
     def lowest_frequencies(self, count: int) -> np.ndarray:
         """Lowest frequencies of the undamped symmetric structure, Hz, ascending, as the function of that name has them;
         none where the first stage does not lead to them.
@@ -319,6 +330,14 @@ class FamilyReduction:
         columns = self._corrected_leading(fine, points, most)
         return ReducedFamily(self.family, columns, DEEPER, base=fine) if columns.shape[1] else fine
 
+    def leading_vectors(self, mu: Hashable, most: int) -> np.ndarray:
+        """Right and left leading vectors at a parameter point, corrected with the full matrices, real and imaginary
+        parts apart, (n, 4 k); each vector has length one in the mass.
+        """
+        columns = self._corrected_leading(self.fine(self.coarse, [mu], most), [mu], most)
+        squares = np.einsum("ij,ij->j", columns, self.family.mass @ columns).reshape(2, 2, -1)  # side, part, mode
+        return columns / np.sqrt(np.tile(squares.sum(axis=1, keepdims=True), (1, 2, 1))).ravel()
+
     def _corrected_leading(self, model: ReducedFamily, points, most: int) -> np.ndarray:
         """Right and left leading vectors of a reduced model at some points, corrected with the full matrices, real and
         imaginary parts side by side.
@@ -328,19 +347,59 @@ class FamilyReduction:
         return np.hstack([part for both in corrected for x in both for part in (x.real, x.imag)])
 
     def correction(self, pairs: Pairs, mu) -> np.ndarray:
-        """Newton's correction of eigenvalues by the full matrices, -w^H T x / (w^H T' x), complex (k,).
+        """Corrections of eigenvalues by the full matrices, complex (k,): those of the projection on each pair of
+        vectors and what a correction with the full matrices adds to it.
 
-        Vectors are corrected once outside the space first; what the space lacks shows in it.
+        What the space lacks shows in it. Of the vectors' corrections only the directions count, so that motions faster
+        than those left out of the space, whose inertia the corrections lack, are not made worse.
         """
         right, left = self._corrected([pairs], [mu])[0]
-        products = self._products(right, self.family.rayleigh(mu)[1], self.family.relaxation(mu))
-        force, inner = self._residual(products, pairs.values, pairs.u, mu)
-        top = np.einsum("ij,ij->j", left.conj(), force) + np.einsum("ij,ij->j", pairs.c.conj(), inner)
+        beta, relaxation = self.family.rayleigh(mu)[1], self.family.relaxation(mu)
+        added = right - pairs.q, left - pairs.w
+        own, further = (self._products(x, beta, relaxation) for x in (pairs.q, added[0]))
+        here = self._residual(own, pairs.values, pairs.u, mu)
+        there = self._residual(further, pairs.values, np.zeros_like(pairs.u), mu)
+
+        def times(left, inner, right):
+            return np.einsum("ij,ij->j", left.conj(), right[0]) + np.einsum("ij,ij->j", inner.conj(), right[1])
+
+        both = times(added[1], np.zeros_like(pairs.c), there)
+        both[both == 0.0] = np.inf  # vectors that are exact are not corrected
+        top = times(pairs.w, pairs.c, here)
+        top -= times(pairs.w, pairs.c, there) * times(added[1], np.zeros_like(pairs.c), here) / both
         # T' by a difference quotient, good enough for the size of a correction
         step = 1e-3 * np.maximum(np.abs(pairs.values), 1.0)
-        ahead = self._residual(products, pairs.values + step, pairs.u, mu)
-        slope = (
-            np.einsum("ij,ij->j", left.conj(), ahead[0] - force)
-            + np.einsum("ij,ij->j", pairs.c.conj(), ahead[1] - inner)
-        ) / step
-        return -top / slope
+        ahead = self._residual(own, pairs.values + step, pairs.u, mu)
+        return -top * step / (times(pairs.w, pairs.c, ahead) - times(pairs.w, pairs.c, here))
+
+
+class _ReductionBeside(FamilyReduction):
+    """Reduced model of a family next to another one, whose factored stiffness corrects the vectors of both.
+
+    What the space lacks is of first order in the difference of the two; one correction leaves its product with that
+    difference, and of an eigenvalue, which left and right vectors give, the square.
+    """
+
+    def __init__(self, family: PencilFamily, space: np.ndarray, solver: StaticSolver, typical, stiffened: StaticSolver):
+        self.family, self._space, self.solver = family, space, solver
+        self._known = typical, stiffened
+        family.model = weakref.ref(self)
+
+    @cached_property
+    def coarse(self) -> ReducedFamily:
+        return ReducedFamily(self.family, self._space, COMPRESSION)
+
+    @property
+    def wide(self) -> ReducedFamily:
+        return self.coarse
+
+    def lowest_frequencies(self, count: int) -> np.ndarray:
+        squares = la.eigvalsh(0.5 * (self.coarse.stiffness + self.coarse.stiffness.T))
+        found = np.sort(squares[np.argsort(np.abs(squares))[:count]])
+        return np.sqrt(np.maximum(found, 0.0)) / (2 * np.pi)
+
+    def _typical(self, mu) -> tuple[float, np.ndarray]:
+        return self._known[0]
+
+    def _stiffened_by(self, factors: np.ndarray, relaxation: Relaxation) -> StaticSolver:
+        return self._known[1]

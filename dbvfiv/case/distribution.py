@@ -115,6 +115,15 @@ class Distribution:
 
         return float(self.at(np.zeros(1))[0])
 
+    @property
+    def scale(self) -> float:
+        """Standard deviation, of a lognormal one towards larger values."""
+        import numpy as np
+
+        if self.form in ("normal", "lognormal"):
+            return float(self.at(np.ones(1))[0]) - self.median
+        return float(np.std(self.numbers)) / (1.0 if self.form == "samples" else np.sqrt(3.0))
+
     def share_outside(self, low: float, high: float) -> float:
         """Probability of values below one bound or above another."""
         import numpy as np

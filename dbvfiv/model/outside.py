@@ -69,10 +69,20 @@ class AddedMass:
     slowness : (r + 1,) array
         mu_i of the motions kept and of the first left out, s2 m3/kg: a massless wall in a fluid of density rho has the
         frequencies 1/sqrt(rho mu)/(2 pi).
+    motions : (n, r) array, optional
+        x_i, where they are known.
     """
 
     columns: np.ndarray
     slowness: np.ndarray
+    motions: np.ndarray | None = None
+
+    @classmethod
+    def of_images(cls, motions: np.ndarray, images: np.ndarray, slowness: np.ndarray) -> AddedMass:
+        """Added mass from motions (n, r) and its images (n, r) of these: exact on their span."""
+        gram = motions.T @ images
+        values, turn = la.eigh(0.5 * (gram + gram.T))
+        return cls(images @ (turn / np.sqrt(values)), slowness, motions)
 
     @property
     def rank(self) -> int:
@@ -267,7 +277,8 @@ def leading_added_mass(fluxes, impedance, structure, kept: int, workspace: Works
         kept = min(kept, len(pairs.values) - 1)
         # signs that stay from state to state: differences are taken of the columns
         signs = np.where(start[:, 0] @ pairs.vectors[:, :kept] < 0.0, -1.0, 1.0)
-        return AddedMass(pairs.images[:, :kept] * (signs / np.sqrt(pairs.values[:kept])), pairs.values)
+        columns = pairs.images[:, :kept] * (signs / np.sqrt(pairs.values[:kept]))
+        return AddedMass(columns, pairs.values, pairs.vectors[:, :kept])
     raise SolveError("The wall's stiffness is far from positive definite; no added mass can be told from it.")
 
 

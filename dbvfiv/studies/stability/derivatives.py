@@ -173,14 +173,21 @@ class Neighbourhood:
     def _between(self, name: str, value: float, low: float, high: float) -> Sensitivity:
         """Differences between two values of a parameter."""
         ends = [changed(self.model, self.pressure, self.mu, name, end) for end in (low, high)]
-        places = [self.q, self.q]
-        if any(model is not self.model or pressure != self.pressure for model, pressure, _ in ends):
-            first, second = (model.residual(self.q, pressure) for model, pressure, _ in ends)
-            moved = -self._factor.solve((second - first) / (high - low))
+        places, moved = [self.q, self.q], self.tangent([end[:2] for end in ends], high - low)
+        if moved is not None:
             places = [self.q + (end - value) * moved for end in (low, high)]
         below, above = (_performance(model, q, pressure) for (model, pressure, _), q in zip(ends, places))
         performance = {key: (above[key] - below[key]) / (high - low) for key in below}
         return Sensitivity(name, value, self._eigenvalues(ends, places, high - low), performance)
+
+    def tangent(self, ends: Sequence[tuple[ValveModel, float]], apart: float) -> np.ndarray | None:
+        """Derivative (n,) of the state from two valves with their inlet pressures, which lie `apart` in a parameter;
+        None where nothing moves it.
+        """
+        if all(model is self.model and pressure == self.pressure for model, pressure in ends):
+            return None
+        first, second = (model.residual(self.q, pressure) for model, pressure in ends)
+        return -self._factor.solve((second - first) / apart) if (second != first).any() else None
 
     def _eigenvalues(self, ends, places, apart: float) -> tuple[complex, ...]:
         if not self.modes:
@@ -192,7 +199,7 @@ class Neighbourhood:
         if self.model.outside is None or places[0] is places[1]:
             return tuple(eigenvalue_derivative(here, mode, change) for mode in self.modes)
         density = self.model.case.outside.density(self.mu["density"])
-        below, above = (self._resisting(model, q) for (model, _, _), q in zip(ends, places))
+        below, above = (self.resisting(model, q, self._motions) for (model, _, _), q in zip(ends, places))
         slope, count = density * (above - below) / apart, len(self.modes)
         found = []
         for i, mode in enumerate(self.modes):
@@ -208,9 +215,9 @@ class Neighbourhood:
             return self._linear
         return linearise(model, q, pressure, added=self._linear.added)
 
-    def _resisting(self, model: ValveModel, q: np.ndarray) -> np.ndarray:
-        """Forces (n, 2 k) of a fluid of unit density outside on the accelerations of the modes."""
-        return model.outside.resistance(q, self._motions, self._panels)
+    def resisting(self, model: ValveModel, q: np.ndarray, motions: np.ndarray) -> np.ndarray:
+        """Forces (n, k) of a fluid of unit density outside on accelerations (n, k) at a state beside this one."""
+        return model.outside.resistance(q, motions, self._panels)
 
     @cached_property
     def _panels(self):

@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from eigen import ColumnSolver
 
+from ...case.parameters import Mu
 from ...errors import CaseError, SolveError
 from ...observer import Observer
 from ..inputs import Plan
+from ..stability.neighbours import At, Beside, Neighbours
 from ..stability.verdict import OUTCOMES, Verdict
 from ..stability.walk import StabilityWalk
 
@@ -30,6 +32,8 @@ class Found(NamedTuple):
         Of the leading oscillating mode, and the least ratio; NaN where nothing is known.
     opening, flow : float, m2, m3/s
         Area between the lips and volume flow, NaN without a steady state.
+    apart : bool
+        Found with its full matrices although samples share a space.
     why : str
         Of a sample that is undecided or not valid.
     """
@@ -42,15 +46,37 @@ class Found(NamedTuple):
     damping_ratio: float
     opening: float
     flow: float
+    apart: bool = False
     why: str = ""
 
     @classmethod
-    def of(cls, sample: int, value: float, verdict: Verdict, state: Any = None) -> Found:
+    def of(cls, sample: int, value: float, verdict: Verdict, state: Any = None, apart: bool = False) -> Found:
         """Row of a verdict and its steady state."""
         read = (np.nan, np.nan) if state is None else (state.outlet_area, state.volume_flow)
         numbers = verdict.growth_rate, verdict.frequency, verdict.damping_ratio
         why = "" if verdict.stable is not None else verdict.reason
-        return cls(sample, value, OUTCOMES.index(verdict.outcome), *numbers, *read, why)
+        return cls(sample, value, OUTCOMES.index(verdict.outcome), *numbers, *read, apart, why)
+
+
+def walk_of(plan: Plan, row: np.ndarray, solver: ColumnSolver) -> StabilityWalk:
+    """Walk of a sample.
+
+    Raises
+    ------
+    CaseError, SolveError
+        For numbers that do not go together.
+    """
+    return StabilityWalk(plan.redescribed(row), Observer(), solver=solver)
+
+
+def walks_at(plan: Plan, value: float, solver: ColumnSolver) -> At:
+    """Function from values of the inputs to the walk of a sample and its parameter point at a value of the range."""
+
+    def at(row: np.ndarray) -> tuple[StabilityWalk, Mu]:
+        walk = walk_of(plan, row, solver)
+        return walk, plan.place(walk.case, value, row)
+
+    return at
 
 
 class Sampler:
@@ -61,13 +87,22 @@ class Sampler:
     plan : Plan
     states : sequence of (n,) array or None
         Displacements of the case at the values of the range; None where it has no steady state.
+    neighbours : mapping, optional
+        What samples have in common, by the numbers of the values; without it each is found with its full matrices.
     walk : StabilityWalk, optional
         Of the case.
     """
 
-    def __init__(self, plan: Plan, states: Sequence[np.ndarray | None], walk: StabilityWalk | None = None):
+    def __init__(
+        self,
+        plan: Plan,
+        states: Sequence[np.ndarray | None],
+        neighbours: Mapping[int, Neighbours] = {},
+        walk: StabilityWalk | None = None,
+    ):
         self.plan, self.states, self._walk = plan, states, walk or StabilityWalk(plan.case)
-        self._solver = ColumnSolver()
+        self._solver, self._neighbours = ColumnSolver(), neighbours
+        self._found: dict[int, Beside] = {}
 
     def found(self, first: int, numbers: np.ndarray) -> list[Found]:
         """Rows of samples, whose values (m, d) are given; the first has the number `first`."""
@@ -91,20 +126,23 @@ class Sampler:
             yield Found.of(first + k, value, verdict, state)
 
     def _one(self, sample: int, row: np.ndarray) -> Iterator[Found]:
-        try:
-            case = self.plan.redescribed(row)
-            walk = StabilityWalk(case, Observer(), solver=self._solver)
-        except (SolveError, CaseError) as error:
-            walk, failure = None, str(error)
-        for value, start in zip(self.plan.values, self.states):
-            state, verdict = None, None
+        walk = None
+        for i, value in enumerate(self.plan.values):
+            state, near = None, self._neighbours.get(i)
+            apart = near is not None
             try:
-                if walk is None:
-                    raise SolveError(failure)
-                place = self.plan.place(case, value, row)
-                walk.settle(place, start)
+                walk = walk or walk_of(self.plan, row, self._solver)
+                place = self.plan.place(walk.case, value, row)
+                walk.settle(place, self.states[i] if near is None else near.state(row))
                 state = walk.state(place)
-                verdict = walk.verdict(place)
+                verdict = self._beside(i).verdict(walk, place, row) if near else None
+                apart = apart and verdict is None
+                verdict = verdict or walk.verdict(place)
             except (SolveError, CaseError, ValueError) as error:
                 verdict = Verdict.undecided(str(error))
-            yield Found.of(sample, value, verdict, state)
+            yield Found.of(sample, value, verdict, state, apart)
+
+    def _beside(self, i: int) -> Beside:
+        if i not in self._found:
+            self._found[i] = Beside(walks_at(self.plan, self.plan.values[i], ColumnSolver()), self._neighbours[i])
+        return self._found[i]

@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from contextlib import suppress
 from functools import cached_property
 from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
+
+from eigen import ColumnSolver
 
 from ...case.parameters import PARAMETERS, Mu
 from ...errors import CaseError, SolveError
@@ -18,16 +21,20 @@ from ..case import Case
 from ..inputs import Plan, quasi_random
 from ..result import StudyResult
 from ..session import Session
+from ..stability.neighbours import Neighbours, find_neighbours
 from ..stability.place import check_scan, describe_fixed, fixed_conditions
 from ..stability.verdict import DIVERGES, FLUTTERS, NOT_VALID, OUTCOMES, STABLE, UNDECIDED
 from ..stability.walk import StabilityWalk
 from ..study import Study
 from ..workers import Lost, Work, Workers
 from . import figures
-from .sampler import Found, Sampler
+from .sampler import Found, Sampler, walks_at
 from .sampling import CONFIDENCE, Probability, Shifted, approach, counted, shares, weighted
 
-SAMPLES, NUMBERS, _WHY = "samples", "numbers", "undecided sample"
+SAMPLES, NUMBERS = "samples", "numbers"
+#: Notes: reason of an undecided sample; error of the space that samples share at a value of the range; a sample found
+#: with its full matrices although there is such a space.
+_WHY, _SPACE, _APART = "undecided sample", "shared space", "sample apart"
 _SAMPLES = (
     Column("sample", "", "Number of the sample", "i8"),
     Column("value", "SI", "Of the range"),
@@ -49,6 +56,9 @@ _NUMBERS = (
 _TABLES = TableSpec(SAMPLES, _SAMPLES, chunk=512), TableSpec(NUMBERS, _NUMBERS, chunk=512)
 #: Samples that a worker takes at a time: of valves that share their states, and of valves with their own.
 SHARED, OWN = 64, 4
+#: Samples from which a space that they share pays; valves that it is made of, and that its error is measured on, with
+#: the seed of their inputs, which no samples have.
+PAYS, TAKEN, CHECKS, NEAR_SEED = 48, 6, 4, 2**31 + 1
 #: Samples of the final density of a rare event over all that may be used; the others lead there.
 FINAL = 0.4
 #: Quantities whose percentiles are told, and their units in lines.
@@ -102,8 +112,9 @@ def run(session: Session, record: GrowingRecord, workers: int | str | None = Non
     states = _states_of_case(plan, walk, record)
     count = case.uncertainty.workers if workers is None else workers
     record.begin("uncertainty", case.uncertainty.samples)
-    with Workers(count, _start, (case.to_dict(), states), record.warn) as team:
-        sampling = _Sampling(plan, record, team, Sampler(plan, states, walk))
+    neighbours = _neighbours(plan, states, record)
+    with Workers(count, _start, (case.to_dict(), states, neighbours), record.warn) as team:
+        sampling = _Sampling(plan, record, team, Sampler(plan, states, neighbours, walk))
         if case.uncertainty.method == "rare":
             sampling.rare()
         else:
@@ -125,8 +136,28 @@ def _states_of_case(plan: Plan, walk: StabilityWalk, record: GrowingRecord) -> l
     return states
 
 
-def _start(case: dict, states: list[np.ndarray | None]) -> Sampler:
-    return Sampler(Plan(Case.from_dict(case)), states)
+def _neighbours(plan: Plan, states: list[np.ndarray | None], record: GrowingRecord) -> dict[int, Neighbours]:
+    """What samples have in common at each value, where it pays and can be had."""
+    found: dict[int, Neighbours] = {}
+    if plan.is_surrounding or plan.case.uncertainty.samples < PAYS:
+        return found
+    row, d = PARAMETERS[plan.parameter], len(plan.inputs)
+    origin, ahead = plan.numbers(np.zeros((1, d)))[0], np.array([one.distribution.scale for one in plan.inputs])
+    near = plan.numbers(quasi_random(TAKEN + CHECKS, d, NEAR_SEED))
+    for i, (value, state) in enumerate(zip(plan.values, states)):
+        if state is None:
+            continue
+        where = f"{value / row.scale:.4g} {row.shown_unit}".rstrip()
+        record.progress(f"space that samples share at {where}, of {1 + len(near)} valves")
+        with suppress(SolveError, CaseError, ArithmeticError, ValueError):  # each sample is then found by itself
+            at = walks_at(plan, value, ColumnSolver())
+            found[i] = find_neighbours(at, origin, ahead, state, near[:TAKEN], near[TAKEN:])
+            record.note(_SPACE, value=value, error=found[i].error)
+    return found
+
+
+def _start(case: dict, states: list[np.ndarray | None], neighbours: dict[int, Neighbours]) -> Sampler:
+    return Sampler(Plan(Case.from_dict(case)), states, neighbours)
 
 
 def _found(sampler: Sampler, first: int, numbers: np.ndarray) -> list[Found]:
@@ -200,6 +231,8 @@ class _Sampling:
         for row in fresh:
             if row.why:
                 self.record.note(_WHY, sample=row.sample, value=row.value, reason=row.why)
+            if row.apart:
+                self.record.note(_APART, sample=row.sample, value=row.value)
         self.record.extend(SAMPLES, {c.name: [getattr(row, c.name) for row in fresh] for c in _SAMPLES})
         for row in fresh:
             self.known[row.sample] = _performance(row.outcome, row.damping_ratio)
@@ -286,7 +319,8 @@ class UncertaintyResult(StudyResult):
 
     def point(self, value: float) -> dict[str, Any]:
         """Numbers at a value of the range: ``probability`` of flutter among the decided samples with its ``interval``,
-        ``samples``, ``undecided``, ``outcomes`` by their names, ``percentiles`` (2.5, 50, 97.5) and ``decides``.
+        ``samples``, ``undecided``, ``shared`` (decided on the space that samples share), ``outcomes`` by their names,
+        ``percentiles`` (2.5, 50, 97.5) and ``decides``.
         """
         found, flutter = self.at(value), self.probability(value)
         names = (FLUTTERS, DIVERGES, NOT_VALID, STABLE)
@@ -299,10 +333,17 @@ class UncertaintyResult(StudyResult):
             "interval": [flutter.low, flutter.high],
             "samples": len(found["outcome"]),
             "undecided": int(_are(found, UNDECIDED).sum()),
+            "shared": self._shared(value, found["sample"]),
             "outcomes": {n: {"probability": _plain(p.value), "interval": [p.low, p.high]} for n, p in others.items()},
             "percentiles": spreads,
             "decides": self.decides(value),
         }
+
+    def _shared(self, value: float, samples: np.ndarray) -> int:
+        if not any(note["value"] == value for note in self.record.notes(_SPACE)):
+            return 0
+        apart = {note["sample"] for note in self.record.notes(_APART) if note["value"] == value}
+        return len(set(samples.tolist()) - apart)
 
     def decides(self, value: float) -> list[dict[str, Any]]:
         """Share of each input in the variance of the least damping ratio at a value, and in that of flutter or not,
@@ -369,7 +410,13 @@ class UncertaintyResult(StudyResult):
         place = f"{self.parameter}, {row.shown_unit}".rstrip(", ")
         head = f"{place:>16}{'flutters':>10}  {'95 % interval':<17}{'not valid':>10}{'undecided':>10}{'samples':>9}"
         lines = [f"At {fixed}:", *(f"  {one.words()}" for one in self.plan.inputs), f"{head}  least damping ratio, %"]
-        return [*lines, *map(self._line, self.points), *self._deciding_lines()]
+        return [*lines, *map(self._line, self.points), *self._shared_lines(), *self._deciding_lines()]
+
+    def _shared_lines(self) -> list[str]:
+        shared, count = (sum(point[name] for point in self.points) for name in ("shared", "samples"))
+        if not shared:
+            return []
+        return [f"{shared} of {count} verdicts on a space that samples share, the others with their full matrices."]
 
     def _line(self, point: dict[str, Any]) -> str:
         low, middle, high = point["percentiles"]["damping_ratio"]

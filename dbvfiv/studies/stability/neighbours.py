@@ -1,0 +1,208 @@
+"""Valves next to one another: what they share, so that a further one costs a projection and no search.
+
+States and added mass are linear in the numbers that tell the valves apart, from one back-substitution and one
+difference each. A state is made exact by Newton's method; the linearised equations of every valve are its own, but for
+the added mass, whose error is of second order and measured on further valves. They project on one space of the leading
+motions of several of these valves; what that lacks of a valve is told by a correction with its full matrices and the
+factors of the first one (`eigen.ColumnSolver.beside`). Growth rates decide where they are clear of both errors.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import suppress
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from eigen import Column, ColumnSolver, FamilyReduction
+from eigen.basis import orthonormal, outside
+
+from ...case.parameters import Mu
+from ...model.dynamics import linearise
+from ...model.outside import AddedMass
+from .derivatives import Neighbourhood
+from .samples import Sample
+from .verdict import Verdict
+from .walk import StabilityWalk, ValveFamily
+
+#: From numbers (d,) to the walk and the parameter point of their valve.
+At = Callable[[np.ndarray], tuple[StabilityWalk, Mu]]
+#: Step of differences over the scale of a number.
+STEP = 0.01
+#: Leading modes of each valve whose vectors the space has.
+MODES = 6
+#: Shares of these vectors, and of those of static responses, below which directions are left out.
+WEAK, STATIC = 3e-4, 0.5
+#: Leading modes that its error is measured on.
+WATCHED = 3
+#: Errors that growth rates must be clear of.
+SAFETY = 5.0
+
+
+@dataclass(frozen=True)
+class Neighbours:
+    """First-order states and added mass of valves, and a space of their leading motions.
+
+    Attributes
+    ----------
+    origin, scales : (d,) arrays
+        Numbers of the first valve, and their scales.
+    q : (n,) array
+        Displacements of the first valve.
+    slopes : (d, n) array
+        Their change for a step of one scale in each number.
+    added : AddedMass or None
+        Of the first valve, at unit density.
+    images : (d, n, r) array
+        Change of the forces on accelerations `added.motions`, likewise.
+    space : (n, k) array
+        Leading motions of several valves.
+    error : float
+        Relative error of eigenvalues by the added mass at a distance of one scale.
+    """
+
+    origin: np.ndarray
+    scales: np.ndarray
+    q: np.ndarray
+    slopes: np.ndarray
+    added: AddedMass | None
+    images: np.ndarray
+    space: np.ndarray
+    error: float = 0.0
+
+    def steps(self, row: np.ndarray) -> np.ndarray:
+        """Distances (d,) of numbers from those of the first valve, in scales."""
+        return (row - self.origin) / self.scales
+
+    def state(self, row: np.ndarray) -> np.ndarray:
+        """Displacements (n,) to first order."""
+        return self.q + self.steps(row) @ self.slopes
+
+    def added_mass(self, row: np.ndarray) -> AddedMass | None:
+        """Added mass to first order."""
+        known = self.added
+        if known is None:
+            return None
+        images = known.columns @ (known.columns.T @ known.motions)
+        return AddedMass.of_images(
+            known.motions, images + np.tensordot(self.steps(row), self.images, 1), known.slowness
+        )
+
+    def square(self, row: np.ndarray) -> float:
+        """Square of the distance from the first valve over the numbers that move its state, one at least."""
+        return max(float((self.steps(row)[self.slopes.any(axis=1)] ** 2).sum()), 1.0)
+
+
+def find_neighbours(
+    at: At, origin: np.ndarray, scales: np.ndarray, start: np.ndarray, taken: np.ndarray, checks: np.ndarray
+) -> Neighbours:
+    """What the neighbours of a valve share.
+
+    Parameters
+    ----------
+    at : callable
+    origin, scales : (d,) arrays
+        Scales are not zero.
+    start : (n,) array
+        Displacements next to those of the first valve.
+    taken, checks : (s, d), (c, d) arrays
+        Numbers of the valves whose leading motions the space has, and of those that the error is measured on.
+
+    Raises
+    ------
+    SolveError, CaseError
+        If one of them has no steady state or no modes, or cannot be made.
+    """
+    near, first = _tangents(at, origin, scales, start)
+    vectors = [first.leading_vectors(at(origin)[1], MODES)]
+    beside = Beside(at, near)
+    for row in taken:
+        walk, place = at(row)
+        walk.settle(place, near.state(row))
+        vectors.append(FamilyReduction(beside.family(walk, place, row)).leading_vectors(place, MODES))
+    near = replace(near, space=_joint_space(first, vectors))
+    return replace(near, error=max(_errors(at, near, checks)))
+
+
+def _tangents(at: At, origin: np.ndarray, scales: np.ndarray, start: np.ndarray) -> tuple[Neighbours, FamilyReduction]:
+    """States and added mass to first order, without a space, and the reduced models of the first valve."""
+    walk, place = at(origin)
+    walk.settle(place, start)
+    q, built, added = walk.equilibrium(place), walk.built(place), walk.family(place).linear.added
+    hood = Neighbourhood(built.model, q, place.pressure, place)
+    slopes = np.zeros((len(origin), len(q)))
+    images = np.zeros((len(origin), *(() if added is None else added.motions.shape)))
+    for i, axis in enumerate(np.diag(STEP * scales)):
+        other, beside = at(origin + axis)
+        end = other.built(beside).model, beside.pressure
+        slope = hood.tangent([(built.model, place.pressure), end], STEP)
+        if slope is None:
+            continue
+        slopes[i] = slope
+        if added is not None:
+            ahead = hood.resisting(end[0], q + STEP * slope, added.motions)
+            images[i] = (ahead - hood.resisting(built.model, q, added.motions)) / STEP
+    near = Neighbours(origin, scales, q, slopes, added, images, np.zeros((len(q), 0)))
+    return near, FamilyReduction(walk.family(place))
+
+
+def _joint_space(first: FamilyReduction, vectors: list[np.ndarray]) -> np.ndarray:
+    """Space (n, k) of leading vectors of several valves, and of static responses of one, without weak directions."""
+    mass = first.family.mass
+    leading = orthonormal(mass, np.hstack(vectors), WEAK, passes=1)[0]
+    return np.hstack([leading, outside(leading, mass, first.coarse.V, STATIC)])
+
+
+def _errors(at: At, near: Neighbours, checks: np.ndarray) -> Iterator[float]:
+    """Relative errors of leading oscillating eigenvalues on some valves, for a distance of one scale."""
+    beside = Beside(at, near)
+    for row in checks:
+        walk, place = at(row)
+        walk.settle(place, near.state(row))
+        if walk.refusal(place):
+            yield 0.0
+            continue
+        exact, found = walk.column([place]).leading[0], beside.column(walk, place, row)[0].leading[0]
+        exact = exact[exact.imag > 0][:WATCHED]
+        apart = np.abs(exact[:, None] - found).min(axis=1) / np.abs(exact)
+        yield float(apart.max(initial=0.0)) / near.square(row)
+
+
+class Beside:
+    """Verdicts on the neighbours of a valve.
+
+    Parameters
+    ----------
+    at : callable
+    near : Neighbours
+    """
+
+    def __init__(self, at: At, near: Neighbours):
+        self.near, self._solver = near, ColumnSolver()
+        walk, self._place = at(near.origin)
+        walk.settle(self._place, near.q)
+        self._first = FamilyReduction(walk.family(self._place))
+
+    def family(self, walk: StabilityWalk, place: Mu, row: np.ndarray) -> ValveFamily:
+        """Linearised equations of a neighbour whose state its walk has."""
+        built, modes = walk.built(place), walk.case.modes
+        linear = linearise(built.model, walk.equilibrium(place), place.pressure, added=self.near.added_mass(row))
+        return ValveFamily(linear, modes.max_frequency, modes.count)
+
+    def column(self, walk: StabilityWalk, place: Mu, row: np.ndarray) -> tuple[Column, ValveFamily]:
+        """Cell of a neighbour whose state its walk has, and its family."""
+        family, near = self.family(walk, place, row), self.near
+        reduction = self._first.beside(family, near.space, self._place)
+        return self._solver.beside(reduction, place, near.error * near.square(row), SAFETY), family
+
+    def verdict(self, walk: StabilityWalk, place: Mu, row: np.ndarray) -> Verdict | None:
+        """Verdict on a neighbour whose state its walk has; None where growth rates are not clear of errors."""
+        if refusal := walk.refusal(place):
+            return Verdict.not_valid(refusal)
+        with suppress(ArithmeticError, ValueError):
+            column, family = self.column(walk, place, row)
+            sealed = family.linear.seal is not None
+            found = Sample.of(np.nan, column, 0, family.leading(place).claimed, sealed).verdict
+            return found if found.certain else None
+        return None
