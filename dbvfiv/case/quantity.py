@@ -36,7 +36,7 @@ DIMENSION = {
     "s": "time",
     "1/s": "rate",
     "Hz": "frequency",
-    "N/m": "stiffness",
+    "N/m": "force per length",
     "Pa/m": "stiffness per area",
     "m/s": "velocity",
     "m^2": "area",

@@ -178,7 +178,8 @@ def openness(history: Columns, model: ValveModel) -> np.ndarray:
         row = max(len(model.stops.unknowns) / np.count_nonzero(model.mesh.z <= model.case.valve.duckbill_length), 1.0)
         held = (history["stops"] >= row) & (drive <= 0) & (history["smallest_area"] <= gap)
         area = np.where(held, 1.0, area)
-    leak = shut_share(model) * gap * np.sqrt(2.0 * model.case.fluid.density * np.maximum(abs(drive), model.load_unit))
+    head = abs(drive) + 2.0 * model.load_unit  # faces that close squeeze out what is between them, and speed it up
+    leak = shut_share(model) * gap * np.sqrt(2.0 * model.case.fluid.density * head)
     flow = np.maximum(abs(history["mass_flow"]), abs(history["inlet_mass_flow"]))
     return np.maximum(area, flow / leak)
 

@@ -8,17 +8,19 @@ import numpy as np
 import pytest
 
 from dbvfiv.cli import run
+from dbvfiv.errors import SolveError
 from dbvfiv.model import ValveModel
-from dbvfiv.model.equilibria import find_equilibria
+from dbvfiv.model.equilibria import LoadPath, find_equilibria
 from dbvfiv.observer import Observer
 from dbvfiv.record.header import Header
 from dbvfiv.record.record import GrowingRecord
+from dbvfiv.studies.case import thesis_case
 from dbvfiv.studies.map.figures import stability_map
 from dbvfiv.studies.map.study import MapResult, keep_column, tables_of
 from dbvfiv.studies.modes.search import run_modes
 from dbvfiv.studies.session import load_result
 from eigen import SingularShiftError, unstable_count
-from tests.small_valves import THESIS_SET
+from tests.small_valves import SMALL, THESIS_SET
 
 from .axes import AXES, run_map
 
@@ -51,6 +53,32 @@ def test_transposed_map_gives_the_same_cells(case, whole):
     other = run_map(turned)
     assert other.plan.transposed
     assert other.grid("growth_rate")[0].T == pytest.approx(whole.grid("growth_rate")[0], rel=1e-6, abs=1e-6)
+
+
+@pytest.mark.slow
+def test_columns_of_a_bill_that_is_moulded_shut_follow_the_pressure_and_name_sealed_and_lost_cells(monkeypatch):
+    """Over pressure and sealing pressure: sealed cells are stable, a cell without an equilibrium leaves a gap that is
+    told, and only that.
+    """
+    find = LoadPath.go_to
+
+    def lost(path, target):
+        if 2e3 < target < 3e3 and path.model.case.valve.sealing_pressure > 1e3:
+            raise SolveError(f"No equilibrium was found at {target:.6g} Pa.")
+        return find(path, target)
+
+    monkeypatch.setattr(LoadPath, "go_to", lost)
+    keys = SMALL | {"valve.sealing_pressure": 800.0, "map.curve": False, "map.refine": 0, "map.checks": 1}
+    axes = {"map.x": "pressure=500,2500,4000", "map.y": "sealing=800,1500", "map.continuity": "both"}
+    found = run_map(thesis_case(keys | axes))
+    assert found.plan.transposed and len(found.columns) == 2
+    sealed = np.array([[True, False, False], [True, False, False]])
+    for law in (0, 1):
+        assert np.array_equal(found.grid("sealed")[law] > 0, sealed)
+        assert np.all(found.grid("growth_rate")[law][sealed] < 0)
+        known = found.grid("certified")[law] > 0
+        assert np.array_equal(known, [[True, True, True], [True, False, True]])
+    assert any("2500 Pa" in sentence for sentence in found.warnings)
 
 
 def test_both_laws_and_pairs_without_the_load(coarse_case):

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from dbvfiv.case.axis import Level
-from dbvfiv.errors import SolveError
+from dbvfiv.errors import JumpError, SolveError
 from dbvfiv.studies.stability.scan import Scan, locate
 
 
@@ -66,6 +66,14 @@ def test_missing_states_are_kept_as_sentences():
     crossings = scan.run(np.linspace(1, 4, 7))
     assert list(scan.failures.values()) == ["No equilibrium."]
     assert locate(scan, crossings[0], 1e-12)[0] == pytest.approx(3.0)
+
+
+@pytest.mark.parametrize("rate", [lambda x: -1.0 if x < 1.3 else 2.0, lambda x: x - 9.0 if x < 1.3 else x + 9.0])
+def test_a_growth_rate_that_jumps_across_zero_is_no_onset(rate):
+    scan = Scan(modes(rate))
+    (crossing,) = scan.run(np.linspace(0, 3, 7))
+    with pytest.raises(JumpError, match="The state jumps between 1.* no mode is neutral there"):
+        locate(scan, crossing, 1e-12)
 
 
 def test_no_crossing_is_claimed_across_a_value_without_a_certificate():
