@@ -12,8 +12,9 @@ from matplotlib.figure import Figure
 from ...case.parameters import PARAMETERS, Mu
 from ...errors import CaseError, SolveError
 from ...record.mesh import MeshData
-from ...record.record import GrowingRecord
+from ...record.record import GrowingRecord, Record
 from ...record.table import Column, TableSpec
+from ..case import Case
 from ..result import StudyResult
 from ..session import Session
 from ..stability.place import check_scan, describe_fixed, fixed_conditions
@@ -50,6 +51,13 @@ _TABLES = TableSpec(CURVE, _CURVE, chunk=512), TableSpec(PEAKS, _PEAKS), TableSp
 def tables_of(_mesh: MeshData) -> tuple[TableSpec, ...]:
     """Tables of a result: curves, peaks, and one row for each value of the range."""
     return _TABLES
+
+
+def rows_to_keep(known: Record, _case: Case) -> dict[str, int]:
+    """Rows that a run goes on from: those of the values whose point vouches for them."""
+    done = known.column(POINTS, "value")
+    own = {table: int(np.isin(known.column(table, "value"), done).sum()) for table in (CURVE, PEAKS)}
+    return own | {POINTS: len(done)}
 
 
 def run(session: Session, record: GrowingRecord) -> None:
@@ -99,12 +107,10 @@ def _respond(walk: StabilityWalk, place: Mu, value: float, rows, record: Growing
     found = transfer.spread(lambda f: np.interp(f, *table.T, left=0.0, right=0.0), table[:, 0])
     modes = transfer.modes()
     peaks = np.abs(transfer.at(modes.imag / (2 * np.pi)))
-    known = record.column(CURVE, "value") == value
-    if not known.any():  # an interrupted attempt may have got so far
-        record.extend(CURVE, columns)
-        for mode, heights in zip(modes, peaks):
-            row = {"value": value, "frequency": mode.imag / (2 * np.pi), "growth_rate": mode.real}
-            record.append(PEAKS, row | dict(zip(OUTPUTS, heights)))
+    record.extend(CURVE, columns)
+    for mode, heights in zip(modes, peaks):
+        row = {"value": value, "frequency": mode.imag / (2 * np.pi), "growth_rate": mode.real}
+        record.append(PEAKS, row | dict(zip(OUTPUTS, heights)))
     point = {"value": value, "error": transfer.error, "size": transfer.size}
     # the peak of least damping, or the leading mode where there is none in the range of frequencies
     ratios = -modes.real / np.abs(modes)
@@ -209,4 +215,4 @@ class ResponseResult(StudyResult):
         return f"white pressure noise of {asked.noise:.4g} Pa up to {asked.max_frequency:.4g} Hz"
 
 
-STUDY = Study("response", tables_of, run, ResponseResult)
+STUDY = Study("response", tables_of, run, ResponseResult, rows_to_keep=rows_to_keep)
