@@ -25,6 +25,7 @@ _PUBLIC = {
     "Observer": "observer",
     "ClosureResult": "studies.closure.study",
     "CycleResult": "studies.cycle.study",
+    "IdentifyResult": "studies.identify.study",
     "LevelsResult": "studies.levels.study",
     "MapResult": "studies.map.study",
     "ModesResult": "studies.modes.study",

@@ -9,6 +9,7 @@ from .resuming import resume as resume
 from .studies.closure.study import ClosureResult as ClosureResult
 from .studies.cycle.study import CycleResult as CycleResult
 from .studies.design.study import DesignResult as DesignResult
+from .studies.identify.study import IdentifyResult as IdentifyResult
 from .studies.levels.study import LevelsResult as LevelsResult
 from .studies.map.study import MapResult as MapResult
 from .studies.modes.study import ModesResult as ModesResult

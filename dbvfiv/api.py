@@ -20,6 +20,7 @@ from .studies.case import Case, load_case
 from .studies.closure.study import ClosureResult
 from .studies.cycle.study import CycleResult
 from .studies.design.study import DesignResult
+from .studies.identify.study import IdentifyResult
 from .studies.map.study import MapResult
 from .studies.modes.study import ModesResult
 from .studies.onset.study import OnsetResult
@@ -269,6 +270,35 @@ class Valve:
         """
         asked = {"response.over": write_axis(over), "response.noise": noise}
         return self._ask(asked, changes).perform("response", output, observer or bar())
+
+    def identify(
+        self,
+        records: Sequence[Mapping[str, Any]] | None = None,
+        over: Range | None = None,
+        *,
+        workers: int | str | None = None,
+        output: Output = None,
+        observer: Observer | None = None,
+        **changes: Any,
+    ) -> IdentifyResult:
+        """What measured records say of the uncertain inputs, and where flutter begins.
+
+        Parameters
+        ----------
+        records : sequence of mapping, optional
+            Each with ``file`` or ``frequency`` and its interval, and ``at``; identify.records of the case by default.
+        over : str or mapping, optional
+            Range as for `onset`, over which the onset is sought.
+        workers : int or str, optional
+            As for `uncertainty`.
+        output, observer, changes
+            As for `modes`; also samples, rounds.
+        """
+        given = None if records is None else [dict(record) for record in records]
+        asked = {"identify.records": given, "identify.over": write_axis(over)}
+        own = {name: changes.pop(name) for name in [*changes] if name in ("samples", "round", "rounds", "seed")}
+        asked |= {f"identify.{name}": value for name, value in own.items()}
+        return self._ask(asked, changes).perform("identify", output, observer or bar(), workers=workers)
 
     def closure(
         self,

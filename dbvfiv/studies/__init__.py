@@ -18,6 +18,7 @@ KINDS = (
     "uncertainty",
     "design",
     "response",
+    "identify",
     "transient",
     "cycle",
     "closure",

@@ -188,10 +188,10 @@ class Plan:
         scores = self.scores_of(independent)
         return np.column_stack([one.distribution.at(scores[:, i]) for i, one in enumerate(self.inputs)])
 
-    def place(self, case: Case, value: float, row: np.ndarray) -> Mu:
-        """Parameter point of a sample."""
+    def point(self, case: Case, row: np.ndarray, **moved: float) -> Mu:
+        """Parameter point of a sample, with some parameters moved."""
         named = {one.name: x for one, x in zip(self.inputs, row) if one.name in PARAMETERS}
-        return Mu.of(case).at(**(named | {self.parameter: value}))
+        return Mu.of(case).at(**(named | moved))
 
     def redescribed(self, row: np.ndarray) -> Case:
         """Case of a sample, without the parameters of the table.

@@ -24,6 +24,7 @@ from .lines import (
     strongest,
     wave,
 )
+from .resonance import resonances
 from .series import Series, check_samples, harmonics, longest_part
 
 #: Share of the energy of a ring-down that may be left about its frequency, as its damping depends on the amplitude.
@@ -110,9 +111,11 @@ def judge_record(
     series = Series.of(time[part], values[part])
     found = find_motion(series, detrend, MAINS)
     if found.name not in _LINES:
-        if found.returns:
-            return replace(judged(), name="irregular", decided=True, reason=found.reason)
         level = judged()
+        peaks = () if found.returns or level.name == "decaying" else resonances(series)
+        level = replace(level, lines=tuple(map(_summary, peaks)))
+        if found.returns:
+            return replace(level, name="irregular", decided=True, reason=found.reason)
         if found.name == "steady" and level.name != "steady":
             words = "Nothing stands out of its noise."
             return replace(level, name="steady", decided=True, reason=words, noise=found.noise, cycles=0, period=np.nan)

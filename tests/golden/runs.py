@@ -76,6 +76,10 @@ def _runs() -> dict[str, list[str]]:
     runs["modes-both-laws"] = arguments("modes", FORMER, "--law=both", "--count=3")
     runs["sweep-thesis-pressure"] = arguments("sweep", FORMER, "--over=pressure=2e3:12e3:5", "--count=2")
     runs["cycle-thesis"] = arguments("cycle", FORMER, "--over=density=60:600:4")
+    modes = "[{frequency=28.3, frequency_interval=0.3, damping_ratio=0.14, damping_ratio_interval=0.01}]"
+    known = {"identify.records": modes, "identify.over": "pressure=3e3,6e3", "identify.samples": 8, "identify.round": 6}
+    learned = {"uncertainty.inputs.loss_factor": "lognormal(1.3)", "uncertainty.inputs.thickness": "normal(3 %)"}
+    runs["identify"] = arguments("identify", PRESENT | known | learned | {"identify.rounds": 1})
     runs["levels"] = arguments("levels", MESH, "-p", "6 kPa", "-p", "18 kPa")
     for name, keys in INSTALLATIONS.items():
         runs[f"steady-{name}"] = arguments("steady", PRESENT | keys, "-p", "3 kPa")

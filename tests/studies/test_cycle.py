@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from dataclasses import replace
 
 import numpy as np
@@ -83,6 +84,41 @@ def test_cycles_are_those_of_runs_in_time(found):
     coarse, fine = (lip_after(point, steps) - start for steps in (60, 120))
     assert 3.0 < coarse / fine < 5.0
     assert abs(4 * fine - coarse) / 3 < 2e-3 * point.amplitude
+
+
+def beside(command_line, folder, record, result, *options):
+    """Lines of a record as `compare` tells them."""
+    np.savetxt(folder / "record.csv", np.column_stack(record), delimiter=",", header="time [s],lip", comments="")
+    files = folder / "record.csv", result, "-o", folder / "beside.png"
+    told = command_line("compare", *files, *options, "--json")
+    assert told.status == 0, told.err
+    return json.loads(told.out)["measured"]
+
+
+def test_a_record_is_the_cycle_of_its_frequency(found, file, tmp_path, command_line):
+    point, time = found.points[-1], np.arange(0.0, 4.0, 1e-3)
+    noise = 0.05 * np.random.default_rng(3).standard_normal(len(time))
+    turn = 2 * np.pi * float(point.frequency) * time
+    (line,) = beside(command_line, tmp_path, (time, np.cos(turn) + noise), file, "--within", "0.01")
+    assert line["matches"][0]["name"] == "cycle at 230 kg/m³" and line["matches"][0]["share"] > 0.5
+    assert "cycle at 230" in line["says"]
+    (ring,) = beside(command_line, tmp_path, (time, np.exp(-2 * time) * np.cos(turn) + noise), file)
+    assert ring["says"] == "It dies out, and nothing that was computed does."
+
+
+def test_a_record_is_the_run_that_it_is(tmp_path, command_line):
+    kick = {"start": "kick", "step": 1e-3, "duration": 0.8}
+    session = session_of(damping__alpha=10.0, fluid__density=1000.0)
+    run = session.replace({f"transient.{key}": value for key, value in kick.items()}).perform(
+        "transient", tmp_path / "run.h5"
+    )
+    time, lip = run.history["time"], run.history["lip_displacement"]
+    noise = 1e-3 * np.ptp(lip) * np.random.default_rng(4).standard_normal(len(lip))
+    lines = beside(command_line, tmp_path, (time, lip + noise), tmp_path / "run.h5", "--within", "1")
+    assert lines[0]["matches"][0]["name"] == "run" and lines[0]["matches"][0]["distance"] < 1.0
+    assert lines[0]["says"].startswith("It is run")
+    faster = beside(command_line, tmp_path, (0.5 * time, lip + noise), tmp_path / "run.h5", "--within", "1")
+    assert faster[0]["says"].startswith("None of them")
 
 
 def test_values_asked_for_are_met(found):

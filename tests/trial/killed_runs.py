@@ -44,6 +44,14 @@ RUNS = {
         {"thickness": "0.7:1.4"}, aim="flow at 2 kPa up", constraints=["mass at most 8 kg"], output=path
     ),
     "response": lambda valve, path: valve.replace({"response.count": 16, "fluid.density": 1000}).response(output=path),
+    "identify": lambda valve, path: valve.replace({"uncertainty.inputs": {"thickness": "normal(4 %)"}}).identify(
+        [{"frequency": 20.0, "frequency_interval": 1.0}],
+        "pressure=1000,3000",
+        samples=8,
+        round=4,
+        rounds=1,
+        output=path,
+    ),
     "transient": lambda valve, path: valve.transient("20 ms", output=path),
     "levels": lambda valve, path: valve.levels([1e3, 2e3], output=path),
     "cycle": lambda valve, path: valve.replace(OSCILLATING).cycle("density=236:260:2", output=path),

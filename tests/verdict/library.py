@@ -220,7 +220,8 @@ def _narrow_band(rng):
     ratio = rng.uniform(8, 40) / (2 * np.pi * b.frequency * b.duration)
     pole = np.exp((-ratio + 1j) * b.w / b.rate)
     motion = lfilter([1], np.poly([pole, pole.conj()]).real, rng.standard_normal(2 * len(b.t)))[len(b.t) :]
-    return b.record("a mode driven by noise", motion / motion.std(), IRREGULAR)
+    truths = {"frequency": b.frequency, "rate": -ratio * b.w, "damping_ratio": ratio / np.hypot(1.0, ratio)}
+    return b.record("a mode driven by noise", motion / motion.std(), IRREGULAR, **truths)
 
 
 def _rossler(_, y):

@@ -45,6 +45,8 @@ _POINTS = (
     Column("error", "", "Relative, of the reduced operator against the full one at frequencies it was not made for"),
     Column("size", "", "Unknowns of the reduced operator", "i8"),
 )
+#: Frequencies below the curves at which the response is made too, over their step.
+SLOW = np.geomspace(0.01, 0.7, 8)
 _TABLES = TableSpec(CURVE, _CURVE, chunk=512), TableSpec(PEAKS, _PEAKS), TableSpec(POINTS, _POINTS)
 
 
@@ -96,11 +98,12 @@ def _respond(walk: StabilityWalk, place: Mu, value: float, rows, record: Growing
     if not verdict.stable:
         state = "is not stable" if verdict.stable is False else "is not known to be stable"
         raise SolveError(f"the state {state}, so that motions about it do not stay small. {verdict.reason}")
-    # down to a little above zero, where the flow without a line is steady
+    # down to a little above zero: a long line lets slow pulsation through that it keeps from faster one
     step = asked.max_frequency / asked.count
-    transfer = Transfer(walk.family(place).linear, place, step * np.arange(1, asked.count + 1))
-    curve = transfer.at(transfer.frequencies)
-    columns: dict[str, Any] = {"value": np.full(len(curve), value), "frequency": transfer.frequencies}
+    even = step * np.arange(1, asked.count + 1)
+    transfer = Transfer(walk.family(place).linear, place, np.append(step * SLOW, even))
+    curve = transfer.at(even)
+    columns: dict[str, Any] = {"value": np.full(len(curve), value), "frequency": even}
     for name, row in zip(OUTPUTS, curve.T):
         columns |= {f"{name}_real": row.real, f"{name}_imag": row.imag}
     table = np.array(rows)

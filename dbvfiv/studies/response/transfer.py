@@ -244,7 +244,7 @@ class Transfer:
         frequencies; between `breaks` the density is smooth.
         """
         low, high = self.frequencies[[0, -1]]
-        places = [low, high, *np.linspace(low, high, 33), *breaks]
+        places = [low, high, *np.linspace(low, high, 33), *np.geomspace(low, high, 17), *breaks]
         for value in self.modes():
             places += [(value.imag + width * value.real) / (2 * np.pi) for width in WIDTHS]
         edges = np.unique([place for place in places if low <= place <= high])

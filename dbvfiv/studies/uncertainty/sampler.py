@@ -74,7 +74,7 @@ def walks_at(plan: Plan, value: float, solver: ColumnSolver) -> At:
 
     def at(row: np.ndarray) -> tuple[StabilityWalk, Mu]:
         walk = walk_of(plan, row, solver)
-        return walk, plan.place(walk.case, value, row)
+        return walk, plan.point(walk.case, row, **{plan.parameter: value})
 
     return at
 
@@ -113,7 +113,7 @@ class Sampler:
     def _side_by_side(self, number: int, first: int, rows: np.ndarray) -> Iterator[Found]:
         """Samples that share the steady state of the case."""
         value, walk = self.plan.values[number], self._walk
-        places = [self.plan.place(self.plan.case, value, row) for row in rows]
+        places = [self.plan.point(self.plan.case, row, **{self.plan.parameter: value}) for row in rows]
         try:
             if self.states[number] is None:
                 raise SolveError("The valve of the case has no steady state there.")
@@ -132,7 +132,7 @@ class Sampler:
             apart = near is not None
             try:
                 walk = walk or walk_of(self.plan, row, self._solver)
-                place = self.plan.place(walk.case, value, row)
+                place = self.plan.point(walk.case, row, **{self.plan.parameter: value})
                 walk.settle(place, self.states[i] if near is None else near.state(row))
                 state = walk.state(place)
                 verdict = self._beside(i).verdict(walk, place, row) if near else None

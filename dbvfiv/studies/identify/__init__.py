@@ -1,0 +1,1 @@
+"""Identification of a valve from measured records."""

@@ -1,0 +1,271 @@
+"""What measured oscillations say of the inputs: likelihood on emulated modes, onset, what to measure next."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from scipy.special import logsumexp, ndtr
+
+from ...case.distribution import Distribution
+from ..inputs import Plan
+from .posterior import Emulator, expected_variance
+from .valves import MODES, Measured, Places, follow, least_damping, onsets
+
+#: Standard errors in half a 95 % interval.
+WIDE = 1.96
+#: Valves beyond the number of inputs without which nothing is emulated.
+MORE = 3
+#: Probability that a measured oscillation is none of the modes computed; it is then as likely anywhere in two decades
+#: of frequency, and in a range of damping ratios.
+NONE, DECADES, DAMPED = 0.02, np.log(100.0), 0.3
+#: Error of the emulated modes over that of the measurement up to which more valves are not needed.
+SMALL = 0.5
+
+
+def coordinates(plan: Plan, independent: np.ndarray) -> np.ndarray:
+    """Coordinates (n, d) of samples from independent scores, in which inputs act evenly: scores, and values between
+    bounds where those end a distribution.
+    """
+    scores = plan.scores_of(independent)
+    return np.column_stack([_coordinate(one.distribution, scores[:, i]) for i, one in enumerate(plan.inputs)])
+
+
+def _coordinate(distribution: Distribution, scores: np.ndarray) -> np.ndarray:
+    if distribution.form in ("normal", "lognormal"):
+        return scores
+    if distribution.form == "uniform":
+        return np.sqrt(3.0) * (2.0 * ndtr(scores) - 1.0)
+    values = np.array(distribution.numbers)
+    return (distribution.at(scores) - values.mean()) / values.std()
+
+
+@dataclass
+class Learning:
+    """Modes of sampled valves and measured oscillations.
+
+    Parameters
+    ----------
+    plan : Plan
+    places : Places
+    lines : sequence of Measured
+
+    Attributes
+    ----------
+    scores : (n, d) array
+        Independent scores of the samples.
+    rounds : (n,) array
+    modes : dict
+        From place to eigenvalues (n, MODES) and likeness (n, MODES, MODES) of all samples; NaN where not asked.
+    begins : (n, 2) array
+        Values of the range at which flutter begins below and above the last record; NaN where it does not, or nobody
+        asked.
+    """
+
+    plan: Plan
+    places: Places
+    lines: Sequence[Measured]
+    scores: np.ndarray
+    rounds: np.ndarray
+    modes: dict[int, tuple[np.ndarray, np.ndarray]]
+    begins: np.ndarray
+    _fits: dict[int, Modal] = field(default_factory=dict)
+
+    @property
+    def dimension(self) -> int:
+        """Scores of a sample: of the inputs, then of the common error of computed frequencies and damping."""
+        return len(self.plan.inputs) + 2
+
+    def modal(self, place: int) -> Modal:
+        """Emulated modes of a place."""
+        if place not in self._fits:
+            known = np.isfinite(self.modes[place][0]).any(axis=1)
+            last = self.rounds == self.rounds[known].max(initial=0)
+            self._fits[place] = Modal.of(coordinates(self.plan, self.scores), self.followed(place), last)
+        return self._fits[place]
+
+    def followed(self, place: int) -> np.ndarray:
+        """Frequency, Hz, and damping ratio (n, MODES, 2) of the samples at a place by the modes of the case."""
+        return follow(*self.modes[place])
+
+    def _errors(self, z: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Common relative errors (n,) of computed frequencies and damping: half of their variance."""
+        asked, d = self.plan.case.identify, len(self.plan.inputs)
+        return tuple(e / WIDE / np.sqrt(2) * z[:, d + k] for k, e in enumerate((asked.error, asked.damping_error)))
+
+    def fitness(self, line: Measured, z: np.ndarray) -> np.ndarray:
+        """Logarithm (n, MODES) of the likelihood of a measured oscillation, were it each of the modes."""
+        asked, d = self.plan.case.identify, len(self.plan.inputs)
+        modal = self.modal(self.places.number(self.places.of_records[line.record]))
+        frequency, damping = modal.at(coordinates(self.plan, z[:, :d]))
+        off, softer = self._errors(z)
+        own = np.hypot(line.frequency_error, asked.error / np.sqrt(2) * frequency) / WIDE
+        spread = np.hypot(own, modal.error[:, 0] * frequency)
+        found = _normal(line.frequency - frequency * (1 + off[:, None]), spread)
+        if np.isfinite(line.damping_ratio):
+            own = np.hypot(line.damping_error, asked.damping_error / np.sqrt(2) * damping) / WIDE
+            spread = np.hypot(own, modal.error[:, 1])
+            found = found + _normal(line.damping_ratio - damping * (1 + softer[:, None]), spread)
+        return np.where(np.isfinite(found), found, -np.inf)
+
+    def _shares(self, line: Measured, z: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Logarithms (n, MODES + 1) of the likelihood of a measured oscillation by what it is, none of the modes last,
+        each with its prior probability; and of their sum (n,).
+        """
+        log = self.fitness(line, z)
+        known = max(int(np.isfinite(log).any(axis=0).sum()), 1)
+        other = -np.log(line.frequency * DECADES) - (np.log(DAMPED) if np.isfinite(line.damping_ratio) else 0.0)
+        whole = np.column_stack([log + np.log((1 - NONE) / known), np.full(len(z), other + np.log(NONE))])
+        return whole, logsumexp(whole, axis=1)
+
+    def log_likelihood(self, z: np.ndarray) -> np.ndarray:
+        """Logarithm (n,) of the likelihood of all that was measured; each oscillation may be any mode, or none."""
+        return sum(self._shares(line, z)[1] for line in self.lines)
+
+    def matches(self, z: np.ndarray) -> list[np.ndarray]:
+        """Probability (MODES + 1,) of each mode for each measured oscillation, and of none."""
+        return [
+            np.exp(whole - total[:, None]).mean(axis=0) for whole, total in (self._shares(o, z) for o in self.lines)
+        ]
+
+    def emulation(self, z: np.ndarray) -> float:
+        """Largest error of the emulated modes over that of what was measured, of the likeliest modes."""
+        worst = 0.0
+        asked = self.plan.case.identify
+        for line, share in zip(self.lines, self.matches(z)):
+            modal, mode = self.modal(self.places.number(self.places.of_records[line.record])), int(np.argmax(share))
+            if mode == MODES:
+                continue
+            own = np.hypot(line.frequency_error / line.frequency, asked.error) / WIDE
+            worst = max(worst, modal.error[mode, 0] / own)
+            if np.isfinite(line.damping_ratio):
+                own = np.hypot(line.damping_error, asked.damping_error * line.damping_ratio) / WIDE
+                worst = max(worst, modal.error[mode, 1] / own)
+        return float(worst)
+
+    @cached_property
+    def _over_range(self) -> tuple[np.ndarray, np.ndarray]:
+        """Least damping ratio (n, values) of the samples over the range, and True (n,) where all of it is known."""
+        table = np.stack([least_damping(self.modes[place][0]) for place in self.places.ranged], axis=1)
+        return table, np.isfinite(table).all(axis=1)
+
+    def damping_over_range(self, z: np.ndarray, seed: int) -> np.ndarray | None:
+        """Least damping ratio (n, values) over the range, with the scatter that emulation leaves; None where too few
+        valves are known.
+        """
+        table, known = self._over_range
+        if known.sum() < len(self.plan.inputs) + MORE:
+            return None
+        emulator = Emulator(coordinates(self.plan, self.scores)[known], table[known])
+        scatter = _spread(emulator.left)
+        found = emulator(coordinates(self.plan, z[:, : len(self.plan.inputs)]))
+        found = found + scatter * np.random.default_rng([seed, 3]).standard_normal(found.shape)
+        return found * (1.0 + self._errors(z)[1][:, None])
+
+    def onsets(self, z: np.ndarray, damping: np.ndarray, seed: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Values (n,) at which flutter begins below and above the last record, NaN where it does not in the range, and
+        the damping ratio at that record.
+
+        Between the values of the range damping is interpolated; what that is off by is learned from valves whose
+        onsets were found.
+        """
+        values, now = np.array(self.places.values), self.places.now
+        table, known = self._over_range
+        found, rough = onsets(values, damping, now), onsets(values, table[known], now)
+        points, random = coordinates(self.plan, self.scores)[known], np.random.default_rng([seed, 4])
+        for side in (0, 1):
+            off = np.log(self.begins[known, side] / rough[side])
+            use = np.isfinite(off)
+            if use.sum() >= len(self.plan.inputs) + MORE:
+                emulator = Emulator(points[use], off[use, None])
+                shift = emulator(coordinates(self.plan, z[:, : len(self.plan.inputs)]))[:, 0]
+                shift = shift + _spread(emulator.left)[0] * random.standard_normal(len(z))
+                low, high = off[use].min(), off[use].max()
+                found[side][:] *= np.exp(np.clip(shift, 2 * low - high, 2 * high - low))
+            elif use.any():
+                found[side][:] *= np.exp(random.choice(off[use], len(z)))
+        return np.minimum(found[0], now), np.maximum(found[1], now), found[2]
+
+    def further(self, z: np.ndarray, targets: dict[str, np.ndarray]) -> list[dict[str, Any]]:
+        """Best further measurement for each target: the mode at a value of the range that narrows it most, measured as
+        well as those before.
+        """
+        asked, points = self.plan.case.identify, coordinates(self.plan, z[:, : len(self.plan.inputs)])
+        accuracy = np.median([line.frequency_error / line.frequency for line in self.lines])
+        known = [line.damping_error for line in self.lines if np.isfinite(line.damping_error)]
+        of_damping = float(np.median(known)) if known else 0.005
+        best = dict.fromkeys(targets, (1.0, None))
+        for value, place in zip(self.places.values, self.places.ranged):
+            modal = self.modal(place)
+            frequency, damping = modal.at(points)
+            for mode in np.flatnonzero(np.isfinite(modal.error[:, 0])):
+                f, ratio = frequency[:, mode], damping[:, mode]
+                error = [
+                    np.hypot(np.hypot(accuracy, asked.error) / WIDE, modal.error[mode, 0]),
+                    np.hypot(np.hypot(of_damping, asked.damping_error * ratio.mean()) / WIDE, modal.error[mode, 1]),
+                ]
+                predicted = np.column_stack([np.log(f), ratio])
+                for name, target in targets.items():
+                    use = np.isfinite(target)
+                    if use.sum() < 0.2 * len(target):
+                        continue
+                    left = expected_variance(target[use, None], predicted[use], np.array(error))[0]
+                    if left < best[name][0]:
+                        best[name] = (left, {"value": float(value), "frequency": float(np.median(f))})
+        return [
+            {"target": name, "remaining": float(np.sqrt(max(left, 0.0))), **measurement}
+            for name, (left, measurement) in best.items()
+            if measurement is not None
+        ]
+
+
+def _normal(apart: np.ndarray, spread: np.ndarray) -> np.ndarray:
+    return -0.5 * (apart / spread) ** 2 - np.log(np.sqrt(2 * np.pi) * spread)
+
+
+def _spread(left: np.ndarray) -> np.ndarray:
+    """Standard errors (k,) that outliers do not move."""
+    return np.quantile(np.abs(left), 0.68, axis=0)
+
+
+@dataclass(frozen=True)
+class Modal:
+    """Emulated frequency and damping of the modes of one place.
+
+    Attributes
+    ----------
+    emulators : list of Emulator or None
+        By mode of the case.
+    error : (MODES, 2) array
+        Standard errors of the logarithm of the frequency, and of the damping ratio; infinite where a mode is unknown.
+    """
+
+    emulators: list[Emulator | None]
+    error: np.ndarray
+
+    @classmethod
+    def of(cls, points: np.ndarray, followed: np.ndarray, last: np.ndarray) -> Modal:
+        """Modes from those that samples have; errors are those of the last round's samples."""
+        emulators, error = [], np.full((MODES, 2), np.inf)
+        for mode in range(MODES):
+            known = np.isfinite(followed[:, mode, 0])
+            if known.sum() < points.shape[1] + MORE or known.sum() < 0.5 * np.isfinite(followed[..., 0]).any(1).sum():
+                emulators.append(None)
+                continue
+            values = np.column_stack([np.log(followed[known, mode, 0]), followed[known, mode, 1]])
+            emulators.append(Emulator(points[known], values))
+            here = last[known]
+            error[mode] = _spread(emulators[-1].left[here] if here.sum() >= 4 else emulators[-1].left)
+        return cls(emulators, error)
+
+    def at(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Frequencies, Hz, and damping ratios (n, MODES) at points; NaN of modes that are unknown."""
+        found = np.full((2, len(points), MODES), np.nan)
+        for mode, emulator in enumerate(self.emulators):
+            if emulator is not None:
+                log, found[1, :, mode] = emulator(points).T
+                found[0, :, mode] = np.exp(log)
+        return found[0], found[1]

@@ -1,0 +1,215 @@
+"""Rounds of sampled valves about what measured records leave, and the tables that keep them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import Any
+
+import numpy as np
+
+from ...errors import SolveError
+from ...record.record import GrowingRecord, Record
+from ...record.table import Column, TableSpec
+from ..case import Case
+from ..inputs import Plan, quasi_random
+from ..workers import Lost, Work, Workers
+from .learning import MORE, SMALL, Learning, coordinates
+from .posterior import sample_posterior
+from .valves import MODES, Begins, Modes, Places, Valves
+
+VALVES, SPECTRA, BEGINS, POSTERIOR = "valves", "spectra", "onsets", "posterior"
+_VALVES = (
+    Column("sample", "", "Number of the valve", "i8"),
+    Column("round", "", "0 of valves drawn from the prior, then the round; last the likeliest valve", "i8"),
+    Column("input", "", "Number of the input", "i8"),
+    Column("score", "", "Independent standard normal score"),
+)
+_SPECTRA = (
+    Column("sample", "", "Number of the valve", "i8"),
+    Column("place", "", "Number of the place", "i8"),
+    Column("growth_rate", "1/s", "Of its leading modes, NaN where there are fewer", shape=(MODES,)),
+    Column("angular_frequency", "rad/s", "Of those modes", shape=(MODES,)),
+    Column("alike", "", "Likeness to the modes of the case, in rows", shape=(MODES, MODES)),
+)
+_BEGINS = (
+    Column("sample", "", "Number of the valve", "i8"),
+    Column("below", "SI", "Value of the range at which flutter begins below the last record; NaN where it does not"),
+    Column("above", "SI", "The same above it"),
+)
+_POSTERIOR = (
+    Column("sample", "", "Number of the sample of the posterior", "i8"),
+    Column("input", "", "Number of the input; then the common errors of frequencies and damping", "i8"),
+    Column("score", "", "Independent standard normal score"),
+)
+TABLES = (
+    TableSpec(VALVES, _VALVES, chunk=512),
+    TableSpec(SPECTRA, _SPECTRA, chunk=64),
+    TableSpec(BEGINS, _BEGINS),
+    TableSpec(POSTERIOR, _POSTERIOR, chunk=512),
+)
+_LOST = "lost valve"
+#: Samples of the posterior, and valves that a worker takes at a time.
+SAMPLES, OWN = 1000, 4
+
+
+def prepare_valves(case: dict, known: list) -> Valves:
+    """Context of a worker, from the case as plain data and what is known of it at each place."""
+    full = Case.from_dict(case)
+    return Valves(Plan(full), Places(full), known)
+
+
+def _found(valves: Valves, first: int, numbers: np.ndarray, asked: Sequence[int]) -> list[Modes | Begins]:
+    return valves.found(first, numbers, asked)
+
+
+class Search:
+    """Rounds of valves; what an earlier attempt kept is not computed again."""
+
+    def __init__(self, plan, places, lines, record: GrowingRecord, team: Workers, valves: Valves):
+        self.plan, self.places, self.lines = plan, places, lines
+        self.record, self.team, self.valves = record, team, valves
+        self.scores, self.rounds = np.zeros((0, len(plan.inputs))), np.zeros(0, int)
+        self.modes, self.begins = kept_modes(record), kept_onsets(record)
+        self.written = int(record.column(VALVES, "sample").max(initial=-1)) + 1
+
+    def learn(self) -> tuple[Learning, np.ndarray, int]:
+        """Samples of the prior, then rounds about what the records leave until measurement is the larger error, all
+        where the records were taken; and a last round over the whole range too.
+        """
+        asked, width = self.plan.case.identify, len(self.plan.inputs)
+        self._ask(quasi_random(asked.samples, width, asked.seed), 0, self.places.first)
+        z, number = self._posterior(0), 0
+        while number < asked.rounds and (number == 0 or self._learning().emulation(z) > SMALL):
+            number += 1
+            self._ask(_some(z, asked.round)[:, :width], number, self.places.first)
+            z = self._posterior(number)
+        number += 1
+        self._ask(_some(z, max(asked.round, width + 2 * MORE))[:, :width], number, range(len(self.places.moved)))
+        return self._learning(), self._posterior(number), number
+
+    def check(self, learning: Learning, z: np.ndarray, number: int) -> dict[str, Any]:
+        """The likeliest valve by the full model beside what was emulated of it."""
+        value = learning.log_likelihood(z) - 0.5 * (z**2).sum(axis=1)
+        best = z[[int(np.argmax(value))]]
+        self._ask(best[:, : len(self.plan.inputs)], number, list(range(len(self.places.moved))))
+        whole = self._learning()
+        rows = []
+        for line, share in zip(self.lines, learning.matches(z)):
+            place, mode = self.places.number(self.places.of_records[line.record]), int(np.argmax(share[:-1]))
+            points = learning.modal(place).at(coordinates(self.plan, best[:, : len(self.plan.inputs)]))
+            full = whole.followed(place)[-1, mode]
+            rows.append(
+                {
+                    "measured": [line.frequency, line.damping_ratio],
+                    "emulated": [float(part[0, mode]) for part in points],
+                    "full": full.tolist(),
+                }
+            )
+        return {"scores": best[0].tolist(), "modes": rows}
+
+    def _learning(self) -> Learning:
+        return learned_from(self.plan, self.places, self.lines, self.scores, self.rounds, self.modes, self.begins)
+
+    def _posterior(self, number: int) -> np.ndarray:
+        learning = self._learning()
+        for place in self.places.first:
+            if not np.isfinite(learning.modal(place).error).any():
+                raise SolveError(f"Too few sampled valves have modes at {self.places.words(place)} to learn from.")
+        z, evidence = sample_posterior(
+            learning.log_likelihood, learning.dimension, SAMPLES, self.plan.case.identify.seed + number
+        )
+        self.record.progress(
+            f"round {number}: logarithm of the evidence {evidence:.4g}, error of emulated modes "
+            f"{learning.emulation(z):.2g} of the measurement's"
+        )
+        return z
+
+    def _ask(self, scores: np.ndarray, number: int, places: Sequence[int]) -> None:
+        first = len(self.scores)
+        self.scores = np.vstack([self.scores, scores])
+        self.rounds = np.append(self.rounds, np.full(len(scores), number))
+        numbers = self.plan.numbers(scores)
+        for sample in range(max(self.written, first), len(self.scores)):
+            row = {"sample": sample, "round": number}
+            inputs = range(scores.shape[1])
+            columns = {name: [value] * len(inputs) for name, value in row.items()}
+            self.record.extend(VALVES, columns | {"input": list(inputs), "score": scores[sample - first].tolist()})
+        self.written = max(self.written, len(self.scores))
+        tasks = [
+            start
+            for start in range(0, len(scores), OWN)
+            if any(
+                (first + k, place) not in self.modes
+                or (len(places) > len(self.places.first) and first + k not in self.begins)
+                for k in range(start, min(start + OWN, len(scores)))
+                for place in places
+            )
+        ]
+        for _, rows in self._results(tasks, first, numbers, places):
+            for row in rows:
+                self._keep(row)
+            self.record.item(rows[-1].sample)
+
+    def _results(self, tasks, first: int, numbers: np.ndarray, places) -> Iterator[tuple[int, list[Modes | Begins]]]:
+        if self.team.is_here:
+            for start in tasks:
+                yield start, self.valves.found(first + start, numbers[start : start + OWN], places)
+            return
+
+        def ask(start: int) -> Work:
+            return Work(_found, (first + start, numbers[start : start + OWN], places))
+
+        for start, rows in self.team.share(tasks, ask):
+            if rows is Lost:
+                raise SolveError(f"Valves {first + start} and on could not be computed: {Lost.sentence}")
+            yield start, rows
+
+    def _keep(self, row: Modes | Begins) -> None:
+        if isinstance(row, Begins):
+            if row.sample not in self.begins:
+                self.begins[row.sample] = row[1:]
+                self.record.append(BEGINS, row._asdict())
+            return
+        if (row.sample, row.place) in self.modes:
+            return
+        if row.why:
+            self.record.note(_LOST, sample=row.sample, place=row.place, reason=row.why)
+        self.modes[row.sample, row.place] = row.eigenvalues, row.alike
+        self.record.append(
+            SPECTRA,
+            {
+                "sample": row.sample,
+                "place": row.place,
+                "growth_rate": row.eigenvalues.real,
+                "angular_frequency": row.eigenvalues.imag,
+                "alike": row.alike,
+            },
+        )
+
+
+def _some(z: np.ndarray, count: int) -> np.ndarray:
+    """Some of the samples of a posterior, evenly over their list."""
+    return z[np.linspace(0, len(z) - 1, count).astype(int)]
+
+
+def kept_modes(record: Record) -> dict[tuple[int, int], tuple[np.ndarray, np.ndarray]]:
+    """Eigenvalues and likeness by sample and place."""
+    sample, place, growth, turns, alike = (record.column(SPECTRA, column.name) for column in _SPECTRA)
+    return {(int(s), int(p)): (growth[i] + 1j * turns[i], alike[i]) for i, (s, p) in enumerate(zip(sample, place))}
+
+
+def kept_onsets(record: Record) -> dict[int, tuple[float, float]]:
+    """Onsets below and above by sample."""
+    sample, below, above = (record.column(BEGINS, column.name) for column in _BEGINS)
+    return {int(s): (b, a) for s, b, a in zip(sample, below, above)}
+
+
+def learned_from(plan, places, lines, scores, rounds, modes, begins) -> Learning:
+    """What valves say, from their scores, and their modes by sample and place and onsets by sample."""
+    empty = np.full(MODES, np.nan + 0j), np.zeros((MODES, MODES))
+    table = {}
+    for place in range(len(places.moved)):
+        rows = [modes.get((sample, place), empty) for sample in range(len(scores))]
+        table[place] = np.array([row[0] for row in rows]), np.array([row[1] for row in rows])
+    known = np.array([begins.get(sample, (np.nan, np.nan)) for sample in range(len(scores))])
+    return Learning(plan, places, lines, scores, rounds, table, known.reshape(-1, 2))

@@ -1,0 +1,457 @@
+"""What measured records say of a valve: run, storage, and what can be read off it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import asdict
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from matplotlib.figure import Figure
+from scipy.special import ndtri
+from scipy.stats import kstest
+
+from ...case.distribution import Distribution
+from ...case.parameters import PARAMETERS
+from ...case.quantity import head_of
+from ...case.write import case_toml
+from ...errors import CaseError, SolveError
+from ...record.mesh import MeshData
+from ...record.record import GrowingRecord, Record
+from ...record.table import TableSpec
+from ..case import Case
+from ..inputs import Plan
+from ..result import StudyResult
+from ..session import Session
+from ..stability.place import check_scan, describe_fixed
+from ..stability.walk import StabilityWalk
+from ..study import Study
+from ..workers import Workers
+from . import figures
+from .learning import Learning, coordinates
+from .posterior import Learned
+from .search import (
+    BEGINS,
+    POSTERIOR,
+    SPECTRA,
+    TABLES,
+    VALVES,
+    Search,
+    kept_modes,
+    kept_onsets,
+    learned_from,
+    prepare_valves,
+)
+from .valves import Measured, Places, Valves, own_modes, records_said
+
+_MEASURED, _FOUND = "measured", "found"
+#: Standard deviations of the prior beyond which the records are doubted.
+UNLIKELY = 3.0
+#: Quantiles of an interval, and values that stand for a distribution of no simple form.
+INTERVAL, STEPS = (0.025, 0.5, 0.975), 41
+#: Distance of the distribution function of a posterior from that of its form up to which the form stands for it, and
+#: least correlation that is kept.
+FORM, KEPT = 0.06, 0.05
+
+
+def tables_of(_mesh: MeshData) -> tuple[TableSpec, ...]:
+    """Tables of a result: valves and their modes, and samples of the posterior."""
+    return TABLES
+
+
+def rows_to_keep(known: Record, _case: Case) -> dict[str, int]:
+    """Rows that a run goes on from: those of valves; the posterior follows from them."""
+    return {name: known.rows(name) for name in (VALVES, SPECTRA, BEGINS)} | {POSTERIOR: 0}
+
+
+def run(
+    session: Session,
+    record: GrowingRecord,
+    workers: int | str | None = None,
+    posterior: Path | None = None,
+) -> None:
+    """Posterior of the inputs of `uncertainty` of the case from the records of `identify`.
+
+    Parameters
+    ----------
+    workers : int or str, optional
+        See `dbvfiv.studies.workers.Workers`; those of the case by default.
+    posterior : path, optional
+        File for the case with what was learned as its uncertainty.
+
+    Raises
+    ------
+    CaseError
+        For records or inputs that cannot be used.
+    SolveError
+        If the valve of the case has no steady state where a record was taken.
+    """
+    case, plan, places = session.case, Plan(session.case), Places(session.case)
+    asked = case.identify
+    check_scan(case, places.parameter)
+    if case.has_pump:
+        raise CaseError(
+            "Behind a pump a head is no input; give drive.pressure and no upstream.pump.", key="upstream.pump"
+        )
+    places.of_records  # places are read before anything is solved, as are correlations
+    plan.scores_of(np.zeros((1, len(plan.inputs))))
+    lines, said = records_said(case)
+    if not record.notes(_MEASURED):
+        record.note(_MEASURED, lines=[asdict(line) for line in lines], records=said)
+    walk = StabilityWalk(case, record, session.model)
+    known = _modes_of_case(plan, places, walk, record)
+    count = asked.workers if workers is None else workers
+    record.begin("identify", asked.samples + (asked.rounds + 1) * asked.round + 1)
+    with Workers(count, prepare_valves, (case.to_dict(), known), record.warn) as team:
+        search = Search(plan, places, lines, record, team, Valves(plan, places, known))
+        learning, z, rounds = search.learn()
+    table = {"sample": np.repeat(np.arange(len(z)), z.shape[1]), "input": np.tile(np.arange(z.shape[1]), len(z))}
+    record.extend(POSTERIOR, table | {"score": z.ravel()})
+    record.note(_FOUND, rounds=rounds, emulation=learning.emulation(z), check=search.check(learning, z, rounds + 1))
+    result = IdentifyResult(record, session)
+    for sentence in result.doubts:
+        record.warn(sentence)
+    if posterior is not None:
+        text = case_toml(result.posterior_case(), comments=False)
+        posterior.parent.mkdir(parents=True, exist_ok=True)
+        posterior.write_text(text + "\n")
+
+
+def _modes_of_case(plan: Plan, places: Places, walk: StabilityWalk, record: GrowingRecord):
+    """Displacements and shapes of the modes of the case at each place; None where it has none, which is said."""
+    found: list[tuple[np.ndarray, np.ndarray] | None] = []
+    for number, moved in enumerate(places.moved):
+        try:
+            found.append(own_modes(walk, plan.point(plan.case, (), **moved)))
+        except SolveError as error:
+            if number in places.first:
+                raise
+            record.fail(f"At {places.words(number)}: {error}")
+            found.append(None)
+    return found
+
+
+class IdentifyResult(StudyResult):
+    """What measured records say of the inputs of a valve, and where flutter begins.
+
+    Attributes
+    ----------
+    plan : Plan
+    scores : (n, d) array
+        Samples of the posterior: independent standard normal scores of the inputs.
+
+    Examples
+    --------
+    >>> found = dbvfiv.load("my.toml").identify([{"file": "tap.csv", "at": "pressure=1 m"}])    # doctest: +SKIP
+    >>> found.onset["above"]["interval"], found.confounded                                      # doctest: +SKIP
+    """
+
+    kind = "identify"
+
+    @cached_property
+    def plan(self) -> Plan:
+        return Plan(self.case)
+
+    @cached_property
+    def places(self) -> Places:
+        return Places(self.case)
+
+    @cached_property
+    def samples(self) -> np.ndarray:
+        """Scores (n, d + 2) of the posterior, with those of the common errors of the model."""
+        return self.record.column(POSTERIOR, "score").reshape(-1, len(self.plan.inputs) + 2)
+
+    @property
+    def scores(self) -> np.ndarray:
+        return self.samples[:, : len(self.plan.inputs)]
+
+    @cached_property
+    def learned(self) -> Learned:
+        """Covariance of the inputs' independent scores."""
+        return Learned(self.scores)
+
+    @cached_property
+    def learning(self) -> Learning:
+        """Emulated modes and measured oscillations."""
+        source, score = (self.record.column(VALVES, name) for name in ("round", "score"))
+        width = len(self.plan.inputs)
+        count = len(score) // width
+        scores, rounds = score[: count * width].reshape(count, width), source[: count * width : width]
+        use = slice(None)
+        found = self.record.notes(_FOUND)
+        if found:  # without the valve that checks what the others say
+            use = rounds <= found[-1]["rounds"]
+        own = kept_modes(self.record), kept_onsets(self.record)
+        return learned_from(self.plan, self.places, self.measured, scores[use], rounds[use], *own)
+
+    @cached_property
+    def measured(self) -> list[Measured]:
+        """Oscillations that were measured."""
+        notes = self.record.notes(_MEASURED)
+        return [Measured(**line) for line in notes[-1]["lines"]] if notes else []
+
+    @cached_property
+    def inputs(self) -> list[dict[str, Any]]:
+        """What is known of each input: median and interval before and after, share of its variance that is gone,
+        variance inflation by those it is confounded with.
+        """
+        values, turned, found = self.plan.numbers(self.scores), self.plan.scores_of(self.scores), []
+        partners = dict(self.learned.confounded())
+        for i, one in enumerate(self.plan.inputs):
+            low, middle, high = np.quantile(values[:, i], INTERVAL)
+            before = one.distribution.at(np.array([-1.959964, 0.0, 1.959964]))
+            confounded = [
+                {"parameter": self.plan.inputs[j].name, "correlation": float(self.learned.correlation[i, j])}
+                for j in partners.get(i, ())
+            ]
+            found.append(
+                {
+                    "parameter": one.name,
+                    "median": float(middle),
+                    "interval": [float(low), float(high)],
+                    "prior": {"median": float(before[1]), "interval": [float(before[0]), float(before[2])]},
+                    "learned": float(np.clip(1.0 - turned[:, i].var(), 0.0, 1.0)),
+                    "variance_inflation": float(self.learned.inflation[i]),
+                    "confounded_with": confounded,
+                }
+            )
+        return found
+
+    @cached_property
+    def confounded(self) -> list[str]:
+        """Sentences on inputs that the records do not tell apart."""
+        said, seen = [], set()
+        for row in self.inputs:
+            for partner in row["confounded_with"][:2]:
+                pair = frozenset((row["parameter"], partner["parameter"]))
+                if pair not in seen:
+                    seen.add(pair)
+                    said.append(
+                        f"{row['parameter']} and {partner['parameter']} are confounded (correlation "
+                        f"{partner['correlation']:+.2f}): the records know a combination of them better than each."
+                    )
+        return said
+
+    @property
+    def doubts(self) -> list[str]:
+        """Sentences on records that the inputs cannot explain, and on modes that are not learned well enough."""
+        said = []
+        middle = np.median(self.plan.scores_of(self.scores), axis=0)
+        for one, score in zip(self.plan.inputs, middle):
+            if abs(score) > UNLIKELY:
+                said.append(
+                    f"The records ask for {one.name} {abs(score):.1f} standard deviations off what was expected of it: "
+                    "check the records and where they were taken, or widen uncertainty.inputs."
+                )
+        if (error := self.found["emulation"]) > 2.0:
+            said.append(
+                f"Modes between the valves computed are known to {error:.2g} times the error of the measurement only, "
+                "which widens the intervals; more identify.rounds narrow them."
+            )
+        return said
+
+    @cached_property
+    def damping(self) -> np.ndarray | None:
+        """Least damping ratio (n, values) of samples over the range; None where too few valves are known."""
+        return self.learning.damping_over_range(self.samples, self.case.identify.seed)
+
+    @cached_property
+    def _onsets(self) -> tuple[np.ndarray, np.ndarray, np.ndarray] | None:
+        if self.damping is None:
+            return None
+        return self.learning.onsets(self.samples, self.damping, self.case.identify.seed)
+
+    @cached_property
+    def onset(self) -> dict[str, Any] | None:
+        """Where flutter begins below and above the last record: median, 95 % interval (None beyond the range) and the
+        probability that it does within the range; None where too few valves are known.
+        """
+        if self._onsets is None:
+            return None
+        below, above, present = self._onsets
+        found: dict[str, Any] = {"parameter": self.places.parameter, "now": self.places.now}
+        found["flutters_now"] = float(np.mean(present < 0))
+        for name, at, beyond in (("below", below, -np.inf), ("above", above, np.inf)):
+            whole = np.where(np.isfinite(at), at, beyond)
+            low, middle, high = np.quantile(whole, INTERVAL, method="nearest")
+            plain = [float(v) if np.isfinite(v) else None for v in (low, middle, high)]
+            share = float(np.isfinite(at).mean())
+            found[name] = {"median": plain[1], "interval": [plain[0], plain[2]], "probability": share}
+        return found
+
+    @cached_property
+    def further(self) -> list[dict[str, Any]]:
+        """Best further measurement for each confounded input and for the onset: where, of which mode, and the share of
+        the standard deviation expected to remain.
+        """
+        targets = {self.plan.inputs[i].name: self.scores[:, i] for i, _ in self.learned.confounded()}
+        if self._onsets is not None:
+            for name, at in zip(("onset below", "onset above"), self._onsets):
+                if np.isfinite(at).mean() > 0.5:
+                    targets[name] = at
+        return self.learning.further(self.samples, targets)
+
+    @cached_property
+    def matches(self) -> list[dict[str, Any]]:
+        """Modes that each measured oscillation may be: frequency at the posterior median, and probability."""
+        found = []
+        points = coordinates(self.plan, self.scores)
+        for line, share in zip(self.measured, self.learning.matches(self.samples)):
+            place = self.places.number(self.places.of_records[line.record])
+            frequency, damping = self.learning.modal(place).at(points)
+            likely = [
+                {
+                    "frequency": float(np.median(frequency[:, mode])),
+                    "damping_ratio": float(np.median(damping[:, mode])),
+                    "probability": float(share[mode]),
+                }
+                for mode in np.argsort(-share[:-1])
+                if share[mode] >= 0.01
+            ]
+            ratio = line.damping_ratio if np.isfinite(line.damping_ratio) else None
+            own = {"record": line.record, "frequency": line.frequency, "damping_ratio": ratio}
+            found.append(own | {"place": self.places.words(place), "modes": likely, "none": float(share[-1])})
+        return found
+
+    def uncertainty(self) -> tuple[dict[str, str], list[tuple[str, str, float]]]:
+        """Distributions of the inputs and correlations of their normal scores, as `uncertainty` takes them."""
+        turned, texts = self.plan.scores_of(self.scores), {}
+        ranks = np.argsort(np.argsort(turned, axis=0), axis=0)
+        normal = ndtri((ranks + 0.5) / len(turned))
+        for i, one in enumerate(self.plan.inputs):
+            texts[one.name] = distribution_text(one.distribution, turned[:, i])
+        matrix, names = np.corrcoef(normal.T).reshape(len(texts), -1), list(texts)
+        matrix[np.abs(matrix) < KEPT] = 0.0
+        np.fill_diagonal(matrix, 1.0)
+        others = ~np.eye(len(matrix), dtype=bool)
+        while np.linalg.eigvalsh(np.round(matrix, 4))[0] < 1e-4:  # left-out ones may make it impossible
+            matrix[others] *= 0.99
+        pairs = [(names[i], names[j], round(float(matrix[i, j]), 4)) for i in range(len(names)) for j in range(i)]
+        return texts, [pair for pair in pairs if pair[2]]
+
+    def posterior_case(self) -> Case:
+        """The case with what was learned as its uncertainty."""
+        texts, pairs = self.uncertainty()
+        return self.case.replace({"uncertainty.inputs": texts, "uncertainty.correlation": pairs})
+
+    @property
+    def found(self) -> dict[str, Any]:
+        """Rounds, error of the emulated modes over the measurement's, and the likeliest valve by the full model."""
+        notes = self.record.notes(_FOUND)
+        return {k: v for k, v in notes[-1].items() if k != "what"} if notes else {}
+
+    def summary(self) -> dict[str, Any]:
+        if not self.found:
+            return {"inputs": [], "matches": [], "onset": None, "further": []} | self.ending()
+        texts, pairs = self.uncertainty()
+        return {
+            "records": self.record.notes(_MEASURED)[-1]["records"],
+            "matches": self.matches,
+            "inputs": self.inputs,
+            "confounded": self.confounded,
+            "directions": [
+                {"remaining": size, "of": {o.name: float(c) for o, c in zip(self.plan.inputs, vector)}}
+                for size, vector in self.learned.directions()
+            ],
+            "onset": self.onset,
+            "further": self.further,
+            "check": self.found,
+            "uncertainty": {"inputs": texts, "correlation": pairs},
+            "valves": int(self.record.column(VALVES, "sample").max(initial=-1)) + 1,
+        } | self.ending()
+
+    def drawers(self) -> Iterator[tuple[str, Callable[[], Figure]]]:
+        if self.found:
+            yield from figures.draw(self)
+
+    def lines(self) -> list[str]:
+        if not self.found:
+            return ["Too few valves were computed to learn from."]
+        said = [f"At {describe_fixed(self.case, *(one.name for one in self.plan.inputs))}:"]
+        for row in self.record.notes(_MEASURED)[-1]["records"]:
+            said.append(f"  record {row['record'] + 1} {row['file']}: {row['says']}, modes measured: {row['modes']}")
+        for match in self.matches:
+            said.append(f"  {_oscillation(match)} at {match['place']} is {_modes_said(match)}")
+        said += ["", f"{'input':<34}{'before (95 %)':>26}{'after (95 %)':>26}{'learned':>9}"]
+        for row, one in zip(self.inputs, self.plan.inputs):
+            before, after = (
+                f"{d['median']:.4g} ({d['interval'][0]:.4g} to {d['interval'][1]:.4g})" for d in (row["prior"], row)
+            )
+            unit = f", {one.quantity.si}" if one.quantity.si else ""
+            said.append(f"{row['parameter'] + unit:<34}{before:>26}{after:>26}{100 * row['learned']:>8.0f}%")
+        said += ["", *self.confounded, *map(self._further_said, self.further)]
+        check = [
+            f"{mode['full'][0]:.5g} Hz, {100 * mode['full'][1]:.3g} % ({mode['emulated'][0]:.5g} Hz, "
+            f"{100 * mode['emulated'][1]:.3g} %)"
+            for mode in self.found["check"]["modes"]
+        ]
+        said.append(f"The likeliest valve by the full model, and as learned from: {'; '.join(check)}.")
+        return [*said, "", *self._onset_said()]
+
+    def _value(self, value: float) -> str:
+        row = PARAMETERS[self.places.parameter]
+        head = f" ({head_of(value, self.case.fluid.density):.3g} m)" if row.name == "pressure" else ""
+        return f"{row.amount(float(f'{value:.4g}'))}{head}"
+
+    def _further_said(self, row: dict[str, Any]) -> str:
+        where = f"the mode near {row['frequency']:.3g} Hz at {self._value(row['value'])}"
+        if row["remaining"] > 0.9:
+            return f"No further record over the range would tell much of {row['target']}; measure it by itself."
+        return f"A record of {where} would leave {100 * row['remaining']:.0f} % of what is open of {row['target']}."
+
+    def _onset_said(self) -> list[str]:
+        if self.onset is None:
+            return ["Where flutter begins is not known: too few valves have modes over the range."]
+        said, found = [], self.onset
+        if found["flutters_now"] > 0.025:
+            said.append(f"It flutters at the last record with a probability of {100 * found['flutters_now']:.0f} %.")
+        ends = {"below": self.places.values[0], "above": self.places.values[-1]}
+        for name in ("above", "below"):
+            part = found[name]
+            if part["probability"] < 0.025:
+                said.append(f"No flutter {name} {self._value(found['now'])} up to {self._value(ends[name])}.")
+                continue
+            edge = f"beyond {self._value(ends[name])}"
+            low, middle, high = (
+                edge if v is None else self._value(v)
+                for v in (part["interval"][0], part["median"], part["interval"][1])
+            )
+            said.append(f"{name.capitalize()} the last record flutter begins at {middle} (95 %: {low} to {high}).")
+        return said
+
+    def shortfall(self) -> str | None:
+        lost = len(self.failures)
+        return f"{lost} places have no steady state" if lost else None
+
+
+def _oscillation(match: dict[str, Any]) -> str:
+    ratio = match["damping_ratio"]
+    return f"{match['frequency']:.5g} Hz" + ("" if ratio is None else f" with {100 * ratio:.3g} % damping")
+
+
+def _modes_said(match: dict[str, Any]) -> str:
+    if match["none"] > 0.5:
+        return "none of the modes computed, and left out"
+    said = [f"the mode at {m['frequency']:.4g} Hz, {100 * m['damping_ratio']:.3g} %" for m in match["modes"][:4]]
+    if len(said) == 1:
+        return said[0]
+    shares = [f"{said} ({100 * mode['probability']:.0f} %)" for said, mode in zip(said, match["modes"])]
+    return f"a mixture: {' or '.join(shares)}"
+
+
+def distribution_text(prior: Distribution, scores: np.ndarray) -> str:
+    """Text of the distribution whose scores under the prior are samples (n,)."""
+    mean, spread = float(scores.mean()), float(scores.std())
+    a, b = prior.numbers[0], prior.numbers[-1]
+    if prior.form in ("normal", "lognormal") and kstest((scores - mean) / spread, "norm").statistic < FORM:
+        if prior.form == "normal":
+            return f"normal({a + b * mean:.8g}, {b * spread:.6g})"
+        if b**spread > 1.0 + 1e-6:
+            return f"lognormal({a * b**mean:.8g}, {b**spread:.8g})"
+    steps = prior.at(np.quantile(scores, (np.arange(STEPS) + 0.5) / STEPS))
+    return f"samples({', '.join(f'{value:.8g}' for value in steps)})"
+
+
+STUDY = Study("identify", tables_of, run, IdentifyResult, rows_to_keep=rows_to_keep)

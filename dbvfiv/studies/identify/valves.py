@@ -1,0 +1,433 @@
+"""Measured oscillations of a valve, and the modes that sampled valves have where those were measured."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from functools import cached_property, partial
+from typing import Any, NamedTuple
+
+import numpy as np
+from scipy.interpolate import PchipInterpolator
+from scipy.optimize import brentq, linear_sum_assignment
+
+from eigen import ColumnSolver
+
+from ...case.parameters import DESIGN, PARAMETERS, Mu
+from ...case.quantity import head_of
+from ...errors import CaseError, SolveError
+from ...observer import Observer
+from ...verdict import JudgeOptions
+from ..case import Case
+from ..inputs import Plan
+from ..recognition import Reading, judge_file
+from ..stability.walk import StabilityWalk
+
+#: Leading modes taken of a valve at a place.
+MODES = 12
+#: Least likeness of shapes, the modal assurance criterion, of a mode and that of the case itself.
+ALIKE = 0.2
+#: Values of the range at which its damping is looked at, between those computed.
+FINE = 400
+#: Error of an onset over the distance of the values that enclose it.
+ACCURATE = 0.005
+#: Values of the range without one, and how far it reaches beyond the records.
+VALUES, BEYOND = 8, 2.5
+
+
+@dataclass(frozen=True)
+class Measured:
+    """An oscillation that was measured.
+
+    Attributes
+    ----------
+    record : int
+        Number of its record.
+    frequency, frequency_error : float, Hz
+        With half its 95 % interval, as all errors.
+    damping_ratio, damping_error : float
+        NaN where only the frequency is known.
+    """
+
+    record: int
+    frequency: float
+    frequency_error: float
+    damping_ratio: float = np.nan
+    damping_error: float = np.nan
+
+
+def measured_of(case: Case, record: int) -> tuple[list[Measured], str]:
+    """Oscillations of a record that are modes, and a sentence on it.
+
+    Raises
+    ------
+    CaseError
+        For a record that cannot be read, or says neither file nor mode.
+    """
+    given, name = case.identify.records[record], f"identify.records.{record}"
+    if given.file is None:
+        if given.frequency is None or given.frequency_interval is None:
+            raise CaseError(
+                f"{name} names no file, and a mode needs frequency and frequency_interval; give them, or file.",
+                key=name,
+            )
+        if (given.damping_ratio is None) != (given.damping_ratio_interval is None):
+            raise CaseError(f"{name} has one of damping_ratio and damping_ratio_interval; give both.", key=name)
+        numbers = given.frequency, given.frequency_interval, given.damping_ratio, given.damping_ratio_interval
+        one = Measured(record, *(np.nan if number is None else number for number in numbers))
+        return [one], f"a mode of {one.frequency:.5g} Hz"
+    found, said = [], []
+    columns = [given.column] if given.column else []
+    for judged in judge_file(given.file, Reading(columns, rate=given.rate), JudgeOptions()):
+        for line in judged.verdict.lines:
+            if line.get("rate") and line["called"] in ("", "resonance") and line["damping_ratio_interval"]:
+                numbers = (line[key] for key in ("frequency", "frequency_interval", "damping_ratio"))
+                found.append(Measured(record, *numbers, line["damping_ratio_interval"]))
+        said.append(f"{judged.signal.name}: {judged.verdict.name}")
+    return found, "; ".join(said)
+
+
+@dataclass(frozen=True)
+class Places:
+    """Parameter points at which valves are asked: those of the records, then values of a range.
+
+    Attributes
+    ----------
+    case : Case
+    """
+
+    case: Case
+
+    @cached_property
+    def of_records(self) -> list[dict[str, float]]:
+        """Parameters of each record by name, SI.
+
+        Raises
+        ------
+        CaseError
+        """
+        return [self._read(f"identify.records.{i}.at", one.at) for i, one in enumerate(self.case.identify.records)]
+
+    def _read(self, key: str, text: str) -> dict[str, float]:
+        found = {}
+        for part in filter(None, (part.strip() for part in text.split(","))):
+            name, equals, given = (piece.strip() for piece in part.partition("="))
+            if name not in PARAMETERS or name in DESIGN or not equals:
+                known = ", ".join(name for name in PARAMETERS if name not in DESIGN)
+                raise CaseError(f"{key} is given as {text!r}; it must be such as 'pressure=1 m', of {known}.", key=key)
+            row = PARAMETERS[name]
+            try:
+                value = row.quantity.parse(given, found.get("density", self.case.fluid.density))
+            except ValueError as error:
+                raise CaseError(f"{key} is given as {text!r}, {error}.", key=key) from None
+            if not row.low <= value <= row.high:
+                raise CaseError(
+                    f"{key} is given as {text!r}; {name} must be within {row.low:g} to {row.high:g} {row.quantity.si}.",
+                    key=key,
+                )
+            found[name] = value
+        return found
+
+    @cached_property
+    def parameter(self) -> str:
+        """Parameter of the range."""
+        axis = self.case.identify.axis
+        return "pressure" if axis is None else axis.parameter
+
+    @cached_property
+    def now(self) -> float:
+        """Value of that parameter at the last record."""
+        return self.value_at(-1)
+
+    def value_at(self, record: int) -> float:
+        """Value of that parameter at a record."""
+        return self._point(self.of_records[record])[self.parameter]
+
+    @cached_property
+    def values(self) -> tuple[float, ...]:
+        """Values of the range, SI."""
+        axis = self.case.identify.axis
+        if axis is not None:
+            return axis.values
+        known = [self._point(one)["pressure"] for one in self.of_records]
+        ends = max(min(known) / BEYOND, 1.01 * self.case.downstream.pressure), max(known) * BEYOND
+        return tuple(np.geomspace(*ends, VALUES).tolist())
+
+    def _point(self, moved: dict[str, float]) -> Mu:
+        return Mu.of(self.case).at(**moved)
+
+    @cached_property
+    def moved(self) -> list[dict[str, float]]:
+        """Parameters of all places, each once: those of the records first."""
+        last = self.of_records[-1]
+        wanted = [*self.of_records, *(last | {self.parameter: value} for value in self.values)]
+        found: list[dict[str, float]] = []
+        for one in wanted:
+            if all(self._point(one) != self._point(other) for other in found):
+                found.append(one)
+        return found
+
+    def number(self, moved: dict[str, float]) -> int:
+        """Number of a place."""
+        return next(i for i, one in enumerate(self.moved) if self._point(one) == self._point(moved))
+
+    @cached_property
+    def first(self) -> list[int]:
+        """Places of the records, each once."""
+        return sorted({self.number(one) for one in self.of_records})
+
+    @cached_property
+    def ranged(self) -> list[int]:
+        """Places of the values of the range."""
+        last = self.of_records[-1]
+        return [self.number(last | {self.parameter: value}) for value in self.values]
+
+    def words(self, place: int) -> str:
+        """A place for people."""
+        said = []
+        for name, value in self.moved[place].items():
+            head = f" ({head_of(value, self.case.fluid.density):.3g} m)" if name == "pressure" else ""
+            said.append(f"{PARAMETERS[name].text(value)}{head}")
+        return ", ".join(said) or "the state of the case"
+
+
+class Modes(NamedTuple):
+    """Leading modes of a sampled valve at one place.
+
+    Attributes
+    ----------
+    sample, place : int
+    eigenvalues : (MODES,) complex array, 1/s
+        NaN where there are fewer.
+    alike : (MODES, MODES) array
+        Modal assurance criterion of the modes of the case itself, in rows, and of these.
+    why : str
+        Why there are none.
+    """
+
+    sample: int
+    place: int
+    eigenvalues: np.ndarray
+    alike: np.ndarray
+    why: str = ""
+
+    @classmethod
+    def none(cls, sample: int, place: int, why: str) -> Modes:
+        return cls(sample, place, np.full(MODES, np.nan + 0j), np.zeros((MODES, MODES)), why)
+
+
+class Begins(NamedTuple):
+    """Values of the range at which flutter of a sampled valve begins below and above the last record; NaN where it does
+    not.
+    """
+
+    sample: int
+    below: float
+    above: float
+
+
+class Valves:
+    """Modes of sampled valves at places.
+
+    Parameters
+    ----------
+    plan : Plan
+    places : Places
+    known : sequence of (q, shapes) or None
+        Displacements and shapes of the modes of the case itself at each place.
+    """
+
+    def __init__(self, plan: Plan, places: Places, known: Sequence[tuple[np.ndarray, np.ndarray] | None]):
+        self.plan, self.places, self.known = plan, places, known
+        self._solver, self._own = ColumnSolver(), None
+
+    def found(self, first: int, numbers: np.ndarray, asked: Sequence[int]) -> list[Modes | Begins]:
+        """Modes of samples, whose values (m, d) are given, at places, and where their flutter begins if all of the
+        range is asked; the first sample has the number `first`.
+        """
+        if self.plan.is_surrounding and all(PARAMETERS[n].surrounding for m in self.places.moved for n in m):
+            self._own = self._own or StabilityWalk(self.plan.case)
+        return [one for k, row in enumerate(numbers) for one in self._one(first + k, row, asked)]
+
+    def _one(self, sample: int, row: np.ndarray, asked: Sequence[int]):
+        walk = self._own
+        try:
+            case = self.plan.redescribed(row)
+            walk = walk or StabilityWalk(case, Observer(), solver=self._solver)
+        except (SolveError, CaseError) as error:
+            yield from (Modes.none(sample, place, str(error)) for place in asked)
+            return
+        rows = {place: self._modes(sample, row, walk, case, place) for place in asked}
+        yield from rows.values()
+        if set(self.places.ranged) <= set(asked):
+            damping = least_damping(np.array([rows[place].eigenvalues for place in self.places.ranged]))
+            known = np.isfinite(damping).all()
+            least = partial(self._least, row, walk, case)
+            yield Begins(sample, *(self._begins(damping, least) if known else (np.nan, np.nan)))
+
+    def _modes(self, sample: int, row: np.ndarray, walk: StabilityWalk, case: Case, place: int) -> Modes:
+        if self.known[place] is None:
+            return Modes.none(sample, place, "The valve of the case has no state there.")
+        q, shapes = self.known[place]
+        try:
+            point = self.plan.point(case, row, **self.places.moved[place])
+            walk.settle(point, q)
+            found = walk.spectrum(point, MODES)
+            return Modes(sample, place, *_kept(found.eigenvalues, found.q, shapes))
+        except (SolveError, CaseError, ValueError) as error:
+            return Modes.none(sample, place, str(error))
+
+    def _least(self, row: np.ndarray, walk: StabilityWalk, case: Case, value: float) -> float:
+        """Least damping ratio of a valve at a value of the range; NaN where it is not known."""
+        moved = self.places.of_records[-1] | {self.places.parameter: value}
+        try:
+            point = self.plan.point(case, row, **moved)
+            return float(least_damping(walk.spectrum(point, MODES).eigenvalues[None])[0])
+        except (SolveError, CaseError, ValueError):
+            return np.nan
+
+    def _begins(self, damping: np.ndarray, least: Callable[[float], float]) -> Iterator[float]:
+        """Onsets below and above, each between the two values of the range that enclose it (Brent's method)."""
+        values, now = np.array(self.places.values), self.places.now
+        axis, back = (np.log(values), np.exp) if values[0] > 0 else (values, float)
+        for guess in (side[0] for side in onsets(values, damping[None], now)[:2]):
+            if not np.isfinite(guess):
+                yield np.nan
+                continue
+            k = int(np.clip(np.searchsorted(values, guess), 1, len(values) - 1))
+            known = {axis[k - 1]: damping[k - 1], axis[k]: damping[k]}
+            try:
+                found = brentq(
+                    lambda x, known=known: known[x] if x in known else least(back(x)),
+                    axis[k - 1],
+                    axis[k],
+                    xtol=ACCURATE * (axis[k] - axis[k - 1]),
+                )
+                yield float(back(found))
+            except ValueError:  # a valve that was lost on the way
+                yield np.nan
+
+
+def _kept(eigenvalues: np.ndarray, q: np.ndarray, shapes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    count = min(MODES, len(eigenvalues))
+    kept, alike = np.full(MODES, np.nan + 0j), np.zeros((MODES, MODES))
+    kept[:count] = eigenvalues[:count]
+    size = (np.abs(shapes) ** 2).sum(axis=0)[:, None] * (np.abs(q[:, :count]) ** 2).sum(axis=0)
+    alike[: shapes.shape[1], :count] = np.abs(shapes.conj().T @ q[:, :count]) ** 2 / np.maximum(size, 1e-300)
+    return kept, alike
+
+
+def own_modes(walk: StabilityWalk, point: Mu) -> tuple[np.ndarray, np.ndarray]:
+    """Displacements of a state, and shapes (n, MODES at most) of its leading modes.
+
+    Raises
+    ------
+    SolveError
+    """
+    q = walk.equilibrium(point)
+    return q, walk.spectrum(point, MODES).q[:, :MODES]
+
+
+def follow(eigenvalues: np.ndarray, alike: np.ndarray) -> np.ndarray:
+    """Frequency, Hz, and damping ratio (n, MODES, 2) of the modes of samples by those of the case that they are like.
+
+    Parameters
+    ----------
+    eigenvalues : (n, MODES) complex array
+    alike : (n, MODES, MODES) array
+        See `Modes`.
+
+    Returns
+    -------
+    array
+        NaN where a sample has no mode of that shape that oscillates.
+    """
+    found = np.full((*eigenvalues.shape, 2), np.nan)
+    for i, (values, likeness) in enumerate(zip(eigenvalues, alike)):
+        known = np.flatnonzero(np.isfinite(values) & (np.abs(values.imag) > 1e-6 * np.abs(values.real)))
+        rows, columns = linear_sum_assignment(-likeness[:, known])
+        for row, column in zip(rows, columns):
+            if likeness[row, known[column]] >= ALIKE:
+                value = values[known[column]]
+                found[i, row] = abs(value.imag) / (2 * np.pi), -value.real / abs(value)
+    return found
+
+
+def least_damping(eigenvalues: np.ndarray) -> np.ndarray:
+    """Least damping ratio (n,) of oscillating modes; NaN where none is known."""
+    ratio = np.where(np.abs(eigenvalues.imag) > 1e-6 * np.abs(eigenvalues.real), -eigenvalues.real, np.nan)
+    ratio = ratio / np.abs(eigenvalues)
+    known = np.isfinite(ratio).any(axis=1)
+    out = np.full(len(ratio), np.nan)
+    out[known] = np.nanmin(ratio[known], axis=1)
+    return out
+
+
+def records_said(case: Case) -> tuple[list[Measured], list[dict[str, Any]]]:
+    """Oscillations of all records, and what each record is.
+
+    Raises
+    ------
+    CaseError
+        Without records, or where none holds a mode.
+    """
+    if not case.identify.records:
+        raise CaseError(
+            "There is no record to identify the valve from; give RECORD.csv and --at, or identify.records.",
+            key="identify.records",
+        )
+    found, said = [], []
+    for number, record in enumerate(case.identify.records):
+        lines, words = measured_of(case, number)
+        found += lines
+        name = "" if record.file is None else record.file.name
+        said.append({"record": number, "file": name, "says": words, "modes": len(lines)})
+    if not found:
+        told = "; ".join(f"{one['file']} ({one['says']})" for one in said)
+        raise CaseError(
+            f"No record holds a mode, a ring-down, growth or a peak of motion under noise: {told}.",
+            key="identify.records",
+        )
+    return found, said
+
+
+def _interpolated(values: np.ndarray, damping: np.ndarray, now: float) -> tuple[PchipInterpolator, float]:
+    """Damping over the values, or their logarithms, and the present one among them."""
+    axis, place = (np.log(values), np.log(now)) if values[0] > 0 else (values, now)
+    return PchipInterpolator(axis, damping, axis=1), float(np.clip(place, axis[0], axis[-1]))
+
+
+def onsets(values: np.ndarray, damping: np.ndarray, now: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Values at which flutter begins below and above the present one, and the damping there.
+
+    Parameters
+    ----------
+    values : (k,) array
+        Rising.
+    damping : (n, k) array
+        Least damping ratio of samples.
+    now : float
+
+    Returns
+    -------
+    below, above, present : (n,) arrays
+        NaN where flutter does not begin within the values. Of a sample that flutters now, where it ends.
+    """
+    smooth, place = _interpolated(values, damping, now)
+    axis = smooth.x
+    fine = np.unique(np.append(np.linspace(axis[0], axis[-1], FINE), place))
+    table, at = smooth(fine), int(np.searchsorted(fine, place))
+    below, above = np.full(len(damping), np.nan), np.full(len(damping), np.nan)
+    for out, part, order in ((above, slice(at, None), 1), (below, slice(0, at + 1), -1)):
+        x, y = fine[part][::order], table[:, part][:, ::order]
+        if len(x) < 2:
+            continue
+        changed = (y[:, 1:] < 0) != (y[:, :1] < 0)
+        first = np.argmax(changed, axis=1)
+        rows = np.flatnonzero(changed.any(axis=1))
+        k = first[rows]
+        a, b = y[rows, k], y[rows, k + 1]
+        out[rows] = x[k] + (x[k + 1] - x[k]) * a / (a - b)
+    if values[0] > 0:
+        below, above = np.exp(below), np.exp(above)
+    return below, above, smooth(place)

@@ -1,0 +1,110 @@
+"""Samples of a posterior, emulators, what is confounded and what a further measurement leaves, against closed forms."""
+
+import numpy as np
+import pytest
+from scipy.stats import norm
+
+from dbvfiv.case.distribution import Distribution
+from dbvfiv.case.quantity import Quantity
+from dbvfiv.studies.identify.posterior import Emulator, Learned, expected_variance, sample_posterior
+from dbvfiv.studies.identify.study import distribution_text
+from dbvfiv.studies.identify.valves import follow, least_damping, onsets
+
+SLOPES = np.array([[1.0, 0.8, 0.0, 0.0], [0.0, 0.3, 1.0, 0.0]])
+DATA = np.array([1.2, -0.4])
+
+
+@pytest.mark.parametrize("error", [0.3, 0.02, 2e-4])
+def test_posterior_and_evidence_of_a_linear_model(error):
+    error = np.array([error, 0.3])
+
+    def linear(z):
+        return norm.logpdf((DATA - z @ SLOPES.T) / error).sum(axis=1) - np.log(error).sum()
+
+    z, evidence = sample_posterior(linear, 4, 2000, 1)
+    precision = np.eye(4) + SLOPES.T @ np.diag(error**-2.0) @ SLOPES
+    covariance = np.linalg.inv(precision)
+    mean = covariance @ SLOPES.T @ (DATA / error**2)
+    spread = np.sqrt(np.diag(covariance))
+    assert np.abs((z.mean(axis=0) - mean) / spread).max() < 0.12
+    np.testing.assert_allclose(z.std(axis=0) / spread, 1.0, atol=0.08)
+    own = SLOPES @ SLOPES.T + np.diag(error**2)
+    expected = -0.5 * DATA @ np.linalg.solve(own, DATA) - 0.5 * np.linalg.slogdet(2 * np.pi * own)[1]
+    assert evidence == pytest.approx(expected, abs=0.25)
+
+
+def test_both_regions_of_a_posterior_have_their_weights():
+    """The same measurement of |z|, with a prior slope from a second one: weights by the densities of both."""
+
+    def two(z):
+        return norm.logpdf(np.abs(z[:, 0]), 1.5, 0.03) + norm.logpdf(z[:, 0], 2.0, 3.0)
+
+    z, _ = sample_posterior(two, 2, 2000, 3)
+    ratio = norm.pdf(1.5, 2.0, 3.0) / (norm.pdf(1.5, 2.0, 3.0) + norm.pdf(-1.5, 2.0, 3.0))
+    assert np.mean(z[:, 0] > 0) == pytest.approx(ratio, abs=0.05)
+
+
+def test_an_emulator_is_exact_of_trends_and_knows_its_error():
+    random = np.random.default_rng(2)
+    points, other = random.standard_normal((60, 5)), random.standard_normal((400, 5))
+    values = lambda x: np.column_stack([1 + x @ np.arange(5.0), np.exp(0.2 * x[:, 0] * x[:, 1])])  # noqa: E731
+    emulator = Emulator(points, values(points))
+    off = emulator(other) - values(other)
+    assert np.abs(off[:, 0]).max() < 1e-6
+    known, true = np.quantile(np.abs(emulator.left[:, 1]), 0.68), np.quantile(np.abs(off[:, 1]), 0.68)
+    assert 0.5 < known / true < 2.0 and true < 0.5 * values(other)[:, 1].std()
+
+
+def test_inputs_that_only_a_sum_is_known_of_are_confounded():
+    random = np.random.default_rng(4)
+    size = 0.05
+    along, across = size * random.standard_normal(4000), random.standard_normal(4000)
+    z = np.column_stack([along + across, along - across, random.standard_normal(4000) * np.sqrt(2)]) / np.sqrt(2)
+    learned = Learned(z)
+    assert learned.confounded() == [(0, [1]), (1, [0])]
+    variance = 0.5 * (1 + size**2)
+    assert learned.inflation[0] == pytest.approx(variance * 0.5 * (1 + size**-2), rel=0.05)
+    assert learned.directions()[0][0] == pytest.approx(size, rel=0.05)
+    assert np.abs(learned.directions()[0][1]) == pytest.approx([np.sqrt(0.5), np.sqrt(0.5), 0.0], abs=0.02)
+
+
+def test_the_variance_left_by_a_further_measurement():
+    """Of z1 from a measurement of z1 + z2 with a standard error s: 1 - 1 / (2 + s^2)."""
+    z = np.random.default_rng(5).standard_normal((20000, 2))
+    left = expected_variance(z[:, :1], z.sum(axis=1)[:, None], np.array([0.5]))
+    assert left[0] == pytest.approx(1 - 1 / 2.25, abs=0.01)
+
+
+def test_onsets_next_to_the_present_value():
+    values = np.geomspace(1.0, 16.0, 5)
+    damping = np.array([[-1.0, -1.0, 1.0, 2.0, -1.0], [1.0, 1.0, 1.0, 1.0, 1.0], [1.0, -1.0, -1.0, -1.0, 1.0]])
+    below, above, present = onsets(values, damping, 4.0)
+    assert 2.0 < below[0] < 4.0 and 8.0 < above[0] < 16.0 and present[0] == pytest.approx(1.0)
+    assert np.isnan([below[1], above[1]]).all()
+    assert 1.0 < below[2] < 2.0 and 8.0 < above[2] < 16.0 and present[2] < 0
+    assert np.isnan(onsets(values, damping, 16.0)[1]).all()
+
+
+def test_modes_are_followed_by_their_shapes():
+    eigenvalues = np.array([[-1 + 20j, -2 + 30j, -5.0], [-3 + 28j, -1 + 22j, np.nan]])
+    alike = np.zeros((2, 3, 3))
+    alike[0, 0, 0] = alike[0, 1, 1] = alike[1, 0, 1] = 0.9
+    alike[1, 1, 0] = 0.1
+    found = follow(eigenvalues, alike)
+    assert found[:, 0, 0] * 2 * np.pi == pytest.approx([20, 22])
+    assert np.isnan(found[1, 1]).all() and found[0, 1, 1] == pytest.approx(2 / abs(-2 + 30j))
+    assert least_damping(eigenvalues) == pytest.approx([1 / abs(-1 + 20j), 1 / abs(-1 + 22j)])
+
+
+@pytest.mark.parametrize("text", ["normal(2, 0.1)", "lognormal(2, 1.3)", "uniform(1, 3)", "samples(1, 2, 4, 8)"])
+def test_a_posterior_is_written_as_a_distribution(text):
+    prior = Distribution.parse(text, Quantity(""))
+    random = np.random.default_rng(6)
+    for scores in (0.4 + 0.3 * random.standard_normal(4000), np.abs(random.standard_normal(4000))):
+        found = Distribution.parse(distribution_text(prior, scores), Quantity(""))
+        ask = np.linspace(-1.5, 1.5, 7)
+        expected = prior.at(np.quantile(scores, norm.cdf(ask)))
+        if prior.form != "samples":
+            np.testing.assert_allclose(found.at(ask), expected, rtol=0.02)
+        else:
+            assert set(found.numbers) <= set(prior.numbers)
