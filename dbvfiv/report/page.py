@@ -132,8 +132,11 @@ def setting(found: Gathered) -> str:
     case, mesh = found.case, found.case.mesh
     given = fixed_conditions(case, "pressure")
     flow, outside = (given.pop(name, "") for name in ("storage", OUTSIDE))
+    own = given.get("loss_factor") == 1.0 and given.pop("loss_factor")
     rows = [(PARAMETERS[name], value) for name, value in given.items() if value]
-    words = [f"{row.title.lower()} {row.amount(value)}" for row, value in rows] + [
+    words = [f"{row.title.lower()} {row.amount(value)}" for row, value in rows]
+    words += [
+        *(["loss factors of its materials"] if own else []),
         f"flow model {flow}",
         *([outside] if outside else []),
     ]
