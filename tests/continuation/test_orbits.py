@@ -155,6 +155,7 @@ def test_steps_of_any_unit_pass_a_fold_of_cycles_once(scale):
     assert np.allclose(branch.values(), radius**4 - radius**2, rtol=0, atol=1e-8)
 
 
+@pytest.mark.slow
 def test_orbits_towards_a_homoclinic_one_have_no_false_bifurcations():
     """The branch of Lorenz ends on the homoclinic orbit at r = 13.926 (Sparrow 1982)."""
     system, mu = lorenz(), {"sigma": 10.0, "b": 8 / 3, "r": 10.0}

@@ -54,14 +54,9 @@ def _branch_is_right(seed):
     assert np.allclose([D for _, D in found], [D for _, D in expected], rtol=0, atol=1e-7), (seed, found, expected)
 
 
-def test_a_hundred_branches_meet_their_folds_hopf_points_and_limits():
-    for seed in range(100):
-        _branch_is_right(seed)
-
-
-@pytest.mark.slow
-def test_two_hundred_more_branches_do_too():
-    for seed in range(100, 300):
+@pytest.mark.parametrize("seeds", [range(30), pytest.param(range(30, 300), marks=pytest.mark.slow)], ids=str)
+def test_branches_meet_their_folds_hopf_points_and_limits(seeds):
+    for seed in seeds:
         _branch_is_right(seed)
 
 

@@ -76,6 +76,7 @@ def test_a_stiff_gas_is_the_incompressible_law():
     assert gaps[0] / gaps[1] == pytest.approx(100.0, rel=0.1) and gaps[1] < 1e-5
 
 
+@pytest.mark.slow
 def test_steady_flow():
     """It meets the equations; behind a line that loses nothing it is that behind its rigid column."""
     z, area = passage()

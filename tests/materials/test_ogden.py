@@ -122,6 +122,7 @@ def test_a_valve_of_one_term_stands_as_the_neo_hookean_one(pair):
     assert found.lip_displacement == pytest.approx(known.lip_displacement, rel=1e-11)
 
 
+@pytest.mark.slow
 def test_its_modes_and_its_motion_are_the_same(pair):
     known, found = (valve.modes("6 kPa", count=2) for valve in pair)
     assert [m.growth_rate for m in found.modes] == pytest.approx([m.growth_rate for m in known.modes], rel=1e-7)

@@ -163,6 +163,7 @@ def test_limit_points_bound_the_pressures_with_several_equilibria(model, path):
     assert len(path.curve.passages(0.5 * PRESSURE)) == 1
 
 
+@pytest.mark.slow
 def test_cracking_head_that_is_asked_for_is_found(model):
     """Of the coarse bill a small head; rows of such a mesh part one by one, so that larger heads have gaps."""
     head = 0.09

@@ -92,6 +92,7 @@ def test_a_resumed_run_gives_the_same_numbers(tmp_path, adaptive, monkeypatch):
         np.testing.assert_allclose(resumed.history[name], whole.history[name], atol=1e-9 * size, rtol=0)
 
 
+@pytest.mark.slow
 def test_three_routes_give_one_number_with_water_outside():
     for law, pressure, further in (
         ("quasi-steady", 10e3, {"outside.fluid": "same"}),

@@ -9,6 +9,8 @@ import os
 import subprocess
 import sys
 
+import pytest
+
 from dbvfiv.shell.kernel_memory import advance_branches, hold_resultants
 
 PROGRAM = f"""
@@ -34,6 +36,7 @@ print(np.count_nonzero(ahead), np.count_nonzero(ahead != held))
 """
 
 
+@pytest.mark.slow
 def test_what_branches_hold_has_the_same_digits_in_either_order(tmp_path):
     def counts(cache: str, *order: str) -> list[int]:
         environment = os.environ | {"DBVFIV_CACHE": str(tmp_path / cache), "NUMBA_CACHE_DIR": str(tmp_path / cache)}

@@ -142,6 +142,7 @@ def test_second_derivative(saddle_shell):
     assert np.linalg.norm(second - shell.second(q, b, a)) < 1e-12 * np.linalg.norm(second)
 
 
+@pytest.mark.slow
 def test_third_derivative(saddle_shell):
     shell = saddle_shell
     q = shell.dofs.restrict(random_state(shell.mesh, 19, 0.08, 0.3, rigid=0.0))

@@ -28,7 +28,19 @@ def ask():
 
 
 #: Kinds that are killed only with the slow tests; each kind's file is written by the same code.
-DEAR = ("steady", "sweep", "sensitivity", "levels", "closure", "modes", "cycle", "onset", "uncertainty", "design")
+DEAR = (
+    "steady",
+    "sweep",
+    "sensitivity",
+    "levels",
+    "closure",
+    "modes",
+    "cycle",
+    "onset",
+    "map",
+    "uncertainty",
+    "design",
+)
 
 
 @pytest.mark.parametrize("kind", [pytest.param(k, marks=pytest.mark.slow) if k in DEAR else k for k in KINDS])

@@ -46,7 +46,9 @@ KINDS = {
 PUSH = 1e-8
 
 
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize(
+    "kind", [pytest.param(kind, marks=pytest.mark.slow) if kind.startswith("pump") else kind for kind in KINDS]
+)
 def test_a_kick_grows_as_the_eigenvalue_and_energies_close(kind):
     kick = {"transient.start": "kick", "transient.kick_opening": PUSH}
     valve = dbvfiv.load(thesis_case(), COARSE | KINDS[kind] | kick)

@@ -109,6 +109,7 @@ def look_at(number: int, seed: int, conditions_each: int = 3) -> tuple[list[str]
     return left_open, refused, unstable
 
 
+@pytest.mark.slow
 def test_waves_resolved_far_above_the_modes():
     """The band ends where the waves are resolved, at thirty times the highest unstable mode of a lightly damped wall:
     shifts of the band's size converge to nothing, and closer ones are taken.

@@ -58,6 +58,7 @@ def fitted(values) -> tuple[float, float]:
     return best[1], best[2]
 
 
+@pytest.mark.slow
 def test_default_mesh():
     """28 x 48 lies within 0.1 % in onset, 0.02 1/s in growth and 0.16 % in flow of the limits."""
     onset, growth, flow = measured(28, 48)

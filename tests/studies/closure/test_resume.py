@@ -91,6 +91,7 @@ def test_a_run_goes_on_wherever_it_was_interrupted(whole, tmp_path):
         resume(path)
 
 
+@pytest.mark.slow
 def test_supports_to_compare_with_and_the_turn_in_time_are_taken_up_too(tmp_path):
     path = tmp_path / "run.h5"
     changes = COARSE | {

@@ -70,6 +70,7 @@ def test_columns_of_the_contact_are_there_where_it_is(tmp_path, shutting, valve,
         assert np.array_equal(resumed.history[name], whole.history[name]), name
 
 
+@pytest.mark.slow
 def test_a_small_motion_of_pressed_lips_follows_its_mode(valve):
     """Growth rate and frequency in time are those of the pencil, stiffness damping acting on the wall alone."""
     changes = {"drive.kind": "uniform", "drive.side": "outside", "drive.pressure": 500.0, "damping.alpha": 0.0}

@@ -16,7 +16,8 @@ WAVES = {
 }
 
 
-@pytest.mark.parametrize("law", [pytest.param("quasi-steady", marks=pytest.mark.slow), "storage"])
+@pytest.mark.slow
+@pytest.mark.parametrize("law", ["quasi-steady", "storage"])
 def test_from_rest_a_wave_has_to_arrive_first(valve, law):
     """Nothing moves for L/c; then the wave is thrown back by a valve that is all but shut: twice the pressure."""
     step = 5e-5

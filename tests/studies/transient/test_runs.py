@@ -224,6 +224,7 @@ def test_the_verdict_ends_the_run(valve):
     assert run.stopped and run.verdict.name == "steady" and run.progress.state.time < 4.0
 
 
+@pytest.mark.slow
 def test_staggered_coupling_reaches_the_same_state(valve):
     changes = {
         "transient.start": "kick",
