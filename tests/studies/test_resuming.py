@@ -97,7 +97,7 @@ def slow(*where):
         slow("onset", 0.4),
         slow("onset", 0.7),
         slow("onset", 0.99),
-        ("onset-classes", 0.6),
+        pytest.param("onset-classes", 0.6, marks=pytest.mark.slow),
         ("map", 0.4),
         slow("map-curves", 0.67),
     ],

@@ -194,7 +194,8 @@ FULL = {
 }
 
 
-@pytest.mark.parametrize("kind", [k if k == "map" else pytest.param(k, marks=pytest.mark.slow) for k in FULL])
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", FULL)
 def test_no_room_for_what_was_found(small_disk, one_sentence, kind):
     (further, taken), path = FULL[kind], small_disk / "r.h5"
     with open(small_disk / "other", "wb") as other:
