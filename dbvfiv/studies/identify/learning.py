@@ -22,6 +22,9 @@ MORE = 3
 #: Probability that a measured oscillation is none of the modes computed; it is then as likely anywhere in two decades
 #: of frequency, and in a range of damping ratios.
 NONE, DECADES, DAMPED = 0.02, np.log(100.0), 0.3
+#: Square of the distance from a mode, in standard errors, from which it is asked whether it is one.
+DOUBTFUL = 9.0
+ROOT = np.sqrt(2.0 * np.pi)
 #: Error of the emulated modes over that of the measurement up to which more valves are not needed.
 SMALL = 0.5
 
@@ -63,6 +66,8 @@ class Learning:
     begins : (n, 2) array
         Values of the range at which flutter begins below and above the last record; NaN where it does not, or nobody
         asked.
+    left_out : tuple of int
+        Numbers of measured oscillations that are none of the modes.
     """
 
     plan: Plan
@@ -72,6 +77,7 @@ class Learning:
     rounds: np.ndarray
     modes: dict[int, tuple[np.ndarray, np.ndarray]]
     begins: np.ndarray
+    left_out: tuple[int, ...] = ()
     _fits: dict[int, Modal] = field(default_factory=dict)
 
     @property
@@ -96,40 +102,65 @@ class Learning:
         asked, d = self.plan.case.identify, len(self.plan.inputs)
         return tuple(e / WIDE / np.sqrt(2) * z[:, d + k] for k, e in enumerate((asked.error, asked.damping_error)))
 
-    def fitness(self, line: Measured, z: np.ndarray) -> np.ndarray:
-        """Logarithm (n, MODES) of the likelihood of a measured oscillation, were it each of the modes."""
+    def _apart(self, line: Measured, z: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Squares (n, MODES) of the distance of a measured oscillation from each of the modes in standard errors, and
+        logarithms of what makes its normal distribution one.
+        """
         asked, d = self.plan.case.identify, len(self.plan.inputs)
         modal = self.modal(self.places.number(self.places.of_records[line.record]))
         frequency, damping = modal.at(coordinates(self.plan, z[:, :d]))
         off, softer = self._errors(z)
         own = np.hypot(line.frequency_error, asked.error / np.sqrt(2) * frequency) / WIDE
         spread = np.hypot(own, modal.error[:, 0] * frequency)
-        found = _normal(line.frequency - frequency * (1 + off[:, None]), spread)
+        square, size = ((line.frequency - frequency * (1 + off[:, None])) / spread) ** 2, np.log(ROOT * spread)
         if np.isfinite(line.damping_ratio):
             own = np.hypot(line.damping_error, asked.damping_error / np.sqrt(2) * damping) / WIDE
             spread = np.hypot(own, modal.error[:, 1])
-            found = found + _normal(line.damping_ratio - damping * (1 + softer[:, None]), spread)
-        return np.where(np.isfinite(found), found, -np.inf)
+            square = square + ((line.damping_ratio - damping * (1 + softer[:, None])) / spread) ** 2
+            size = size + np.log(ROOT * spread)
+        known = np.isfinite(square) & np.isfinite(size)
+        return np.where(known, square, np.inf), np.where(known, size, 0.0)
 
     def _shares(self, line: Measured, z: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Logarithms (n, MODES + 1) of the likelihood of a measured oscillation by what it is, none of the modes last,
-        each with its prior probability; and of their sum (n,).
+        """Logarithms (n, MODES) of the likelihood of a measured oscillation as each of the modes, which are equally
+        probable before, and of their sum (n,).
         """
-        log = self.fitness(line, z)
-        known = max(int(np.isfinite(log).any(axis=0).sum()), 1)
-        other = -np.log(line.frequency * DECADES) - (np.log(DAMPED) if np.isfinite(line.damping_ratio) else 0.0)
-        whole = np.column_stack([log + np.log((1 - NONE) / known), np.full(len(z), other + np.log(NONE))])
-        return whole, logsumexp(whole, axis=1)
+        square, size = self._apart(line, z)
+        known = max(int(np.isfinite(square).any(axis=0).sum()), 1)
+        log = -0.5 * square - size - np.log(known)
+        return log, np.maximum(logsumexp(log, axis=1), -1e12)
+
+    @property
+    def used(self) -> list[int]:
+        """Numbers of the measured oscillations that are modes."""
+        return [number for number in range(len(self.lines)) if number not in self.left_out]
 
     def log_likelihood(self, z: np.ndarray) -> np.ndarray:
-        """Logarithm (n,) of the likelihood of all that was measured; each oscillation may be any mode, or none."""
-        return sum(self._shares(line, z)[1] for line in self.lines)
+        """Logarithm (n,) of the likelihood of all that was measured and is a mode; which mode it is, is open."""
+        return sum((self._shares(self.lines[number], z)[1] for number in self.used), np.zeros(len(z)))
+
+    def doubtful(self, z: np.ndarray) -> list[int]:
+        """Oscillations that are far from every mode of the samples of a posterior."""
+        return [n for n in self.used if np.median(self._apart(self.lines[n], z)[0].min(axis=1)) > DOUBTFUL]
+
+    def evidence_of_none(self, number: int) -> float:
+        """Logarithm of the evidence of an oscillation that is none of the modes, over the odds that it is one."""
+        line = self.lines[number]
+        density = -np.log(line.frequency * DECADES) - (np.log(DAMPED) if np.isfinite(line.damping_ratio) else 0.0)
+        return density + np.log(NONE / (1.0 - NONE))
 
     def matches(self, z: np.ndarray) -> list[np.ndarray]:
         """Probability (MODES + 1,) of each mode for each measured oscillation, and of none."""
-        return [
-            np.exp(whole - total[:, None]).mean(axis=0) for whole, total in (self._shares(o, z) for o in self.lines)
-        ]
+        found = []
+        for number, line in enumerate(self.lines):
+            shares = np.zeros(MODES + 1)
+            if number in self.left_out:
+                shares[-1] = 1.0
+            else:
+                log, total = self._shares(line, z)
+                shares[:-1] = np.exp(log - total[:, None]).mean(axis=0)
+            found.append(shares)
+        return found
 
     def emulation(self, z: np.ndarray) -> float:
         """Largest error of the emulated modes over that of what was measured, of the likeliest modes."""
@@ -220,10 +251,6 @@ class Learning:
             for name, (left, measurement) in best.items()
             if measurement is not None
         ]
-
-
-def _normal(apart: np.ndarray, spread: np.ndarray) -> np.ndarray:
-    return -0.5 * (apart / spread) ** 2 - np.log(np.sqrt(2 * np.pi) * spread)
 
 
 def _spread(left: np.ndarray) -> np.ndarray:

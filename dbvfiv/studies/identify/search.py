@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -70,6 +71,7 @@ class Search:
         self.record, self.team, self.valves = record, team, valves
         self.scores, self.rounds = np.zeros((0, len(plan.inputs))), np.zeros(0, int)
         self.modes, self.begins = kept_modes(record), kept_onsets(record)
+        self.left_out: tuple[int, ...] = ()
         self.written = int(record.column(VALVES, "sample").max(initial=-1)) + 1
 
     def learn(self) -> tuple[Learning, np.ndarray, int]:
@@ -85,7 +87,8 @@ class Search:
             z = self._posterior(number)
         number += 1
         self._ask(_some(z, max(asked.round, width + 2 * MORE))[:, :width], number, range(len(self.places.moved)))
-        return self._learning(), self._posterior(number), number
+        z = self._posterior(number)
+        return self._learning(), z, number
 
     def check(self, learning: Learning, z: np.ndarray, number: int) -> dict[str, Any]:
         """The likeliest valve by the full model beside what was emulated of it."""
@@ -108,21 +111,36 @@ class Search:
         return {"scores": best[0].tolist(), "modes": rows}
 
     def _learning(self) -> Learning:
-        return learned_from(self.plan, self.places, self.lines, self.scores, self.rounds, self.modes, self.begins)
+        known = self.scores, self.rounds, self.modes, self.begins
+        return replace(learned_from(self.plan, self.places, self.lines, *known), left_out=self.left_out)
 
     def _posterior(self, number: int) -> np.ndarray:
+        self.left_out = ()
         learning = self._learning()
         for place in self.places.first:
             if not np.isfinite(learning.modal(place).error).any():
                 raise SolveError(f"Too few sampled valves have modes at {self.places.words(place)} to learn from.")
-        z, evidence = sample_posterior(
-            learning.log_likelihood, learning.dimension, SAMPLES, self.plan.case.identify.seed + number
-        )
+        z, evidence = self._sampled(learning, number)
+        while doubtful := learning.doubtful(z):
+            others = []
+            for line in doubtful:
+                other = replace(learning, left_out=(*learning.left_out, line))
+                samples, less = self._sampled(other, number)
+                others.append((less + learning.evidence_of_none(line), less, other, samples))
+            best = max(others, key=lambda one: one[0])
+            if best[0] <= evidence:
+                break
+            _, evidence, learning, z = best
+        self.left_out = learning.left_out
         self.record.progress(
             f"round {number}: logarithm of the evidence {evidence:.4g}, error of emulated modes "
             f"{learning.emulation(z):.2g} of the measurement's"
         )
         return z
+
+    def _sampled(self, learning: Learning, number: int) -> tuple[np.ndarray, float]:
+        seed = self.plan.case.identify.seed + number
+        return sample_posterior(learning.log_likelihood, learning.dimension, SAMPLES, seed)
 
     def _ask(self, scores: np.ndarray, number: int, places: Sequence[int]) -> None:
         first = len(self.scores)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -109,7 +109,13 @@ def run(
         learning, z, rounds = search.learn()
     table = {"sample": np.repeat(np.arange(len(z)), z.shape[1]), "input": np.tile(np.arange(z.shape[1]), len(z))}
     record.extend(POSTERIOR, table | {"score": z.ravel()})
-    record.note(_FOUND, rounds=rounds, emulation=learning.emulation(z), check=search.check(learning, z, rounds + 1))
+    record.note(
+        _FOUND,
+        rounds=rounds,
+        left_out=[*learning.left_out],
+        emulation=learning.emulation(z),
+        check=search.check(learning, z, rounds + 1),
+    )
     result = IdentifyResult(record, session)
     for sentence in result.doubts:
         record.warn(sentence)
@@ -184,7 +190,8 @@ class IdentifyResult(StudyResult):
         if found:  # without the valve that checks what the others say
             use = rounds <= found[-1]["rounds"]
         own = kept_modes(self.record), kept_onsets(self.record)
-        return learned_from(self.plan, self.places, self.measured, scores[use], rounds[use], *own)
+        learned = learned_from(self.plan, self.places, self.measured, scores[use], rounds[use], *own)
+        return replace(learned, left_out=tuple(found[-1]["left_out"])) if found else learned
 
     @cached_property
     def measured(self) -> list[Measured]:

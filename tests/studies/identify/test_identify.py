@@ -87,7 +87,7 @@ class Hidden:
         count, place = int(rate * duration), self.point(pressure)
         transfer = Transfer(self.walk.family(place).linear, place, np.linspace(0.5, 120, 160))
         grid, frequency = np.linspace(0.5, 120, 4000), np.fft.rfftfreq(2 * count, 1 / rate)
-        lip = np.interp(frequency, grid, transfer.at(grid)[:, 0], left=0.0, right=0.0)
+        lip = np.interp(frequency, grid, transfer.at(grid)[:, 0], right=0.0)
         motion = np.fft.irfft(np.fft.rfft(self.random.standard_normal(2 * count)) * lip)[count:]
         return self._write(path, np.arange(count) / rate, motion / motion.std(), 0.05)
 
