@@ -180,7 +180,23 @@ def _sure(found: Gathered, verdicts: dict) -> tuple[str, ...]:
         said.append("range of the damping: not examined (none is known of given constants)")
     for level in _by_level(found, "modes"):
         said.append(f"strain level {float(level):.0%}: {_verdict(found.get(f'levels-modes-{level}').verdict)}")
+    if (chance := _chance(found)) is not None:
+        said.append(chance)
     return tuple(said)
+
+
+def _chance(found: Gathered) -> str | None:
+    """Probability of chatter where it is largest, with its interval; None where the case has no uncertainty."""
+    result = found.get("chance")
+    if result is None:
+        return _not_there(found, "chance", "uncertainty") if "chance" in found.missing else None
+    known = [point for point in result.points if point["probability"] is not None]
+    if not known:
+        return "probability of chatter: no sample was decided"
+    most = max(known, key=lambda point: point["probability"])
+    low, high = (100 * end for end in most["interval"])
+    at = found.case.units.parameter(result.parameter).text(most["value"])
+    return f"probability of chatter at {at}: {100 * most['probability']:.2g} % ({low:.2g} to {high:.2g} %)"
 
 
 def loss_range(case) -> tuple[float, float] | None:

@@ -28,7 +28,7 @@ from ..studies.stability.place import why_it_moves
 from ..studies.workers import Lost, Work, Workers
 
 #: What a report can leave out.
-PARTS = ("steady", "heads", "pipe", "onset", "law", "mesh", "levels", "closure", "cycle")
+PARTS = ("steady", "heads", "pipe", "onset", "law", "mesh", "levels", "closure", "chance", "cycle")
 #: Heads examined where none are asked for, over the largest pressure of the case: closer where the lips just open.
 _HEADS = (0.02, 0.05, 0.1, 0.2, 0.4, 0.7, 1.0)
 #: Back pressures examined, over the rated one.
@@ -227,6 +227,9 @@ def following(found: Gathered) -> Iterator[Run]:
         for i, pressure in enumerate(heads, 1):
             keys = quick | {"drive.pressure": pressure, "sweep.over": span}
             yield Run(f"pipe-{i}", "sweep", f"length of the pipe at {case.units.pressure(pressure)}", keys, 5)
+    if case.uncertainty.model_fields_set:
+        over = {} if case.uncertainty.over else {"drive.pressure": worst}
+        yield Run("chance", "uncertainty", "probability of chatter", over, 1.0 * case.uncertainty.samples)
     changed = [
         pair
         for pair in zip(found.modes.items(), list(found.modes.items())[1:])

@@ -195,6 +195,40 @@ def pipe_part(found: Gathered) -> Part | None:
     )
 
 
+def chance_part(found: Gathered) -> Part | None:
+    """Probability of chatter and what decides it, where the case says how uncertain its numbers are."""
+    result, title = found.get("chance"), "How likely chatter is, and what decides it"
+    if result is None:
+        asked = "chance" in found.missing and "chance" not in found.not_asked
+        return not_there(found, "chance", title) if asked else None
+    row = found.case.units.parameter(result.parameter)
+    head = (
+        f"{row.title}, {row.shown_unit}".rstrip(", "),
+        "chatters, %",
+        "95 % interval, %",
+        "not valid, %",
+        "undecided",
+    )
+    percent = lambda value: "-" if value is None else f"{100 * value:.2g}"  # noqa: E731
+    rows = tuple(
+        (
+            f"{p['value'] / row.scale:.4g}",
+            percent(p["probability"]),
+            " to ".join(map(percent, p["interval"])),
+            percent(p["outcomes"]["not valid"]["probability"]),
+            f"{p['undecided']} of {p['samples']}",
+        )
+        for p in result.points
+    )
+    captions = {
+        "probability": "Probability of chatter with its 95 % interval.",
+        "margin": "Least damping ratio of the samples.",
+        "tornado": "Least damping ratio with each input low and high.",
+    }
+    said = (*result.deciding_lines(), *(f"Input: {one.words()}." for one in result.plan.inputs))
+    return Part("chance", title, said, (Table(head, rows),), pictures_of(result, captions), result.failures)
+
+
 _CYCLES = "What it grows into"
 
 
@@ -411,6 +445,7 @@ MAKERS = (
     heads_part,
     onset_part,
     pipe_part,
+    chance_part,
     cycle_part,
     closure_part,
     strains_part,

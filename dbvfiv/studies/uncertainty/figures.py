@@ -13,6 +13,8 @@ from ..result import StudyResult
 from ..stability.place import describe_fixed
 from ..stability.verdict import FLUTTERS, NOT_VALID, OUTCOMES, STABLE
 
+#: Samples from which a fifth of them has a median, three each.
+LEAST = 15
 _LOOKS = {STABLE: COMPUTED, FLUTTERS: ACCENT}
 
 
@@ -25,6 +27,9 @@ def draw(result: StudyResult) -> Iterator[tuple[str, Callable[[], Figure]]]:
     yield "margin", lambda: margin(result)
     if (result.deciding or {}).get("decides") and result.deciding["decides"][0]["share"] is not None:
         yield "what-decides", lambda: what_decides(result)
+
+    if result.deciding and result.deciding["samples"] >= LEAST:
+        yield "tornado", lambda: tornado(result)
 
 
 def _axis(axes, result: StudyResult) -> np.ndarray:
@@ -117,5 +122,32 @@ def what_decides(result: StudyResult) -> Figure:
     right.legend()
     shown = PARAMETERS[result.parameter]
     headline(figure, f"What decides at {point['value'] / shown.scale:.4g} {shown.shown_unit}".rstrip())
+    _under(figure, result)
+    return figure
+
+
+def tornado(result: StudyResult) -> Figure:
+    """Median of the least damping ratio over the samples in the lowest and in the highest fifth of each input, the
+    input that moves it most on top.
+    """
+    point = result.deciding
+    found = result.at(point["value"])
+    plain = (found["stage"] == 0) & np.isfinite(found["damping_ratio"])
+    ratio, values = 100 * found["damping_ratio"][plain], found["inputs"][plain]
+    ends = np.quantile(values, [0.2, 0.8], axis=0)
+    low, high = (
+        np.array([np.median(ratio[mask]) for mask in masks.T]) for masks in (values <= ends[0], values >= ends[1])
+    )
+    order, middle = np.argsort(np.abs(high - low)), np.median(ratio)
+    figure = new_figure()
+    axes = figure.add_subplot()
+    titles = [result.plan.inputs[i].title for i in order]
+    for side, name, colour in ((low, "input in its lowest fifth", REST), (high, "in its highest fifth", COMPUTED)):
+        axes.barh(titles, side[order] - middle, left=middle, color=colour, label=name)
+    axes.axvline(middle, color="black", lw=0.8)
+    axes.set_xlabel("Median of the least damping ratio, %")
+    axes.legend()
+    shown = PARAMETERS[result.parameter]
+    headline(figure, f"Each input low and high at {point['value'] / shown.scale:.4g} {shown.shown_unit}".rstrip())
     _under(figure, result)
     return figure

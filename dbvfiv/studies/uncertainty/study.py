@@ -410,7 +410,7 @@ class UncertaintyResult(StudyResult):
         place = f"{self.parameter}, {row.shown_unit}".rstrip(", ")
         head = f"{place:>16}{'flutters':>10}  {'95 % interval':<17}{'not valid':>10}{'undecided':>10}{'samples':>9}"
         lines = [f"At {fixed}:", *(f"  {one.words()}" for one in self.plan.inputs), f"{head}  least damping ratio, %"]
-        return [*lines, *map(self._line, self.points), *self._shared_lines(), *self._deciding_lines()]
+        return [*lines, *map(self._line, self.points), *self._shared_lines(), *self.deciding_lines()]
 
     def _shared_lines(self) -> list[str]:
         shared, count = (sum(point[name] for point in self.points) for name in ("shared", "samples"))
@@ -428,7 +428,8 @@ class UncertaintyResult(StudyResult):
         counts = f"{never:>10}{point['undecided']:10d}{point['samples']:9d}"
         return f"{value:16.6g}{said:>10}  {interval:<17}{counts}  {spread}"
 
-    def _deciding_lines(self) -> list[str]:
+    def deciding_lines(self) -> list[str]:
+        """Sentences on the inputs that decide, and on what measuring the first of them would tell."""
         point = self.deciding
         if point is None or not point["decides"] or point["decides"][0]["share"] is None:
             return []

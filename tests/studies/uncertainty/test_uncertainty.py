@@ -10,9 +10,12 @@ import pytest
 import dbvfiv
 from dbvfiv.errors import CaseError
 from dbvfiv.observer import Observer
+from dbvfiv.report.gather import Gathered
+from dbvfiv.report.parts import chance_part
 from dbvfiv.studies.inputs import inputs_of
 from dbvfiv.studies.session import load_result
 from dbvfiv.studies.stability.verdict import OUTCOMES
+from dbvfiv.studies.uncertainty.figures import tornado
 from tests.small_valves import SMALL, load_small
 
 LINE = "cases/dbv12-in-line.toml"
@@ -143,3 +146,22 @@ def test_a_sealing_pressure_may_be_uncertain():
 def test_what_cannot_be_used_is_answered_by_a_sentence(changes, clause):
     with pytest.raises(CaseError, match=clause):
         load(**changes).uncertainty()
+
+
+def test_a_report_and_a_tornado_say_what_the_samples_say(found):
+    part = chance_part(Gathered(found.case, "valve", (4e3,), None, results={"chance": found}))
+    (point,) = found.points
+    ((_, chatters, interval, invalid, undecided),) = part.tables[0].rows
+    assert float(chatters) == pytest.approx(100 * point["probability"], rel=0.01)
+    assert [float(end) for end in interval.split(" to ")] == pytest.approx(
+        [100 * p for p in point["interval"]], rel=0.01
+    )
+    assert (float(invalid), undecided) == (0.0, "0 of 16")
+    assert {"margin", "tornado"} <= {one.name for one in part.pictures}
+    samples, names = found.at(point["value"]), [one.name for one in found.plan.inputs]
+    values, ratio = samples["inputs"][:, names.index("beta")], 100 * samples["damping_ratio"]
+    low = np.median(ratio[values <= np.quantile(values, 0.2)])
+    figure = tornado(found)
+    bars = figure.axes[0].containers[0]
+    row = [label.get_text() for label in figure.axes[0].get_yticklabels()].index("Stiffness damping")
+    assert bars[row].get_x() + bars[row].get_width() == pytest.approx(low)
