@@ -271,7 +271,7 @@ def test_cases_of_the_trade_seal_at_rest_and_crack_in_its_range(size):
 
 @pytest.mark.slow
 @pytest.mark.random
-@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("seed", range(50))
 def test_random_presets_open_without_a_jump_in_flow_that_no_limit_point_explains(seed):
     """Random bills and heads: states that are found are sealed or open, the flow rises with the head, and a sealed
     bill is stable; what is not found is said in a sentence.
@@ -283,7 +283,11 @@ def test_random_presets_open_without_a_jump_in_flow_that_no_limit_point_explains
         "valve.thickness_factor": float(random.uniform(0.8, 1.3)),
         "fluid.continuity": str(random.choice(["storage", "quasi-steady"])),
     }
-    model = ValveModel(thesis_case(COARSE | keys))
+    try:
+        model = ValveModel(thesis_case(COARSE | keys))
+    except SolveError as error:  # too soft for such a preset
+        assert str(error).endswith(".")
+        return
     path = LoadPath(model, SteadyOptions.of(model.case))
     flows = []
     for pressure in np.sort(10 ** random.uniform(2.0, 4.3, 6)):

@@ -103,6 +103,15 @@ def test_back_pressure(capsys):
     assert 0.1 < turned.closing.closing_time < 0.2
 
 
+def test_moulded_shut(capsys):
+    follow("moulded-shut", folder="tutorials")
+    told = capsys.readouterr().out
+    assert [state.is_sealed for state in dbvfiv.load_result("shut.h5").states] == [True, False, False]
+    assert "Flutters under quasi-steady continuity" in told and "Stable under storage continuity" in told
+    run = dbvfiv.load_result("run.h5").verdict
+    assert run["verdict"] == "chatters" and run["chatter"]["shuttings"] >= 3 and run["chatter"]["impact_speed"] > 0.1
+
+
 def test_chatter(capsys):
     follow("chatter")
     told = capsys.readouterr().out
