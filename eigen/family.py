@@ -17,7 +17,7 @@ from .operator import CoupledPencil, Relaxation, edge_of, real_apply
 from .pairs import all_eigenvalues
 from .spectrum import CLEAR, LOWEST, SLOPE, SearchOptions
 
-#: Structures kept of a family.
+#: Structures kept of a family, and parameter points whose eigenvalues are.
 KEPT = 8
 #: Patterns of motion and force weaker than this are left out of a count.
 PATTERNS = 1e-6
@@ -163,6 +163,7 @@ class ReducedFamily(PencilFamily):
         self.forces, self.slope = (family.forces.T @ self.V).T, family.slope @ self.V
         self._relaxations: dict[int, tuple[Relaxation, Relaxation]] = {}
         self._condensed: dict[tuple, tuple] = {}
+        self._known: dict[Hashable, np.ndarray] = {}
 
     def _projected(self, matrix, known: np.ndarray | None) -> np.ndarray:
         """V^T A V, of which the part on the base may be known."""
@@ -217,8 +218,12 @@ class ReducedFamily(PencilFamily):
         return float(np.sqrt(squares[squares > 0].min())) if (squares > 0).any() else 1.0
 
     def eigenvalues(self, mu: Hashable) -> np.ndarray:
-        """All finite eigenvalues in the upper half-plane."""
-        return all_eigenvalues(self.at(mu))
+        """All finite eigenvalues in the upper half-plane; those of the points asked last are kept."""
+        if mu not in self._known:
+            if len(self._known) >= KEPT:
+                self._known.clear()
+            self._known[mu] = all_eigenvalues(self.at(mu))
+        return self._known[mu]
 
     def leading(self, mu: Hashable) -> np.ndarray:
         """Leading eigenvalues, sorted by growth rate."""

@@ -146,17 +146,16 @@ class AskPanel:
         self.answers += 1
         self._status.text = f"answered in {seconds:.2f} s"
         self._status.props(f"data-answers={self.answers} data-seconds={seconds:.4f}")
-        if self._moved.is_set():
-            return
-        self._show(await predictor.about(file, "bounded", values=values))
-        for step in ("confirm", "margin"):
-            if await self._is_moved_before(self._confirming):
+        for step, worker in (("bounded", predictor), ("confirm", confirmer), ("margin", confirmer)):
+            if worker is confirmer and await self._is_moved_before(self._confirming):
                 return
-            question = {"values": values} if step == "confirm" else {}
-            self._confirming = asyncio.create_task(confirmer.about(file, step, **question))
-            if await self._is_moved_before(self._confirming):
+            question = {} if step == "margin" else {"values": values}
+            asked = asyncio.create_task(worker.about(file, step, **question))
+            asked.add_done_callback(lambda task: task.cancelled() or task.exception())  # told below, or of no use
+            self._confirming = asked if worker is confirmer else self._confirming
+            if await self._is_moved_before(asked):
                 return
-            self._show(self._confirming.result())
+            self._show(asked.result())
 
     async def _is_moved_before(self, task: asyncio.Task | None) -> bool:
         """Wait for a task; True where a slider moves before it is done."""

@@ -99,9 +99,10 @@ class Page:
             self._drawing.cancel()
 
     async def _begin(self) -> None:
-        left = self.home / "valve.toml"
+        left, begins = self.home / "valve.toml", self.home not in self.site.begun
+        self.site.begun.add(self.home)
         try:
-            if left.exists():
+            if left.exists() and not (begins and self.site.start is not None):
                 self.take(left.read_text(encoding="utf-8"), "valve")
             elif self.site.start is not None and self.site.start.suffix == ".h5":
                 text = await self.site.workers.drawing.ask("case_of", path=str(self.site.start))

@@ -27,6 +27,8 @@ VALVES, KEPT, WAITING, LONGEST = 3, 40, 8, 6 * 3600.0
 PATIENCE = 300.0
 #: Largest line of an answer, bytes.
 LINE = 64 << 20
+#: Added to the priority number of processes that nobody's hand waits for.
+BEHIND = 10
 
 
 class Ended(CaseError):
@@ -40,9 +42,16 @@ def surroundings(**further: str) -> dict[str, str]:
 
 
 class Worker:
-    """One worker process; it is started with the first question, and again after it died."""
+    """One worker process; it is started with the first question, and again after it died.
 
-    def __init__(self) -> None:
+    Parameters
+    ----------
+    nice : int
+        Added to its priority number, so that others go first.
+    """
+
+    def __init__(self, nice: int = 0) -> None:
+        self._nice = nice
         self._process: asyncio.subprocess.Process | None = None
         self._waiting: dict[int, asyncio.Future] = {}
         self._numbers = itertools.count()
@@ -59,6 +68,7 @@ class Worker:
         command = (sys.executable, "-m", "dbvfiv.app.worker")
         pipes = {"stdin": asyncio.subprocess.PIPE, "stdout": asyncio.subprocess.PIPE, "limit": LINE}
         self._process = await asyncio.create_subprocess_exec(*command, env=environment, start_new_session=True, **pipes)
+        _put_behind(self._process.pid, self._nice)
         self._reader = asyncio.create_task(self._read(self._process))
 
     async def _read(self, process: asyncio.subprocess.Process) -> None:
@@ -125,12 +135,12 @@ class Workers:
     """Workers of the valves that were asked last: one predicts, one confirms; and one that draws for all."""
 
     def __init__(self) -> None:
-        self.drawing = Worker()
+        self.drawing = Worker(BEHIND)
         self._pairs: OrderedDict[Path, tuple[Worker, Worker]] = OrderedDict()
 
     def of(self, case: Path) -> tuple[Worker, Worker]:
         """Workers of a case file; those of the valve that was not asked for longest are ended where too many live."""
-        pair = self._pairs.pop(case, None) or (Worker(), Worker())
+        pair = self._pairs.pop(case, None) or (Worker(), Worker(BEHIND))
         self._pairs[case] = pair
         while len(self._pairs) > VALVES:
             for worker in self._pairs.popitem(last=False)[1]:
@@ -328,6 +338,7 @@ class Runs:
                 run.process = await asyncio.create_subprocess_exec(
                     *run.command(), cwd=run.folder, env=environment, stdout=out, stderr=errors, start_new_session=True
                 )
+                _put_behind(run.process.pid, BEHIND)
                 try:
                     status = await asyncio.wait_for(run.process.wait(), LONGEST)
                 except TimeoutError:
@@ -357,6 +368,12 @@ async def _insist(run: Run) -> None:
         if run.process is process:
             _signal(run, number)
             await asyncio.sleep(patience)
+
+
+def _put_behind(pid: int, nice: int) -> None:
+    """Let other processes go first."""
+    with contextlib.suppress(OSError, AttributeError):  # ended already, or a system without priorities
+        os.setpriority(os.PRIO_PROCESS, pid, os.getpriority(os.PRIO_PROCESS, 0) + nice)
 
 
 def _signal(run: Run, number: signal.Signals) -> None:

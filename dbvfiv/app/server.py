@@ -168,7 +168,7 @@ class Site:
     folder : Path
         Everything is kept below it.
     start : Path, optional
-        Case file that a new user begins with.
+        Case or result file that every user begins with, once; afterwards with the valve that was left.
     at_once : int
         Runs at a time.
     """
@@ -177,6 +177,7 @@ class Site:
     start: Path | None = None
     at_once: int = 1
     workers: Workers = field(default_factory=Workers)
+    begun: set[Path] = field(default_factory=set)
 
     def __post_init__(self) -> None:
         self.runs = Runs(self.at_once)

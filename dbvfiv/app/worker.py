@@ -14,6 +14,7 @@ import os
 import queue
 import sys
 import threading
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -41,9 +42,16 @@ LIQUID = 300.0
 
 
 class Desk:
-    """Answers to questions on the valve that was opened last."""
+    """Answers to questions on the valve that was opened last.
 
-    def __init__(self) -> None:
+    Parameters
+    ----------
+    interrupted : callable
+        True where another question waits.
+    """
+
+    def __init__(self, interrupted: Callable[[], bool] = lambda: False) -> None:
+        self._interrupted = interrupted
         self.valve: Valve | None = None
         self.explorer: Explorer | None = None
         self._last: Answer | None = None
@@ -66,6 +74,7 @@ class Desk:
         self.explorer = None
         self.valve = load(case)
         self.explorer = found = self.valve.explore()
+        found.interrupted = self._interrupted
         units, liquid = found.case.units, found.case.fluid.density > LIQUID
         in_pressure = not liquid or (units.text and not units.heads)
         head = units.factor("pressure") if units.heads else GRAVITY * found.case.fluid.density
@@ -188,7 +197,7 @@ def main() -> None:
         asked.put(None)
 
     threading.Thread(target=listen, daemon=True).start()
-    desk, idle = Desk(), True
+    desk, idle = Desk(lambda: not asked.empty()), True
     while True:
         try:
             line = asked.get(timeout=IDLE if idle else 3600.0)

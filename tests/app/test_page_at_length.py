@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 pytest.importorskip("nicegui", reason="NiceGUI is not installed; `pip install 'dbvfiv[app]'` brings it")
+import dbvfiv
 from dbvfiv.studies.case import load_case
 from tests.app.server import COARSE, Served, Tab, served
 from tests.browser import browser
@@ -194,5 +195,28 @@ def test_many_moves_are_all_answered_in_bounded_memory(tmp_path, moves):
             print(f"\nstate stays: median {quick[0]:.3f} s, 95 % {quick[1]:.3f} s")
             print(f"state moves: median {slow[0]:.2f} s, 95 % {slow[1]:.2f} s; memory {sizes} MB")
             assert sizes[-1] < 1.25 * sizes[0] + 200
+    finally:
+        driver.quit()
+
+
+def test_a_result_is_opened_for_a_user_who_left_another_valve(tmp_path):
+    """The server names its user by a cookie; the browser comes back with it, once it has left a valve behind."""
+    case = tmp_path / "six.toml"
+    case.write_text(COARSE)
+    result = tmp_path / "six.h5"
+    dbvfiv.load(case, {"valve.duckbill_length": "104 mm"}).steady(pressure=5e3, output=result)
+    driver = browser(*WIDE)
+    try:
+        for start, length in ((case, "280 mm long"), (result, "279 mm long")):
+            server = Served(tmp_path / "page", start)
+            try:
+                tab = Tab(driver, server.address)
+                tab.wait(lambda length=length: length in tab.text)
+                tab.fill("valve.duckbill_length", "100 mm")
+                tab.wait(lambda: "275 mm long" in tab.text)
+                driver.refresh()
+                tab.wait(lambda: "275 mm long" in tab.text)
+            finally:
+                server.end()
     finally:
         driver.quit()
