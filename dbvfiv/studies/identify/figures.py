@@ -23,7 +23,8 @@ def inputs(result: StudyResult) -> Figure:
     """Intervals of the inputs over those of the prior, and their correlations."""
     figure = new_figure(10.4, 0.4 * len(result.inputs) + 2.6)
     left, right = figure.subplots(1, 2, width_ratios=(1.3, 1.0))
-    scores, titles = result.plan.scores_of(result.scores), [one.title for one in result.plan.inputs]
+    scores = result.plan.scores_of(result.scores)
+    titles = [f"{number}  {one.title}" for number, one in enumerate(result.plan.inputs, 1)]
     low, middle, high = np.quantile(scores, (0.025, 0.5, 0.975), axis=0)
     rows = np.arange(len(titles))
     left.hlines(rows, -1.96, 1.96, color=REST, lw=7, alpha=0.4, label="before, 95 %")
@@ -35,6 +36,7 @@ def inputs(result: StudyResult) -> Figure:
     shown = right.imshow(np.corrcoef(scores.T).reshape(len(rows), -1), vmin=-1, vmax=1, cmap="RdBu_r")
     right.set_xticks(rows, [str(row + 1) for row in rows])
     right.set_yticks(rows, [str(row + 1) for row in rows])
+    right.grid(False)
     figure.colorbar(shown, ax=right, label="Correlation after")
     headline(figure, f"What the records say of {result.header.name}")
     return figure
@@ -50,6 +52,10 @@ def onset(result: StudyResult) -> Figure:
     axes.fill_between(x, low, high, color=COMPUTED, alpha=0.25, lw=0, label="95 %")
     axes.plot(x, middle, "o-", color=COMPUTED, label="median")
     axes.axhline(0.0, color="black", lw=0.8)
+    for side in ("below", "above"):
+        ends = [value for value in result.onset[side]["interval"] if value is not None]
+        if len(ends) == 2:  # found by itself: between the values of the range damping is not straight
+            axes.axvspan(*(np.array(ends) / PARAMETERS[name].scale), color=REST, alpha=0.5, label=f"onset {side}, 95 %")
     for number, match in enumerate(result.matches):
         value = result.places.value_at(match["record"]) / PARAMETERS[name].scale
         if match["damping_ratio"] is not None:
