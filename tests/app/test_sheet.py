@@ -42,7 +42,7 @@ def test_a_sheet_is_the_case_of_its_file(tmp_path):
 @pytest.mark.parametrize(
     ("text", "said"),
     [
-        ('[valve]\nduckbill_length = "-1 mm"', "The case, line 2: valve.duckbill_length is given as -0.001"),
+        ('[valve]\nduckbill_length = "-1 mm"', 'The case, line 2: valve.duckbill_length is given as "-1 mm"'),
         ("[valve]\nlenght = 1", "valve.lenght is not a key of the case file"),
         ("[mesh]\naround = 400\nalong = 400", "160000 elements"),
         ('[map]\nworkers = "tcp://10.0.0.1:8786"', "map.workers"),
