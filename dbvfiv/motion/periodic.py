@@ -56,7 +56,7 @@ class PeriodicValve:
         check_periodic(model)
         self.inner, self.size = model.flow.inner, model.size + model.flow.inner
         area = float(model.mesh.rest_area[-1])
-        self._weight = area  # turns the flow's equations, Pa, into forces
+        self.flow_weight = area  # turns the flow's equations, Pa, into forces
         self._workspace = Workspace()
         self._known_forces: tuple[ValveModel, np.ndarray, np.ndarray] | None = None
         scale = np.ones(model.shell.dofs.free.shape)
@@ -116,7 +116,7 @@ class PeriodicValve:
                 out[i] += memory.force(q[i], held[i])
             out[i] += model.shell.inertia(q[i], v[i], a[i] + mu["alpha"] * v[i])
             out[i] -= model.pressure_force(nodal, p[i])
-        return np.concatenate([out, self._weight * rest], axis=1)
+        return np.concatenate([out, self.flow_weight * rest], axis=1)
 
     def _internal_forces(self, model: ValveModel, q: np.ndarray) -> np.ndarray:
         """(N, n); those of the last positions are kept, for derivatives by frequency and parameters ask again."""
@@ -157,7 +157,7 @@ class PeriodicValve:
     def _fluid_term(self, left, right, parts) -> Term:
         """- G p over the flow's equations, from areas and the flow's unknowns."""
         a0, a1, a2, b0, b1, r0, r1, r2, s0, s1 = (parts[name] for name in FLUID_PARTS)
-        w = self._weight
+        w = self.flow_weight
         zero = np.zeros_like(s0), np.zeros_like(b0)
         middle = [
             (0, np.block([[-a0, -b0], [w * r0, w * s0]])),
@@ -186,7 +186,7 @@ class PeriodicValve:
             relaxed = 0.0 if relaxation is None else np.mean([relaxation.factors(x) for x in s], axis=1)
             return 1.0 + relaxed + beta * s
 
-        return AveragedSolves(operator.average, operator.motion, self._weight, stiffening, self._workspace)
+        return AveragedSolves(operator.average, operator.motion, self.flow_weight, stiffening, self._workspace)
 
 
 def check_periodic(model: ValveModel) -> None:

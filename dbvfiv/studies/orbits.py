@@ -13,12 +13,14 @@ from continuation.cycle_branch import CycleTracer
 from continuation.cycle_points import CyclePoint
 from continuation.cycles import Cycle, CycleSolver, cycles_beside_onset
 from continuation.harmonics import Harmonics
+from continuation.normal_form import AmplitudeEquation, amplitude_equation
 from continuation.periodic import PeriodicMotion
 
 from ..case.parameters import PARAMETERS, Mu
 from ..errors import SolveError
 from ..flow.stepping import MovingFluid
 from ..model import ValveModel
+from ..model.memory_forms import ValveMemoryForms
 from ..model.state import LipCentre
 from ..model.system import ValveSystem
 from ..motion.periodic import PeriodicValve
@@ -246,6 +248,29 @@ class Follower:
                 f"of {amplitude * 1e3:.3g} mm (cycle.amplitude): {error}"
             ) from error
 
+    def amplitude(self, onset: Onset) -> tuple[AmplitudeEquation, float]:
+        """Amplitude equation of the mode of an onset, or of a nearly neutral one beside it, for the displacement of the
+        lip, m; and that displacement at rest.
+
+        Raises
+        ------
+        SolveError
+            If the mode does not move the middle of the lips.
+        """
+        mu, n = onset.place.for_system(), self.system.size - self.system.inner
+        forms = _AtRest(ValveMemoryForms(self.system.model(mu), self.walk.equilibrium(onset.place), mu))
+        weight = np.append(np.ones(n), np.full(self.system.inner, self.system.flow_weight))
+        row, rest = np.zeros(self.system.size), forms.rest[self.lip]
+        row[self.lip] = 1.0
+        mode = np.concatenate([onset.mode.q, onset.mode.u])
+        try:
+            found = amplitude_equation(
+                forms, lambda motion: self.system.residual(motion, mu) / weight, onset.eigenvalue, mode, row, abs(rest)
+            )
+        except ContinuationError as error:
+            raise SolveError(f"At {self.parameter} = {onset.value:.6g} no amplitude follows: {error}") from error
+        return found, float(rest)
+
     def beside(self, onset: Onset, first: Cycle, value: float) -> Cycle:
         """The cycle at a value between an onset and the first cycle of its branch, guessed by the root of the distance
         from the onset.
@@ -322,6 +347,14 @@ class Follower:
     def orbit(self, cycle: Cycle) -> Orbit:
         """Orbit of a cycle, from which its results are taken."""
         return Orbit(self.system.model(cycle.mu), cycle.mu, cycle.motion)
+
+
+class _AtRest:
+    """Steady state of a valve with the unknowns of its periodic motions: velocities are none of them."""
+
+    def __init__(self, forms: ValveMemoryForms):
+        self.pencil, self.slope = forms.pencil, forms.slope
+        self.rest = np.concatenate([forms.q, forms.rest[2 * len(forms.q) :]])
 
 
 def _basis(system: PeriodicValve, spectrum) -> np.ndarray:

@@ -1,11 +1,14 @@
-"""The first Lyapunov coefficient: known values, and what it must not depend on."""
+"""The first Lyapunov coefficient and the amplitude equation: known values, and what they must not depend on."""
 
+import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
 
 from continuation import ContinuationOptions, NotABifurcation, continue_branch, hopf_normal_form
+from continuation.first_order import FirstOrderSystem
 from continuation.jax_system import JaxSystem
+from continuation.normal_form import SystemForms, amplitude_equation
 from tests.systems.brusselator import brusselator
 from tests.systems.normal_forms import bautin, stuart_landau, warped_stuart_landau
 
@@ -148,3 +151,61 @@ def test_what_is_no_hopf_point_is_refused():
     with pytest.raises(NotABifurcation, match="not simple"):
         q = np.array([1, -1j, 0, 0])
         hopf_normal_form(nilpotent, np.zeros(4), {}, 1.0, q)
+
+
+def amplitude_of(system, mu, eigenvalue, unit=1.0):
+    periodic, rest = FirstOrderSystem(system), np.zeros(2)
+    forms = SystemForms(system, rest, mu)
+    return amplitude_equation(forms, lambda m: -periodic.residual(m, mu), eigenvalue, [1, -1j], [1.0, 0.0], unit)
+
+
+@pytest.mark.parametrize("make", [stuart_landau, warped_stuart_landau])
+def test_amplitude_equation_of_a_known_cycle(make):
+    """|z|^2 = mu, frequency w - c mu; a mass that depends on the state leaves the orbit as it is."""
+    found = amplitude_of(make(), {"mu": 0.1, "w": 2.0, "c": 0.7}, 0.1 + 2j)
+    assert np.isclose(found.amplitude, np.sqrt(0.1), rtol=5e-4) and found.attracts
+    assert np.isclose(found.frequency, 2.0 - 0.07, rtol=2e-4)
+    assert abs(found.amplitude / np.sqrt(0.1) - 1) <= found.residual < 2e-3
+
+
+@pytest.mark.parametrize("mu, nu, square, attracts", [(-0.05, 0.5, 0.1381966, False), (0.05, -0.5, 0.0854102, True)])
+def test_amplitude_equation_to_fifth_order(mu, nu, square, attracts):
+    """mu + nu r^2 - r^4 = 0."""
+    found = amplitude_of(bautin(), {"mu": mu, "nu": nu}, mu + 1j)
+    assert np.isclose(found.amplitude**2, square, rtol=1e-6) and found.attracts is attracts
+    assert np.isclose(found.frequency, 1.0, rtol=1e-9)
+
+
+def test_amplitude_equation_sees_through_coordinates():
+    """w = u + Q(u) moves on a circle of known radius; u does not, and its swing is that of the inverse."""
+
+    def bent(u):
+        x, y = u[0], u[1]
+        return jnp.stack([x + 0.3 * x**2 - 0.2 * x * y + 0.1 * y**3, y + 0.4 * y**2 + 0.15 * x**2 * y])
+
+    def residual(u, mu):
+        x, y = w = bent(u)
+        r2 = w @ w
+        a, b = mu["mu"] - r2 + 0.6 * r2**2, 2 - 0.7 * r2
+        return jnp.stack([a * x - b * y, b * x + a * y])
+
+    system = JaxSystem(residual, 2, mass=lambda u, mu, c: jax.jvp(bent, (u,), (c,))[1])
+    errors = []
+    for mu in (0.02, 0.08):
+        square = (1 - np.sqrt(1 - 2.4 * mu)) / 1.2
+        phases = 2 * np.pi * np.arange(2000) / 2000
+        circle = u = np.sqrt(square) * np.array([np.cos(phases), np.sin(phases)])
+        for _ in range(60):
+            u = circle - (np.array(bent(u)) - u)
+        found = amplitude_of(system, {"mu": mu}, mu + 2j, 0.5)
+        errors.append(abs(np.ptp(found.extremes()) / np.ptp(u[0]) - 1))
+        assert errors[-1] < 2e-4 and 0.05 * found.residual < errors[-1] < 2 * found.residual
+        assert np.isclose(found.frequency, 2 - 0.7 * square, rtol=5e-5)
+    assert errors[1] > 4 * errors[0]
+
+
+def test_amplitude_equation_without_a_cycle():
+    found = amplitude_of(stuart_landau(), {"mu": -0.1, "w": 2.0, "c": 0.7}, -0.1 + 2j)
+    assert np.isnan(found.amplitude) and found.residual == np.inf
+    with pytest.raises(NotABifurcation, match="observed quantity"):
+        amplitude_equation(None, None, 2j, [1, -1j], [0.0, 0.0], 1.0)

@@ -44,6 +44,11 @@ class Keys(Section):
         "Follow limit cycles from the onsets of each column of the grid, as the section cycle says: their amplitude in "
         "each cell.",
     )
+    amplitude: StrictBool = key(
+        False,
+        "The same by the amplitude equation of the mode near onset, which costs no branch; branches where its residual "
+        "is too large.",
+    )
     symmetry: Literal["SS", "all"] = key(
         "SS",
         "Symmetry classes looked at: SS is that of the model, all adds those in which the lips sway in y (SA), the "
@@ -110,6 +115,9 @@ def command(
     cycles: Annotated[
         bool, typer.Option("--cycles", help="Amplitude of the limit cycle in each cell that has one.")
     ] = False,
+    amplitude: Annotated[
+        bool, typer.Option("--amplitude", help="The same, without branches of cycles near the onsets.")
+    ] = False,
 ) -> Request:
     """Growth rate of the leading mode over two parameters, with the exact onset curves.
 
@@ -124,7 +132,8 @@ def command(
     found and corrected like the onset curves.
 
     With --cycles branches of limit cycles are followed from the onsets of each column, as the section cycle of the case
-    says; that takes seconds a cell.
+    says; that takes seconds a cell. With --amplitude the amplitude equation of the mode (invariant manifold, to seventh
+    order) answers near onset, and branches only where its residual is too large.
 
     With -o every finished column is kept at once: `dbvfiv resume` goes on after Ctrl-C or a crash. Columns are shared
     among processes of this machine (--workers 4), of mpiexec, or of a Dask cluster (--workers tcp://host:8786).
@@ -144,5 +153,6 @@ def command(
         "map.symmetry": symmetry,
         "map.contours": contours,
         "map.cycles": cycles or None,
+        "map.amplitude": amplitude or None,
     }
     return Request(changes)

@@ -95,6 +95,10 @@ def cycle_amplitude(result: StudyResult) -> Figure:
         axes.pcolormesh(_edges(result.plan.x), _edges(result.plan.y), still, cmap="gray", vmin=0.0, vmax=1.0)
         rows, columns = np.nonzero(growing[law] > 0)
         axes.plot(x[columns], y[rows], ".", color="black", ms=3)
+        for line in result.touching_curves(law):
+            touching = np.column_stack([_shown(result.plan.x, line[:, 0]), _shown(result.plan.y, line[:, 1])])
+            axes.plot(*touching.T, color="C3", lw=2.0, marker="o", ms=3)
+            axes.annotate("lips touch", touching[len(touching) // 2], fontsize=8, color="C3", path_effects=HALO)
         _curves(axes, result, law)
         label_regions(axes, result, law)
     colour_bar(figure, mesh, panels, "Amplitude of the limit cycle, one lip, mm", pad=0.015)

@@ -355,10 +355,17 @@ class MapResult(StudyResult):
         return grid_of(self.plan, self.columns, name, range(len(self.plan.laws)))
 
     def cycle_grid(self, name: str) -> np.ndarray:
-        """amplitude, frequency or growing of the limit cycles on the grid (laws, y, x); see
-        `dbvfiv.studies.map.cycles`.
-        """
+        """A quantity of `dbvfiv.studies.map.cycles.CELLS` of the limit cycles on the grid (laws, y, x)."""
         return cycles.cycle_grid(self.record, self.plan, name)
+
+    def touching_curves(self, law: int) -> list[np.ndarray]:
+        """Lines (k, 2) in x and y on which cycles just close the lips."""
+        return cycles.touching_curves(self.record, self.plan, law)
+
+    @property
+    def has_cycles(self) -> bool:
+        """True where limit cycles were asked for."""
+        return self.case.map.cycles or self.case.map.amplitude
 
     @property
     def moved(self) -> tuple[str, ...]:
@@ -394,7 +401,7 @@ class MapResult(StudyResult):
 
     def _picture(self, law: int) -> dict[str, Any]:
         leading = {"leading": self._leading(law)} if self.classes else {}
-        followed = cycles.summary_of(self.record, self.plan, law) if self.case.map.cycles else {}
+        followed = cycles.summary_of(self.record, self.plan, law) if self.has_cycles else {}
         sealed = {"sealed": self.grid("sealed")[law].astype(bool).tolist()} if self.case.valve.is_preset else {}
         mine = [curve for curve in self.curves if curve.law == law and not curve.level]
         contours = [curve.summary() for curve in self.curves if curve.law == law and curve.level]
@@ -435,7 +442,7 @@ class MapResult(StudyResult):
         for i in range(len(self.plan.laws)):
             lines.append(self._cells_line(i))
             lines += [self._curve_line(curve) for curve in self.curves if curve.law == i]
-            if self.case.map.cycles:
+            if self.has_cycles:
                 lines += cycles.sentences(self.record, self.plan, i)
         lines += [self._class_line(note) for note in self.classes]
         if self.checks:

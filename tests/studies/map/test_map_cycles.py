@@ -9,6 +9,8 @@ import pytest
 
 from dbvfiv.observer import Observer
 from dbvfiv.studies.case import thesis_case
+from dbvfiv.studies.map.cycles import CELLS
+from dbvfiv.studies.orbits import Follower
 from dbvfiv.studies.session import Session, load_result, resume_result
 
 CASE = {
@@ -51,6 +53,41 @@ def test_cells_have_the_cycles_of_branches(found):
     (point,) = (p for p in branch.points if p.value == 225.0)
     assert np.isclose(amplitude[0, 1], point.amplitude, rtol=1e-3)
     assert np.isclose(frequency[0, 1], point.frequency, rtol=1e-5)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "law, pressure, density",
+    [("quasi-steady", "5.5 kPa:6 kPa:2", "200:250:6"), ("storage", "6 kPa:6.5 kPa:2", "15:26:6")],
+)
+def test_amplitudes_of_the_reduced_manifold(law, pressure, density):
+    """Within 2 % of the cycles up to half the amplitude at which lips touch, and closer than the residual."""
+    asked = {"fluid__continuity": law, "map__x": f"pressure={pressure}", "map__y": f"density={density}"}
+    branch, near = (
+        session_of(map__cycles=not reduced, map__amplitude=reduced, cycle__exponents=0, **asked).perform("map")
+        for reduced in (False, True)
+    )
+    cycle, found = ({name: x.cycle_grid(name)[0] for name in CELLS} for x in (branch, near))
+    reduced = np.isfinite(found["residual"]) & np.isfinite(cycle["amplitude"])  # a branch may lack a cell
+    error = np.abs(found["amplitude"] / cycle["amplitude"] - 1)
+    rest = near.cycle_grid("least")[0] + found["amplitude"]  # about the displacement at rest
+    half = reduced & (found["amplitude"] <= 0.5 * rest)
+    assert half.sum() >= 4
+    assert (error[half] <= 0.02).all() and (error[reduced] <= found["residual"][reduced] + 1e-3).all()
+    assert np.allclose(found["frequency"][half], cycle["frequency"][half], rtol=1e-3)
+    assert (found["growing"][half] == 0).all()
+    beyond = np.isfinite(cycle["amplitude"]) & ~np.isfinite(found["residual"])
+    assert np.allclose(found["amplitude"][beyond], cycle["amplitude"][beyond], rtol=2e-3)
+
+
+def test_amplitudes_near_onset_need_no_branch(found, monkeypatch):
+    """The same cells as branches give, without one; the branch is not asked for."""
+    monkeypatch.setattr(Follower, "begin", None)
+    again = session_of(map__cycles=False, map__amplitude=True, map__y="density=225:255:3").perform("map")
+    assert (np.isfinite(again.cycle_grid("residual")) == np.isfinite(found.cycle_grid("amplitude"))).all()
+    for name, tolerance in (("amplitude", 2e-2), ("frequency", 1e-3), ("growing", 0), ("least", 2e-2)):
+        assert np.allclose(again.cycle_grid(name), found.cycle_grid(name), rtol=tolerance, equal_nan=True), name
+    assert np.isnan(found.cycle_grid("residual")).all() and again.summary()["touching_curves"] == []
 
 
 def test_in_file_tables_and_figures(found, file):
