@@ -281,7 +281,7 @@ class Valve:
         observer: Observer | None = None,
         **changes: Any,
     ) -> IdentifyResult:
-        """What measured records say of the uncertain inputs, and where flutter begins.
+        """Identification of the uncertain inputs by measured records, and of where flutter begins.
 
         Parameters
         ----------

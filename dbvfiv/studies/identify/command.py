@@ -35,7 +35,7 @@ class MeasuredRecord(Section):
 
 
 class Keys(Section):
-    """What measured records say of the valve."""
+    """Identification of the valve by measured records."""
 
     records: tuple[MeasuredRecord, ...] = key((), "Measured records and modes, each with where it was taken.")
     over: StabilityRange | None = key(
@@ -92,7 +92,7 @@ def command(
     ] = None,
     workers: WorkersOption = None,
 ) -> Request:
-    """What measured records say of loss factors, modulus, line and any other uncertain input, and where flutter begins,
+    """Loss factors, modulus, line and any other uncertain input as measured records have them, and where flutter begins,
     with 95 % intervals.
 
     The inputs are those of `uncertainty`. Ring-downs and motion under noise give frequency and damping of modes; each

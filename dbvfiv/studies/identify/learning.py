@@ -1,4 +1,4 @@
-"""What measured oscillations say of the inputs: likelihood on emulated modes, onset, what to measure next."""
+"""Inputs from measured oscillations: likelihood on emulated modes, onset, what to measure next."""
 
 from __future__ import annotations
 

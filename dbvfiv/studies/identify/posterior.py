@@ -126,7 +126,7 @@ INFLATED, CORRELATED = 2.0, 0.3
 
 @dataclass(frozen=True)
 class Learned:
-    """What samples of a posterior say of independent inputs whose prior is standard normal.
+    """Knowledge of independent inputs, whose prior is standard normal, by samples of their posterior.
 
     Attributes
     ----------

@@ -223,7 +223,7 @@ def kept_onsets(record: Record) -> dict[int, tuple[float, float]]:
 
 
 def learned_from(plan, places, lines, scores, rounds, modes, begins) -> Learning:
-    """What valves say, from their scores, and their modes by sample and place and onsets by sample."""
+    """Likelihood and emulated modes from the scores of valves, their modes by sample and place, and onsets by sample."""
     empty = np.full(MODES, np.nan + 0j), np.zeros((MODES, MODES))
     table = {}
     for place in range(len(places.moved)):

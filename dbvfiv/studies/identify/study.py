@@ -1,4 +1,4 @@
-"""What measured records say of a valve: run, storage, and what can be read off it."""
+"""Identification of a valve by measured records: run, storage, and what can be read off it."""
 
 from __future__ import annotations
 
@@ -140,7 +140,7 @@ def _modes_of_case(plan: Plan, places: Places, walk: StabilityWalk, record: Grow
 
 
 class IdentifyResult(StudyResult):
-    """What measured records say of the inputs of a valve, and where flutter begins.
+    """Inputs of a valve as measured records have them, and where flutter begins.
 
     Attributes
     ----------
@@ -201,7 +201,7 @@ class IdentifyResult(StudyResult):
 
     @cached_property
     def inputs(self) -> list[dict[str, Any]]:
-        """What is known of each input: median and interval before and after, share of its variance that is gone,
+        """Knowledge of each input: median and interval before and after, share of its variance that is gone,
         variance inflation by those it is confounded with.
         """
         values, turned, found = self.plan.numbers(self.scores), self.plan.scores_of(self.scores), []
@@ -272,7 +272,7 @@ class IdentifyResult(StudyResult):
 
     @cached_property
     def onset(self) -> dict[str, Any] | None:
-        """Where flutter begins below and above the last record: median, 95 % interval (None beyond the range) and the
+        """Onset of flutter below and above the last record: median, 95 % interval (None beyond the range) and the
         probability that it does within the range; None where too few valves are known.
         """
         if self._onsets is None:

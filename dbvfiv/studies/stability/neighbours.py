@@ -97,7 +97,7 @@ class Neighbours:
 def find_neighbours(
     at: At, origin: np.ndarray, scales: np.ndarray, start: np.ndarray, taken: np.ndarray, checks: np.ndarray
 ) -> Neighbours:
-    """What the neighbours of a valve share.
+    """Find the neighbours of a valve: their first-order states and added mass, and the space that they share.
 
     Parameters
     ----------

@@ -137,7 +137,7 @@ def _states_of_case(plan: Plan, walk: StabilityWalk, record: GrowingRecord) -> l
 
 
 def _neighbours(plan: Plan, states: list[np.ndarray | None], record: GrowingRecord) -> dict[int, Neighbours]:
-    """What samples have in common at each value, where it pays and can be had."""
+    """Neighbours of the case at each value, whose space samples share, where that pays and can be had."""
     found: dict[int, Neighbours] = {}
     if plan.is_surrounding or plan.case.uncertainty.samples < PAYS:
         return found
