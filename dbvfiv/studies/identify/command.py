@@ -92,7 +92,7 @@ def command(
     ] = None,
     workers: WorkersOption = None,
 ) -> Request:
-    """Loss factors, modulus, line and any other uncertain input as measured records have them, and where flutter begins,
+    """Loss factors, modulus, line and other uncertain inputs as measured records have them, and where flutter begins,
     with 95 % intervals.
 
     The inputs are those of `uncertainty`. Ring-downs and motion under noise give frequency and damping of modes; each

@@ -223,7 +223,7 @@ def kept_onsets(record: Record) -> dict[int, tuple[float, float]]:
 
 
 def learned_from(plan, places, lines, scores, rounds, modes, begins) -> Learning:
-    """Likelihood and emulated modes from the scores of valves, their modes by sample and place, and onsets by sample."""
+    """Likelihood and emulated modes from the scores of valves, their modes by sample and place, and onsets."""
     empty = np.full(MODES, np.nan + 0j), np.zeros((MODES, MODES))
     table = {}
     for place in range(len(places.moved)):

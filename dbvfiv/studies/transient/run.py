@@ -153,7 +153,7 @@ def shut_share(model: ValveModel) -> float:
 
 
 def parting(history: Columns, model: ValveModel) -> np.ndarray:
-    """Distance of the faces of a valve (k,) over that at which they meet: 1 and less where they meet in the middle of the lips or shut the
+    """Distance of the faces of a valve (k,) over that at which they meet, in the middle of the lips, or shut the
     passage.
     """
     share, gap = shut_share(model), model.case.valve.initial_gap
@@ -165,7 +165,7 @@ def parting(history: Columns, model: ValveModel) -> np.ndarray:
 
 
 def openness(history: Columns, model: ValveModel) -> np.ndarray:
-    """Distance of a valve from shut (k,): 1 and less where it is: passage and flows over those of a shut one.
+    """Distance of a valve from shut (k,), at most 1 where it is: passage and flows over those of a shut one.
 
     Faces shut it where they leave at most `shut_share` of the gap at rest. Stops hold lips where they are at rest; they
     shut it where nothing drives fluid out and as many as a row has hold. A shut valve leaks at most what a jet through
