@@ -208,8 +208,9 @@ class Explorer:
         corners = self._space[2]
         if corners:
             place = corners[-1]
-            bound = 0.0 if self.walk.refusal(place) else self._enriched(place)
-            if corners and np.isfinite(bound):  # not of one that was interrupted
+            if not self.walk.refusal(place):
+                self._enriched(place)
+            if not self.interrupted():
                 corners.pop()
         elif self._heads:
             with suppress(SolveError):  # a head that is not reached is told where it is asked
@@ -221,6 +222,8 @@ class Explorer:
         if "pressure" not in self.ranges:
             return []
         low, high = self.ranges["pressure"]
+        if not 0.0 < low < high:  # where nothing flows
+            return []
         share = 0.5 + 0.5 * np.cos(np.pi * np.arange(HEADS) / (HEADS - 1))
         return [float(value) for value in low * (high / low) ** share]
 
