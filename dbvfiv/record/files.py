@@ -228,10 +228,7 @@ def reading(path: str | Path) -> Iterator[h5py.File]:
                 f"it was written by {file.attrs.get('program', 'a newer program')}."
             )
         if layout < LAYOUT:
-            raise CaseError(
-                f"{str(path)!r} was written by an older program ({file.attrs.get('program', 'unknown')}) and this "
-                f"version cannot read it; make it anew with '{file.attrs.get('command', f'dbvfiv {kind}')}'."
-            )
+            raise older_program(path, file)
         try:
             yield file
         except CaseError:
@@ -241,6 +238,15 @@ def reading(path: str | Path) -> Iterator[h5py.File]:
             raise CaseError(
                 f"The {kind} result {str(path)!r} is damaged or cut short ({type(error).__name__}: {detail})."
             ) from error
+
+
+def older_program(path: Path, file: h5py.File) -> CaseError:
+    """Error for a result of an earlier version, which has other tables."""
+    command = file.attrs.get("command", f"dbvfiv {file.attrs['dbvfiv_kind']}")
+    return CaseError(
+        f"{str(path)!r} was written by an older program ({file.attrs.get('program', 'unknown')}) and this "
+        f"version cannot read it; make it anew with '{command}'."
+    )
 
 
 def _refuse_empty(path: Path) -> None:

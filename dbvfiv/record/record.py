@@ -18,7 +18,7 @@ import numpy as np
 from ..case.model import Case
 from ..errors import CaseError, as_path
 from ..observer import Observer
-from .files import DeferredSignals, reading
+from .files import DeferredSignals, older_program, reading
 from .header import Header, read_header
 from .journal import Journal, read_log
 from .mesh import MeshData, read_mesh
@@ -270,9 +270,8 @@ class StoredRecord(Record):
             self._log = read_log(file)
             for table in self.tables.values():
                 group = file["tables"][table.name]
-                missing = [c.name for c in table.columns if c.name not in group]
-                if missing:
-                    raise KeyError(f"{table.name}/{missing[0]}")
+                if any(column.name not in group for column in table.columns):
+                    raise older_program(self.path, file)
             self._count = {name: read_rows(file["tables"][name]) for name in self.tables}
             self.header = replace(read_header(file, case_model), complete=self.complete)
 
