@@ -49,6 +49,15 @@ def test_modules_and_lines_are_short():
             assert len(path.read_text().splitlines()) <= 600, f"{path} has more than 600 lines"
 
 
+def test_names_of_a_module_are_defined_once():
+    """A second function of one name hides the first, which the linter only tells where that is not used between."""
+    for package in ("dbvfiv", "eigen", "continuation"):
+        for path in (ROOT / package).rglob("*.py"):
+            body = ast.parse(path.read_text()).body
+            names = [node.name for node in body if isinstance(node, (ast.FunctionDef, ast.ClassDef))]
+            assert len(names) == len(set(names)), f"{path}: {sorted({n for n in names if names.count(n) > 1})}"
+
+
 def test_own_modules_are_imported_at_the_top():
     """Inside functions only libraries that are slow to import may be, and in commands what they act with."""
     for package in ("dbvfiv", "eigen", "continuation"):

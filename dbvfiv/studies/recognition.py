@@ -319,7 +319,7 @@ class JudgedSignal:
             notes.append(f"{signal.skipped} of {rows} rows hold no number and were left out.")
         head = f"{signal.name}: {verdict.name}{'' if verdict.decided else ' (not certain)'}. {verdict.reason}"
         lines = [head, *(f"  Note: {note}" for note in notes)]
-        for label, value in _numbers(verdict):
+        for label, value in _numbers_of(verdict):
             if value == value:
                 lines.append(f"  {label:<20}{value:.7g}")
         lines += [_line_of(one) for one in verdict.lines]
@@ -461,7 +461,7 @@ def _peaks(signal: Signal, count: int = 5) -> list[dict[str, float]]:
     ]
 
 
-def _numbers(verdict: Verdict) -> list[tuple[str, float]]:
+def _numbers_of(verdict: Verdict) -> list[tuple[str, float]]:
     return [
         ("mean", verdict.mean),
         ("amplitude", verdict.amplitude),

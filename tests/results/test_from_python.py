@@ -80,7 +80,9 @@ def test_arrays_and_single_texts(valve):
 
 
 def test_what_the_package_offers():
-    results = "Steady Modes Sweep Sensitivity Levels Onset Map Closure Transient Cycle Uncertainty Design Response"
+    results = (
+        "Steady Modes Sweep Sensitivity Levels Onset Map Closure Transient Cycle Uncertainty Design Response Identify"
+    )
     public = {"Valve", "load", "load_result", "resume", "CaseError", "SolveError", "Observer", "State"}
     public |= {f"{name}Result" for name in results.split()}
     assert public <= set(dir(dbvfiv)) and public == set(dbvfiv.__all__)
