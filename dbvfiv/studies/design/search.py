@@ -20,6 +20,8 @@ from .problem import AtHead, DesignProblem, together
 HELD = 1e-5
 #: Rounds in which heads are added, and heads of a span that are looked at.
 ROUNDS, LOOK = 3, 13
+#: Starts tried between one that cannot be computed and the case, each halfway on: the last is 3 % of the way from it.
+BACK = 6
 #: Change of the aim, over its size at the start, at which a search ends.
 GAIN = 1e-5
 #: Aim and constraints, over their sizes, by which a valve that cannot be computed seems worse: the step is cut to a
@@ -117,9 +119,10 @@ class Search:
         from scipy.optimize import minimize
 
         try:
-            scale, limit = self._scale(share), len(self._seen) + evaluations
+            share, scale = self._begin(share)
         except _Enough:
             return None
+        limit = len(self._seen) + evaluations
 
         def part(number: int, x: np.ndarray):
             """One of what `_evaluated` gives; of a valve that is none, what makes any step to it too long."""
@@ -146,18 +149,20 @@ class Search:
         designs = [found[4] for found in self._seen.values() if found is not None]
         return best_of(designs, self.aim)
 
-    def _scale(self, share: np.ndarray) -> float:
-        """Size of the aim at the start.
+    def _begin(self, share: np.ndarray) -> tuple[np.ndarray, float]:
+        """Start and the size of the aim there; one at which no valve can be computed is moved towards the case.
 
         Raises
         ------
         _Enough
             If there is no valve to start from.
         """
-        self._latest = self._evaluated(share)
-        if self._latest is None:
-            raise _Enough
-        return abs(self._latest[0]) or 1.0
+        for _ in range(BACK):
+            self._latest = self._evaluated(share)
+            if self._latest is not None:
+                return share, abs(self._latest[0]) or 1.0
+            share = 0.5 * (share + self.problem.start)
+        raise _Enough
 
     def _rows(self, statements: Sequence[Statement]) -> list[tuple[Statement, float | None]]:
         """Statements at their pressures, one by one."""

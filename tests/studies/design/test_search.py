@@ -39,13 +39,10 @@ def two_throats(x, _pressure):
 
 @pytest.mark.parametrize("start", range(5))
 def test_two_throats_of_a_nozzle_become_equal(start):
-    """Least mass for a flow: a = b = sqrt(2), from every start that is open."""
+    """Least mass for a flow: a = b = sqrt(2), from every start; those that are shut step back towards the case."""
     problem = Analytic((Variable("a", 0.5, 4.0, 3.5, "m"), Variable("b", 0.5, 4.0, 1.2, "m")), two_throats)
     found, tried = search(problem, "mass down", f"flow at {HEAD} Pa at least 1 m^3/s")
     design = found.from_start(starts_of(problem, 8)[start], 60)
-    if start and isinstance(tried[0], str):
-        assert "shut" in tried[0]
-        return
     assert design.holds and design.values == pytest.approx((2**0.5, 2**0.5), rel=2e-3)
     assert design.aim == pytest.approx(8**0.5, rel=1e-3) and len(tried) < 60
 
