@@ -481,11 +481,15 @@ class _MotionSeries:
     def __init__(self, forms, residual, omega: float, border, row, unit: float):
         self._forms, self._residual, self._border, self._row = forms, residual, border, row
         self.omega, self._unit, self.rest = omega, unit, np.asarray(forms.rest, float)
+        #: Terms of the motion (m + 1, n) by harmonics, of order m = 1, 2, ...; coefficients of the amplitude equation.
+        self.terms: list[np.ndarray] = []
+        self.g: list[complex] = []
+        self._still: np.ndarray | float = 0.0  # what the steady state leaves
+        self._still = self._left(self._wave(0.0, 1), omega)[0]
         self._first = Bordered(self._pencil(1), border, row.astype(complex))
         first = self._first.solve(np.append(np.zeros(len(border), complex), 0.5))
-        self._still = self._left(self._wave(0.0, 1), omega)[0]
-        #: Terms of the motion (m + 1, n) by harmonics, of order m = 1, 2, ...; coefficients of the amplitude equation.
-        self.terms, self.g = [np.stack([0 * first[:-1], first[:-1]])], [complex(first[-1])]
+        self.terms.append(np.stack([0 * first[:-1], first[:-1]]))
+        self.g.append(complex(first[-1]))
 
     def _pencil(self, k: int):
         return self._forms.pencil(1j * k * self.omega)
@@ -507,7 +511,7 @@ class _MotionSeries:
                 self.g.append(g)
 
     def _defect(self, r: float, order: int) -> np.ndarray:
-        """What the motion without terms of an order leaves, over ``r**order``."""
+        """Residual (H + 1, n) of the motion without terms of an order, over ``r**order``."""
         left = self._left(self._wave(r, order), self.omega)
         left[1] += self._border * sum(g * r ** (2 * m + 1) for m, g in enumerate(self.g))
         return left / r**order
@@ -529,7 +533,7 @@ class _MotionSeries:
         """Harmonics (count + 1, n) of the motion at an amplitude."""
         wave = np.zeros((count + 1, len(self.rest)), complex)
         wave[0] = self.rest
-        for m, term in enumerate(getattr(self, "terms", ()), 1):
+        for m, term in enumerate(self.terms, 1):
             wave[: m + 1] += r**m * term
         return wave
 
@@ -539,12 +543,12 @@ class _MotionSeries:
         """
         h = Harmonics(len(wave) - 1, 2 * len(wave) + 3)
         left = h.complex(h.project(self._residual(PeriodicMotion(h, h.real(wave), omega))))
-        left[0] -= getattr(self, "_still", 0.0)
+        left[0] -= self._still
         return left
 
     def correction(self, equation: AmplitudeEquation) -> float:
-        """What the residual of the cycle asks for: of the even harmonics first, then of the odd ones with them mended;
-        the amplitude by the slope of the cubic equation.
+        """Correction that the residual of the cycle asks for: of the even harmonics first, then of the odd ones with
+        them mended; the amplitude by the slope of the cubic equation.
         """
         r, count = equation.amplitude, len(self.terms)
         if np.isnan(r):

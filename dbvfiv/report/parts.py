@@ -148,7 +148,7 @@ def onset_part(found: Gathered) -> Part | None:
     """Heads at which chatter begins or ends, located."""
     result, title = found.get("onset"), "Heads at which chatter begins or ends"
     if result is None:
-        return not_there(found, "onset", title) if "onset" in found.missing and "onset" not in found.not_asked else None
+        return not_there(found, "onset", title) if "onset" in found.failed else None
     row = found.case.units.parameter("pressure")
     head = (
         f"{_pressure_title(found)}, {row.shown_unit}",
@@ -199,8 +199,7 @@ def chance_part(found: Gathered) -> Part | None:
     """Probability of chatter and what decides it, where the case says how uncertain its numbers are."""
     result, title = found.get("chance"), "How likely chatter is, and what decides it"
     if result is None:
-        asked = "chance" in found.missing and "chance" not in found.not_asked
-        return not_there(found, "chance", title) if asked else None
+        return not_there(found, "chance", title) if "chance" in found.failed else None
     row = found.case.units.parameter(result.parameter)
     head = (
         f"{row.title}, {row.shown_unit}".rstrip(", "),
@@ -236,9 +235,7 @@ def cycle_part(found: Gathered) -> Part | None:
     """The limit cycle from its onset to this state; nothing where the state is stable."""
     result = found.get("cycle")
     if result is None or not result.points:
-        return (
-            not_there(found, "cycle", _CYCLES) if "cycle" in found.missing and "cycle" not in found.not_asked else None
-        )
+        return not_there(found, "cycle", _CYCLES) if "cycle" in found.failed else None
     units, here = found.case.units, Mu.of(found.case)[result.parameter]
     row, size, unit = units.parameter(result.parameter), units.factor("size"), units.name("size")
     rows = tuple(

@@ -165,7 +165,7 @@ def test_limit_points_bound_the_pressures_with_several_equilibria(model, path):
 
 @pytest.mark.slow
 def test_cracking_head_that_is_asked_for_is_found(model):
-    """Of the coarse bill a small head; rows of such a mesh part one by one, so that larger heads have gaps."""
+    """A coarse bill is asked a small head; rows of such a mesh part one by one, so that larger heads have gaps."""
     head = 0.09
     case = model.case.replace({"valve.sealing_pressure": None, "valve.cracking_head": head})
     sealing = sealing_for_cracking(case, 2.0)

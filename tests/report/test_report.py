@@ -205,7 +205,7 @@ def test_a_strain_level_that_the_case_has_is_no_other_one():
 
 
 def test_heads_at_which_the_bill_is_sealed_have_rows_without_losses(made):
-    """Those that open keep their losses."""
+    """Heads that open keep their losses."""
     case = load_case("cases/dbv12-moulded.toml")
     losses = SimpleNamespace(head_loss=0.9, loss_coefficient=1234.0, kv=20.0, cv=23.0, line_loss=0.1)
     states = [

@@ -15,7 +15,6 @@ from scipy.stats import kstest
 
 from ...case.distribution import Distribution
 from ...case.parameters import PARAMETERS
-from ...case.quantity import head_of
 from ...case.write import case_toml
 from ...errors import CaseError, SolveError
 from ...record.mesh import MeshData
@@ -399,8 +398,7 @@ class IdentifyResult(StudyResult):
 
     def _value(self, value: float) -> str:
         row = PARAMETERS[self.places.parameter]
-        head = f" ({head_of(value, self.case.fluid.density):.3g} m)" if row.name == "pressure" else ""
-        return f"{row.amount(float(f'{value:.4g}'))}{head}"
+        return f"{row.amount(float(f'{value:.4g}'))}{self.places.head(row.name, value)}"
 
     def _further_said(self, row: dict[str, Any]) -> str:
         where = f"the mode near {row['frequency']:.3g} Hz at {self._value(row['value'])}"

@@ -186,9 +186,12 @@ class Places:
         """A place for people."""
         said = []
         for name, value in self.moved[place].items():
-            head = f" ({head_of(value, self.case.fluid.density):.3g} m)" if name == "pressure" else ""
-            said.append(f"{PARAMETERS[name].text(value)}{head}")
+            said.append(f"{PARAMETERS[name].text(value)}{self.head(name, value)}")
         return ", ".join(said) or "the state of the case"
+
+    def head(self, name: str, value: float) -> str:
+        """Head of a pressure, to stand behind it; empty for other parameters."""
+        return f" ({head_of(value, self.case.fluid.density):.3g} m)" if name == "pressure" else ""
 
 
 class Modes(NamedTuple):

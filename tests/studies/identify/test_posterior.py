@@ -34,7 +34,7 @@ def test_posterior_and_evidence_of_a_linear_model(error):
 
 
 def test_both_regions_of_a_posterior_have_their_weights():
-    """The same measurement of |z|, with a prior slope from a second one: weights by the densities of both."""
+    """Posterior of a measurement of |z|, with a prior slope from a second one: weights by the densities of both."""
 
     def two(z):
         return norm.logpdf(np.abs(z[:, 0]), 1.5, 0.03) + norm.logpdf(z[:, 0], 2.0, 3.0)
@@ -69,7 +69,7 @@ def test_inputs_that_only_a_sum_is_known_of_are_confounded():
 
 
 def test_the_variance_left_by_a_further_measurement():
-    """Of z1 from a measurement of z1 + z2 with a standard error s: 1 - 1 / (2 + s^2)."""
+    """Variance of z1 left by a measurement of z1 + z2 with a standard error s: 1 - 1 / (2 + s^2)."""
     z = np.random.default_rng(5).standard_normal((20000, 2))
     left = expected_variance(z[:, :1], z.sum(axis=1)[:, None], np.array([0.5]))
     assert left[0] == pytest.approx(1 - 1 / 2.25, abs=0.01)

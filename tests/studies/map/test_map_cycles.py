@@ -81,7 +81,7 @@ def test_amplitudes_of_the_reduced_manifold(law, pressure, density):
 
 
 def test_amplitudes_near_onset_need_no_branch(found, monkeypatch):
-    """The same cells as branches give, without one; the branch is not asked for."""
+    """Cells are those that branches give, without one; the branch is not asked for."""
     monkeypatch.setattr(Follower, "begin", None)
     again = session_of(map__cycles=False, map__amplitude=True, map__y="density=225:255:3").perform("map")
     assert (np.isfinite(again.cycle_grid("residual")) == np.isfinite(found.cycle_grid("amplitude"))).all()
