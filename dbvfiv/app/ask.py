@@ -100,6 +100,10 @@ class AskPanel:
         self._file = file
         self._task = asyncio.create_task(self._follow(file, values or {}))
 
+    def values_of(self, file: Path | None) -> dict[str, float]:
+        """Values of the sliders, SI, where they are those of a case file; empty where it is another."""
+        return self.values if file == self._file else {}
+
     def go(self, values: dict[str, float]) -> None:
         """Move sliders to values, SI, as far as they reach."""
         for name, value in values.items():
@@ -155,7 +159,7 @@ class AskPanel:
             self._confirming = asked if worker is confirmer else self._confirming
             if await self._is_moved_before(asked):
                 return
-            self._show(asked.result())
+            self._show(asked.result(), step == "margin")
 
     async def _is_moved_before(self, task: asyncio.Task | None) -> bool:
         """Wait for a task; True where a slider moves before it is done."""
@@ -199,15 +203,17 @@ class AskPanel:
         if value is not None:
             self.go({name: value * self._rows[name]["scale"]})
 
-    def _show(self, found: dict[str, Any]) -> None:
+    def _show(self, found: dict[str, Any], whole: bool = False) -> None:
+        """Show an answer; where it is whole, what it lacks is not to be had."""
         verdict, state = found["verdict"], found["state"]
         for _, name, factor, unit in NUMBERS:
             self._numbers[
                 name
             ].content = f"<b data-name='{name}' data-si='{state[name]!r}'>{_short(state[name] * factor)} {unit}</b>"
         ratio, margin = verdict["damping_ratio"], verdict["critical_damping_factor"]
+        missing = "none found" if whole else "–"
         self._margin.content = f"<b>{'–' if ratio is None else f'{100 * ratio:.3g} %'}</b>"
-        self._factor.content = f"<b>{'–' if margin is None else f'{margin:.3g} × damping'}</b>"
+        self._factor.content = f"<b>{missing if margin is None else f'{margin:.3g} × damping'}</b>"
         self._verdict.text = verdict["outcome"].capitalize()
         bound = "" if found["bound"] is None else f", within {max(found['bound'], 1e-9):.0e} of an eigenvalue"
         self._mark.text = "confirmed by the full model" if found["confirmed"] else f"predicted{bound}"

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import asyncio
+import copy
+import filecmp
 import hashlib
 import re
 from collections.abc import Callable
@@ -11,13 +13,13 @@ from typing import Any
 
 from nicegui import events, ui
 
-from ..case.section import Section
+from ..case.load import put
 from ..errors import CaseError
 from ..studies.case import Case
 from .ask import AskPanel
 from .processes import Run
 from .see import RunsPanel, SeePanel
-from .sheet import FORM, Checked, change, check, given, read_sheet, write_sheet
+from .sheet import FORM, Checked, change, check, given, read_sheet, stay_inside, usual_value, write_sheet
 
 #: Valves to start from: those of the source tree, and of the folder that the server was started in.
 SHELVES = (Path(__file__).parents[2] / "cases", Path("cases").resolve())
@@ -36,7 +38,7 @@ body { font-family: 'DejaVu Sans', Arial, sans-serif; background: #f6f7f9 }
 .number { background: white; border-radius: 6px; padding: 8px 10px } .number b { font-size: 1.25rem; display: block }
 .text { white-space: pre; overflow-x: auto; font: 12px 'DejaVu Sans Mono', monospace; max-width: 100%; width: 100% }
 .predicted, .confirmed { border-left: 4px solid #d98200; padding-left: 10px } .confirmed { border-color: #2e7d32 }
-.q-tab-panel { padding: 12px } .nicegui-content { padding: 0 }
+.q-uploader__subtitle { display: none } .q-tab-panel { padding: 12px } .nicegui-content { padding: 0 }
 """
 
 
@@ -104,9 +106,8 @@ class Page:
         try:
             if left.exists() and not (begins and self.site.start is not None):
                 self.take(left.read_text(encoding="utf-8"), "valve")
-            elif self.site.start is not None and self.site.start.suffix == ".h5":
-                text = await self.site.workers.drawing.ask("case_of", path=str(self.site.start))
-                self.take(text, self.site.start.stem)
+            elif self.site.start is not None and self.site.start.suffix.lower() == ".h5":
+                self.take_case_of(await self._result_of_start(self.site.start))
             elif self.site.start is not None:
                 self.start_from(self.site.start)
             else:
@@ -150,6 +151,44 @@ class Page:
             if (path.parent / name).is_file():
                 (self.home / name).write_bytes((path.parent / name).read_bytes())
         self.take(text, path.stem)
+
+    async def keep_result(self, name: str, content: Path | bytes) -> Run:
+        """Keep a result file, or what one holds, among the runs.
+
+        Raises
+        ------
+        CaseError
+            For what is no result, and where a user has too many.
+        """
+        run = self.site.runs.keep(self.home, name, content)
+        try:
+            found = await self.site.workers.drawing.ask("header", path=str(run.page))
+            if isinstance(content, bytes):
+                stay_inside(read_sheet(found["case"]))
+        except CaseError:
+            self.site.runs.delete(self.home, run)
+            raise
+        run.case.write_text(found["case"], encoding="utf-8")
+        run.kind = found["kind"]
+        run.keep()
+        return run
+
+    async def _result_of_start(self, path: Path) -> Run:
+        """Run of the result file that the server was started with, which is kept once."""
+        kept = (run for run in self.site.runs.of(self.home) if run.title == path.name and run.page.exists())
+        found = next((run for run in kept if filecmp.cmp(run.page, path, shallow=False)), None)
+        return found or await self.keep_result(path.name, path)
+
+    def take_case_of(self, run: Run) -> None:
+        """Take the valve of a run, unless it is that on the page.
+
+        Raises
+        ------
+        CaseError, OSError
+        """
+        text = run.case.read_text(encoding="utf-8")
+        if read_sheet(text) != self.data:
+            self.take(text, Path(run.title.rpartition(" of ")[2]).stem)
 
     def typed(self, key: str, text: str) -> None:
         """Take what was typed for a key."""
@@ -237,7 +276,7 @@ class Page:
                 self._form()
                 self._parts()
                 with ui.expansion("All keys as text").classes("full"):
-                    self._text = ui.textarea().classes("full").props("autogrow").style("font-family: monospace")
+                    self._text = ui.textarea().classes("full").props("rows=16").style("font-family: monospace")
                     ui.button("Take this text", on_click=lambda: self._attempt(self.take, self._text.value, self.name))
             with ui.column():
                 self._picture = ui.image().classes("drawing full")
@@ -252,18 +291,13 @@ class Page:
 
     def _field(self, key: str, label: str) -> None:
         section, name = key.split(".")
-        part = Case.model_fields[section].annotation
-        field = part.model_fields[name] if issubclass(part, Section) else None
-        default = getattr(getattr(_DEFAULT, section), name)
-        shown = "" if default is None else f"{default:g}" if isinstance(default, float) else str(default)
-        box = (
-            ui.input(label, value=given(self.data, key), placeholder=shown)
-            .props("dense stack-label")
-            .props(f'data-at="{key}"')
-        )
+        usual = getattr(_DEFAULT, section)
+        default, told = usual_value(usual, name), type(usual).model_fields[name].description
+        box = ui.input(label, value=given(self.data, key), placeholder="" if default is None else str(default))
+        box.props(f'dense stack-label data-at="{key}"')
         box.on_value_change(lambda event: self.typed(key, event.value or ""))
-        if field is not None and field.description:
-            box.tooltip(field.description)
+        if told:
+            box.tooltip(told)
 
     @ui.refreshable_method
     def _parts(self) -> None:
@@ -278,7 +312,7 @@ class Page:
                 ui.label(f"{name}: " + ", ".join(f"{key} {value}" for key, value in card.items())).classes("note")
             with ui.row().style("align-items: center; gap: 8px"):
                 name = ui.input("Name").props("dense").style("width: 100px").props('data-at="rubber"')
-                shore = ui.input("Hardness, Shore A").props("dense").style("width: 120px").props('data-at="hardness"')
+                shore = ui.input("Hardness, Shore A").props("dense").style("width: 150px").props('data-at="hardness"')
                 test = ui.select(["", *self._data_files()], label="or its test").style("width: 130px")
                 loss = ui.input("Loss factor").props("dense").style("width: 90px")
                 ui.button(
@@ -291,16 +325,16 @@ class Page:
     def _rows(self, heading: str, key: str, names: tuple[str, ...]) -> None:
         """Table of a list of the case, with its default where it is not given."""
         table, _, last = key.rpartition(".")
-        holder = self.data if not table else self.data.get(table, {})
+        holder = self.data if not table else self.data.get(table)
         rows = holder.get(last) if isinstance(holder, dict) else None
         if not isinstance(rows, list):
             default = getattr(getattr(_DEFAULT, table), last) if table else getattr(_DEFAULT, last)
-            rows = [row.model_dump(mode="json") for row in default]
+            rows = [{name: usual_value(row, name) for name in row.model_fields_set} for row in default]
 
         def resize(removed: int | None) -> None:
             kept = [row for number, row in enumerate(rows) if number != removed]
-            kept += [dict(kept[-1])] if removed is None and kept else []
-            (self.data.setdefault(table, {}) if table else self.data)[last] = kept
+            kept += copy.deepcopy(kept[-1:]) if removed is None else []
+            self._attempt(put, Case, self.data, key, kept)
             self._parts.refresh()
             self.changed()
 
@@ -322,7 +356,7 @@ class Page:
         card |= {"kind": "fit", "path": test} if test else {"kind": "neo-hookean", "shear_modulus": f"{shore} Shore A"}
         if loss:
             card["loss_factor"] = float(loss) if re.fullmatch(r"[\d.]+", loss) else loss
-        self.data.setdefault("materials", {})[name] = card
+        self._attempt(put, Case, self.data, f"materials.{name}", card)
         self._parts.refresh()
         self.changed()
 

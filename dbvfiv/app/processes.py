@@ -23,8 +23,10 @@ from ..errors import CaseError
 
 #: Valves whose workers are kept; results of one user that are kept, and of them waiting; time of a run, s.
 VALVES, KEPT, WAITING, LONGEST = 3, 40, 8, 6 * 3600.0
-#: Time for an answer of a worker, s.
-PATIENCE = 300.0
+#: Time for an answer of a worker, and for a run to end that was asked to, s.
+PATIENCE, STUBBORN = 300.0, 5.0
+#: File of a record in the folder of its run; no data file of a case has such a name.
+RECORD = ".record.csv"
 #: Largest line of an answer, bytes.
 LINE = 64 << 20
 #: Added to the priority number of processes that nobody's hand waits for.
@@ -191,6 +193,11 @@ class Run:
         return self.folder / ("report.html" if self.kind == "report" else "result.h5")
 
     @property
+    def case(self) -> Path:
+        """Case file."""
+        return self.folder / "case.toml"
+
+    @property
     def can_resume(self) -> bool:
         """True where it was ended before its end."""
         return self.state in ("cancelled", "interrupted") and self.process is None
@@ -236,16 +243,18 @@ class Run:
                 said += [line.rsplit("\r", 1)[-1].rstrip() for line in text.split("\n")]
         return "\n".join(line for line in said if line and not re.search(r"\d%\|", line))
 
-    def command(self) -> list[str]:
-        """Command line; one that was begun goes on in its file."""
-        base = [sys.executable, "-m", "dbvfiv"]
+    def commands(self) -> list[list[str]]:
+        """Command lines, one after another; a study that was begun goes on in its file."""
         if self.kind == "report":
-            return [*base, "report", "case.toml", "-o", "report.html", "--workers", "1", *self.arguments]
+            return [["report", "case.toml", "-o", "report.html", "--workers", "1", *self.arguments]]
         if self.kind == "verdict":
-            return [*base, "verdict", *self.arguments]
+            return [["verdict", RECORD, "--plots", "figures"]]
+        if self.kind == "compare":
+            beside = ["compare", RECORD, "result.h5", "-o", "figures/record.png"]
+            return [["modes", "case.toml", "-o", "result.h5", *self.arguments], beside]
         if (self.folder / "result.h5").exists():
-            return [*base, "resume", "result.h5"]
-        return [*base, self.kind, "case.toml", "-o", "result.h5", *self.arguments]
+            return [["resume", "result.h5"]]
+        return [[self.kind, "case.toml", "-o", "result.h5", *self.arguments]]
 
 
 class Runs:
@@ -278,18 +287,36 @@ class Runs:
         CaseError
             Where a user has too many.
         """
-        known = self.of(folder)
-        if sum(run.state in ("waiting", "running") for run in known) >= WAITING:
+        if sum(run.state in ("waiting", "running") for run in self.of(folder)) >= WAITING:
             raise CaseError(f"{WAITING} runs are waiting already; cancel one or wait.")
-        if len(known) >= KEPT:
+        run = self._make(folder, kind, title, files, arguments)
+        self._enqueue(run)
+        return run
+
+    def keep(self, folder: Path, title: str, result: Path | bytes) -> Run:
+        """Keep a result file that was made elsewhere beside the runs; its kind is to be told yet.
+
+        Raises
+        ------
+        CaseError
+            Where a user has too many.
+        """
+        run = self._make(folder, "", title, {"result.h5": result}, [])
+        run.state = "done"
+        return run
+
+    def _make(self, folder: Path, kind: str, title: str, files: dict[str, Path | bytes], arguments: list[str]) -> Run:
+        if len(self.of(folder)) >= KEPT:
             raise CaseError(f"{KEPT} results are kept already; delete some.")
         own = folder / "runs" / f"{time.time_ns():x}-{secrets.token_hex(3)}"
         own.mkdir(parents=True)
         for name, content in files.items():
-            (own / name).write_bytes(content)
+            if isinstance(content, Path):
+                shutil.copyfile(content, own / name)
+            else:
+                (own / name).write_bytes(content)
         run = Run(own, kind, title, arguments, made=time.time())
         self._known[folder][run.name] = run
-        self._enqueue(run)
         return run
 
     def resume(self, run: Run) -> None:
@@ -310,7 +337,8 @@ class Runs:
         if run.state in ("waiting", "running"):
             run.state = "cancelled"
             run.keep()
-            self._start(_insist(run))
+            if run.process is not None:
+                self._start(_insist(run.process))
 
     def delete(self, folder: Path, run: Run) -> None:
         """End a run and delete its folder."""
@@ -333,17 +361,11 @@ class Runs:
         try:
             run.state, run.started = "running", time.time()
             run.keep()
-            environment = surroundings(DBVFIV_BAR="1", COLUMNS="100")
+            status = 0
             with open(run.folder / "output.txt", "wb") as out, open(run.folder / "errors.txt", "wb") as errors:
-                run.process = await asyncio.create_subprocess_exec(
-                    *run.command(), cwd=run.folder, env=environment, stdout=out, stderr=errors, start_new_session=True
-                )
-                _put_behind(run.process.pid, BEHIND)
-                try:
-                    status = await asyncio.wait_for(run.process.wait(), LONGEST)
-                except TimeoutError:
-                    self.cancel(run)
-                    status = await run.process.wait()
+                for command in run.commands():
+                    if run.state == "running" and status == 0:
+                        status = await self._carry_out(run, command, out, errors)
             if run.state == "running":
                 run.state = "done" if status == 0 else "interrupted" if status in (130, 143, -9, -15) else "failed"
         except OSError:
@@ -355,28 +377,38 @@ class Runs:
                 run.keep()
             self._next()
 
-    def end(self) -> None:
-        """End all runs; those that ran are interrupted, and go on when they are resumed."""
-        for run in self._running:
-            _signal(run, signal.SIGTERM)
+    async def _carry_out(self, run: Run, command: list[str], out: Any, errors: Any) -> int:
+        """Exit status of a command line of a run."""
+        line = (sys.executable, "-m", "dbvfiv", *command)
+        streams = {"stdin": asyncio.subprocess.DEVNULL, "stdout": out, "stderr": errors, "start_new_session": True}
+        environment = surroundings(DBVFIV_BAR="1", COLUMNS="100")
+        run.process = await asyncio.create_subprocess_exec(*line, cwd=run.folder, env=environment, **streams)
+        _put_behind(run.process.pid, BEHIND)
+        if run.state != "running":  # cancelled while it was being started
+            self._start(_insist(run.process))
+        try:
+            return await asyncio.wait_for(run.process.wait(), LONGEST)
+        except TimeoutError:
+            self.cancel(run)
+            return await run.process.wait()
+
+    async def end(self) -> None:
+        """End all runs; those that ran or waited are interrupted, and go on when they are resumed."""
+        self._queue.clear()
+        await asyncio.gather(*(_insist(run.process) for run in self._running if run.process is not None))
 
 
-async def _insist(run: Run) -> None:
-    """End the process of a run: it is asked, asked again where a library has swallowed that, and killed."""
-    process = run.process
-    for number, patience in ((signal.SIGTERM, 5.0), (signal.SIGTERM, 10.0), (signal.SIGKILL, 0.0)):
-        if run.process is process:
-            _signal(run, number)
-            await asyncio.sleep(patience)
+async def _insist(process: asyncio.subprocess.Process) -> None:
+    """End a process: it is asked, asked again where a library has swallowed that, and killed."""
+    for number in (signal.SIGTERM, signal.SIGTERM, signal.SIGKILL):
+        if process.returncode is None:
+            with contextlib.suppress(ProcessLookupError):
+                os.killpg(process.pid, number)
+            with contextlib.suppress(TimeoutError):
+                await asyncio.wait_for(process.wait(), STUBBORN)
 
 
 def _put_behind(pid: int, nice: int) -> None:
     """Let other processes go first."""
     with contextlib.suppress(OSError, AttributeError):  # ended already, or a system without priorities
         os.setpriority(os.PRIO_PROCESS, pid, os.getpriority(os.PRIO_PROCESS, 0) + nice)
-
-
-def _signal(run: Run, number: signal.Signals) -> None:
-    if run.process is not None and run.process.returncode is None:
-        with contextlib.suppress(ProcessLookupError):
-            os.killpg(run.process.pid, number)

@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
+import asyncio
 import time
 from typing import Any
 
 from nicegui import events, ui
 
+from ..case.parameters import PARAMETERS
 from ..errors import CaseError
 from ..studies import KINDS
 from .ask import COLOUR_BAR
-from .processes import Run
+from .processes import RECORD, Run
 
-#: Time between two looks at the runs, s.
-LOOK = 1.0
+#: Time between two looks at the runs, s; largest record or result, bytes.
+LOOK, LARGEST = 1.0, 15 << 20
 #: Pictures of a valve: title, study, and its arguments; low and high are heads, Pa, damping a range of the damping.
 PICTURES = {
     "Head-loss curve": ("steady", ("-p", "{kpa_low:.6g} kPa:{kpa_high:.6g} kPa:10")),
@@ -54,7 +56,8 @@ class RunView:
                 self._state = ui.label().classes("note").props('data-at="state"')
                 self._cancel = ui.button("Cancel", on_click=lambda: page.site.runs.cancel(run)).props("flat dense")
                 self._resume = ui.button("Resume", on_click=lambda: page.site.runs.resume(run)).props("flat dense")
-                self._open = ui.button("Open", on_click=self._show).props("flat dense")
+                self._open = ui.button("Open", on_click=self.show).props("flat dense")
+                self._valve = ui.button("Its valve", on_click=self._take_case).props("flat dense")
                 ui.button("Delete", on_click=self._delete).props("flat dense")
             self._bar = ui.linear_progress(0, show_value=False).classes("full")
             self._body = ui.column().classes("full")
@@ -64,20 +67,30 @@ class RunView:
         """Bring bar and buttons up to date."""
         run, live = self.run, self.run.state in ("running", "waiting")
         share, said = run.progress() if run.state == "running" else (float(run.state == "done"), "")
-        took = f" in {run.ended - run.started:.0f} s" if run.state == "done" else ""
+        took = f" in {run.ended - run.started:.0f} s" if run.state == "done" and run.started else ""
         if run.state == "running" and not said:
             said = f"{time.time() - run.started:.0f} s"
         self._state.text = f"{run.state}{took}{': ' if said else ''}{said}"
         self._bar.value = share
         self._bar.visible, self._cancel.visible = live, live
         self._resume.visible = run.can_resume
-        self._open.visible = run.state in ("done", "failed", "cancelled", "interrupted")
+        self._open.visible = not live
+        self._valve.visible = run.case.exists()
+
+    def _take_case(self) -> None:
+        try:
+            self.page.take_case_of(self.run)
+        except (CaseError, OSError) as error:
+            self.page.tell(str(error))
+            return
+        self.page.panels.value = "Describe"
 
     def _delete(self) -> None:
         self.page.site.runs.delete(self.page.home, self.run)
         self.page.running.refresh()
 
-    async def _show(self) -> None:
+    async def show(self) -> None:
+        """Draw what the run found."""
         self._body.clear()
         with self._body:
             await show_result(self.page, self.run)
@@ -88,27 +101,30 @@ async def show_result(page: Any, run: Run) -> None:
     ui.label(run.output()).classes("text")
     if run.kind == "report" and run.page.exists():
         ui.link("Open the report", f"/files/{run.name}/report.html", new_tab=True)
+    figures = run.folder / "figures"
+    drawn = sorted(file.name for file in figures.glob("*.png"))
     if run.kind in KINDS and run.page.exists():
         try:
-            found = await page.site.workers.drawing.ask(
-                "result", path=str(run.page), figures=str(run.folder / "figures")
-            )
+            found = await page.site.workers.drawing.ask("result", path=str(run.page), figures=str(figures))
         except CaseError as error:
             ui.label(str(error)).classes("wrong")
             return
+        if not run.output():  # of a result that was made elsewhere
+            ui.label("\n".join(found["lines"])).classes("text")
         if run.kind == "map" and found["summary"].get("growth_rate"):
-            show_map(page, found["summary"])
+            show_map(page, run, found["summary"])
+        drawn = found["figures"]
         with ui.row():
             for name in found["tables"]:
                 ui.link(name, f"/files/{run.name}/figures/{name}").props("download")
             ui.link("result.h5", f"/files/{run.name}/result.h5").props("download")
-        for name in found["figures"]:
-            address = f"/files/{run.name}/figures/{name}?{run.page.stat().st_mtime_ns}"
-            with ui.link(target=address).props(f'download="{name}" title="Save this figure"').classes("drawing full"):
-                ui.html(f'<img src="{address}" alt="{name}">', sanitize=False).classes("drawing full")
+    for name in drawn:
+        address = f"/files/{run.name}/figures/{name}?{(figures / name).stat().st_mtime_ns}"
+        with ui.link(target=address).props(f'download="{name}" title="Save this figure"').classes("drawing full"):
+            ui.html(f'<img src="{address}" alt="{name}">', sanitize=False).classes("drawing full")
 
 
-def show_map(page: Any, found: dict[str, Any]) -> None:
+def show_map(page: Any, run: Run, found: dict[str, Any]) -> None:
     """Draw a stability map with neutral curves and the star of the installation; a click goes to a cell."""
     axes, grid = (found["x"], found["y"]), found["growth_rate"]
     names = [axis["parameter"] for axis in axes]
@@ -136,6 +152,7 @@ def show_map(page: Any, found: dict[str, Any]) -> None:
         if point.get("x") is None:
             return
         values = {name: float(point[axis]) * row["scale"] for name, row, axis in zip(names, rows, "xy")}
+        page.take_case_of(run)
         page.panels.value = "Ask"
         page.asking.open(values)
 
@@ -157,21 +174,24 @@ class SeePanel:
     def build(self) -> None:
         """Draw the panel."""
         with ui.row():
-            for title in PICTURES:
-                ui.button(title, on_click=lambda _, title=title: self._ask(title)).props(f'data-at="see {title}"')
+            buttons = {title: ui.button(title, on_click=lambda _, title=title: self._ask(title)) for title in PICTURES}
+        self._chance = buttons["Probability of chatter"]
         ui.label("Each is a run, which waits in its turn and is kept.").classes("note")
         self._views: dict[str, RunView] = {}
+        self._awaited: set[Run | None] = set()
         self._list = ui.column().classes("full")
         ui.timer(LOOK, self.refresh)
 
     def _ask(self, title: str) -> None:
         case = self.page.checked.case
         arguments = [] if case is None else arguments_of(case, title)
-        self.page.run(PICTURES[title][0], title, arguments)
+        self._awaited.add(self.page.run(PICTURES[title][0], title, arguments))
         self.refresh()
 
     def refresh(self) -> None:
         """Bring the list up to date: the newest of each picture."""
+        case = self.page.checked.case
+        self._chance.visible = case is not None and bool(case.uncertainty.model_fields_set)
         newest: dict[str, Run] = {}
         for run in self.page.site.runs.of(self.page.home):
             if run.title in PICTURES:
@@ -182,6 +202,9 @@ class SeePanel:
                 self._views = {title: RunView(self.page, run) for title, run in newest.items()}
         for view in self._views.values():
             view.look()
+            if view.run.state == "done" and view.run in self._awaited:
+                self._awaited.discard(view.run)
+                asyncio.create_task(view.show())
 
 
 class RunsPanel:
@@ -202,7 +225,9 @@ class RunsPanel:
             kinds = ["report", *KINDS]
             self._kind = ui.select(kinds, value="report", label="Run").style("min-width: 140px").props('data-at="kind"')
             ui.button("Add to the queue", on_click=self._add).props('data-at="add"')
-            drop = ui.upload(label="Drop a record", auto_upload=True, max_file_size=10 << 20, on_upload=self._judge)
+            drop = ui.upload(
+                label="Drop a record or result", auto_upload=True, max_file_size=LARGEST, on_upload=self._take
+            )
             drop.props("flat bordered").style("width: 230px; max-height: 56px")
         ui.label("What a study takes stands in its section of the case: Describe, all keys as text.").classes("note")
         self._list = ui.column().classes("full")
@@ -212,14 +237,21 @@ class RunsPanel:
         self.page.run(self._kind.value, f"{self._kind.value} of {self.page.name}", [])
         self.refresh()
 
-    async def _judge(self, event: events.UploadEventArguments) -> None:
-        content = await event.file.read()
+    async def _take(self, event: events.UploadEventArguments) -> None:
+        """Keep a result; judge a record, beside the modes of the valve at the values of the sliders."""
+        content, name, page = await event.file.read(), event.file.name[:40], self.page
         event.sender.reset()
         try:
-            files = {"record.csv": content}
-            self.page.site.runs.add(
-                self.page.home, "verdict", f"verdict of {event.file.name[:40]}", files, ["record.csv"]
-            )
+            if name.lower().endswith(".h5"):
+                await page.keep_result(name, content)
+            elif page.checked.case is None:
+                page.site.runs.add(page.home, "verdict", f"verdict of {name}", {RECORD: content}, [])
+            else:
+                moved = [
+                    f"--set={PARAMETERS[key].key}={value!r}" for key, value in page.asking.values_of(page.file).items()
+                ]
+                files = page.files() | {RECORD: content}
+                page.site.runs.add(page.home, "compare", f"{name} beside the modes of {page.name}", files, moved)
         except (CaseError, OSError) as error:
             self.page.tell(str(error))
         self.refresh()

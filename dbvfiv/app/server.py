@@ -205,7 +205,7 @@ def build(site: Site, token: str, password: str = "") -> FastAPI:
     @asynccontextmanager
     async def lifespan(_: FastAPI):
         yield
-        site.runs.end()
+        await site.runs.end()
         site.workers.end()
 
     app = FastAPI(docs_url=None, redoc_url=None, openapi_url=None, lifespan=lifespan)

@@ -9,7 +9,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from ..case.describe import quantity_of
 from ..case.load import make_case, parse_toml, put, toml_value
+from ..case.section import Section
 from ..errors import CaseError
 from ..studies.case import Case, contradictions, oddities
 
@@ -126,6 +128,12 @@ def given(data: Mapping[str, Any], key: str) -> str:
     return "" if value is None else value if isinstance(value, str) else _value(value)
 
 
+def usual_value(section: Section, name: str) -> Any:
+    """Value of a key of a section as a case file has it, with its unit."""
+    value, quantity = getattr(section, name), quantity_of(type(section).model_fields[name])
+    return quantity.show(value) if quantity is not None and isinstance(value, (int, float)) else value
+
+
 def change(data: dict[str, Any], key: str, text: str) -> None:
     """Set a key to what was typed; an empty text takes it away.
 
@@ -139,14 +147,18 @@ def change(data: dict[str, Any], key: str, text: str) -> None:
     *path, last = key.split(".")
     table: Any = data
     for part in path:
-        table = table[int(part)] if isinstance(table, list) else table.get(part, {})
-    table.pop(last, None)
+        if isinstance(table, list):
+            table = table[int(part)] if part.isdigit() and int(part) < len(table) else None
+        else:
+            table = table.get(part) if isinstance(table, dict) else None
+    if isinstance(table, dict):
+        table.pop(last, None)
 
 
 def check(data: Mapping[str, Any], folder: Path, text: str = "") -> Checked:
     """Check data for a page: what ``dbvfiv case`` refuses, files outside a folder, and what is too large to run."""
     try:
-        _stay_inside(data)
+        stay_inside(data)
         case = make_case(Case, data, folder=folder, source="The case" if text else "", text=text)
         elements = case.mesh.around * case.mesh.along
         if elements > ELEMENTS:
@@ -161,7 +173,7 @@ def check(data: Mapping[str, Any], folder: Path, text: str = "") -> Checked:
         return Checked(None, (f"The case cannot be read ({type(error).__name__}).",))
 
 
-def _stay_inside(data: Mapping[str, Any]) -> None:
+def stay_inside(data: Mapping[str, Any]) -> None:
     """Refuse names of files outside the folder, and processes elsewhere.
 
     Raises

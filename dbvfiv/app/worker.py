@@ -65,9 +65,10 @@ class Desk:
         picture = base64.b64encode(drawn.getvalue()).decode()
         return {"picture": picture, "sizes": ValveSizes.of(model).lines(), "notes": list(model_warnings(model))}
 
-    def case_of(self, path: str) -> str:
-        """Case of a result file, as TOML."""
-        return case_toml(load_result(path).header.case, comments=False)
+    def header(self, path: str) -> dict[str, str]:
+        """Kind of a result file, and its case as TOML."""
+        found = load_result(path)
+        return {"kind": found.kind, "case": case_toml(found.header.case, comments=False)}
 
     def open(self, case: str) -> dict[str, Any]:
         """Open a case file; the parameters that can be moved, SI, with their rows of the table."""
@@ -204,7 +205,7 @@ def main() -> None:
         except queue.Empty:
             try:
                 idle = desk.explorer is not None and desk.explorer.prepare()
-            except (CaseError, SolveError):
+            except Exception:  # nobody asked for it; the question that comes to it is told
                 idle = False
             continue
         if line is None:

@@ -7,16 +7,18 @@ import sys
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import pyvista
 from scipy.interpolate import PchipInterpolator
 
 from ..drawing.style import kilopascals
 from ..errors import CaseError
 from ..record.mesh import MeshData
 from .bodies import SHAPES, Piece, Shape, WallFaces, shape_of
+
+if TYPE_CHECKING:
+    import pyvista
 
 #: STEP files are in millimetres.
 MILLIMETRES = 1e3
@@ -168,6 +170,8 @@ def triangulated(shape: Shape) -> pyvista.PolyData:
             triangles.append(found if sx * sy > 0 else found[:, ::-1])
             points.append(piece.points.reshape(-1, 3) * [sx, sy, 1.0] + 0.0)
             count += len(points[-1])
+    import pyvista
+
     joined, triangles = _joined(np.concatenate(points), np.concatenate(triangles))
     surface = pyvista.PolyData.from_regular_faces(joined, triangles)
     if shape.closed and not surface.is_manifold:

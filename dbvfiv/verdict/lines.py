@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 from scipy.ndimage import uniform_filter1d
-from scipy.stats import norm
+from scipy.special import erfcx
 
 from .series import Series
 
@@ -304,15 +304,20 @@ def _beyond(
     spread = max(np.sqrt(seen / max(np.count_nonzero(~(low | high)), 1)), 1e-9 * float(np.ptp(values)))
     for _ in range(8):  # expectation and maximisation for the noise, of which the rails hide the largest
         away = beyond / spread
-        hidden = len(away) + away @ np.exp(norm.logpdf(away) - norm.logsf(away))
+        hidden = len(away) + away @ _hazard(away)
         spread = max(np.sqrt((seen + spread**2 * hidden) / len(values)), 1e-9 * float(np.ptp(values)))
     wanted, weight = values.copy(), np.ones(len(values))
     for chosen, rail, sign in ((low, rails[0], -1.0), (high, rails[1], 1.0)):
         away = sign * (rail - model[chosen]) / spread
-        mean = np.exp(norm.logpdf(away) - norm.logsf(away))
+        mean = _hazard(away)
         weight[chosen] = np.maximum(mean * (mean - away), 1e-6)
         wanted[chosen] = model[chosen] + sign * spread * mean / weight[chosen]
     return wanted, weight
+
+
+def _hazard(value: np.ndarray) -> np.ndarray:
+    """Density of the standard normal distribution over its probability of more."""
+    return np.sqrt(2 / np.pi) / erfcx(value / np.sqrt(2))
 
 
 def _gram(whole: np.ndarray, weight: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

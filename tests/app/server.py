@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import base64
 import os
 import re
 import signal
@@ -139,6 +140,17 @@ class Tab:
         track = self.at(f"slide {name}").find_element("css selector", ".q-slider__track-container")
         offset = int((share - 0.5) * (track.size["width"] - 2))
         ActionChains(self.driver, duration=0).move_to_element_with_offset(track, offset, 0).click().perform()
+
+    def drop(self, name: str, content: bytes) -> None:
+        """Drop a file on the box of the panel that is shown."""
+        boxes = self.driver.find_elements("css selector", ".q-uploader")
+        box = next(box for box in boxes if box.is_displayed())
+        script = """const [box, name, data] = arguments, moved = new DataTransfer();
+            moved.items.add(new File([Uint8Array.from(atob(data), c => c.charCodeAt(0))], name));
+            const told = kind => new DragEvent(kind, {bubbles: true, cancelable: true, dataTransfer: moved});
+            box.dispatchEvent(told("dragover"));
+            setTimeout(() => box.querySelector(".q-uploader__dnd").dispatchEvent(told("drop")), 200);"""
+        self.driver.execute_script(script, box, name, base64.b64encode(content).decode())
 
     def number(self, name: str) -> float:
         """Number of the answer, SI."""

@@ -11,7 +11,6 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 from scipy.special import ndtri
-from scipy.stats import kstest
 
 from ...case.distribution import Distribution
 from ...case.parameters import PARAMETERS
@@ -448,6 +447,8 @@ def _modes_said(match: dict[str, Any]) -> str:
 
 def distribution_text(prior: Distribution, scores: np.ndarray) -> str:
     """Text of the distribution whose scores under the prior are samples (n,)."""
+    from scipy.stats import kstest
+
     mean, spread = float(scores.mean()), float(scores.std())
     a, b = prior.numbers[0], prior.numbers[-1]
     if prior.form in ("normal", "lognormal") and kstest((scores - mean) / spread, "norm").statistic < FORM:
