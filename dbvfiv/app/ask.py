@@ -177,7 +177,7 @@ class AskPanel:
             for name, row in self._rows.items():
                 scale, step = row["scale"], (row["high"] - row["low"]) / row["scale"] / STEPS
                 low, high, own = row["low"] / scale, row["high"] / scale, row["own"] / scale
-                moves = ", moves the state" if row["moves"] else ""
+                moves = " (changes the steady state)" if row["moves"] else ""
                 ui.label(f"{self.shown(name)['label']}{moves}").classes("note")
                 with ui.row().classes("full").style("flex-wrap: nowrap; align-items: center"):
                     slider = ui.slider(min=low, max=high, step=step, value=own).props(f'data-at="slide {name}"')
@@ -282,7 +282,11 @@ def _space(found: dict[str, Any], colour: str) -> dict[str, Any]:
     """Figure of the skin in space."""
     (x, y, z), (i, j, k) = zip(*found["points"]), zip(*found["triangles"])
     mesh = {"type": "mesh3d", "x": z, "y": x, "z": y, "i": i, "j": j, "k": k, "colorscale": "Cividis"}
-    mesh |= {"intensity": found["colours"][colour], "flatshading": True, "colorbar": COLOUR_BAR | {"title": colour}}
+    mesh |= {
+        "intensity": found["colours"][colour],
+        "flatshading": True,
+        "colorbar": COLOUR_BAR | {"title": {"text": colour}},
+    }
     camera = {"eye": {"x": -1.8, "y": -1.9, "z": 1.1}}
     scene = {"aspectmode": "data", "camera": camera, **{f"{a}axis": {"title": {"text": f"{n}, m"}} for a, n in _AXES}}
     layout = {"margin": {"l": 0, "r": 0, "t": 30, "b": 80}, "height": 480, "scene": scene}

@@ -33,6 +33,8 @@ body { font-family: 'DejaVu Sans', Arial, sans-serif; background: #f6f7f9 }
 .columns > * { flex: 1 1 340px; min-width: 0; max-width: 100% }
 .fields { display: grid; grid-template-columns: repeat(auto-fill, minmax(150px, 1fr)); gap: 4px 12px; width: 100% }
 .wrong { color: #b3261e; white-space: pre-line } .note { color: #5a5f66; white-space: pre-line }
+.figures { display: grid; grid-template-columns: repeat(auto-fit, minmax(min(100%, 520px), 1fr)); gap: 12px }
+.figures { width: 100% } .figures > * { max-width: 760px }
 .drawing img { width: 100%; background: white; border-radius: 6px } .full { width: 100% }
 .numbers { display: grid; grid-template-columns: repeat(auto-fill, minmax(130px, 1fr)); gap: 8px; width: 100% }
 .number { background: white; border-radius: 6px; padding: 8px 10px } .number b { font-size: 1.25rem; display: block }
@@ -168,7 +170,7 @@ class Page:
         except CaseError:
             self.site.runs.delete(self.home, run)
             raise
-        run.case.write_text(found["case"], encoding="utf-8")
+        (run.folder / f"{Path(name).stem}.toml").write_text(found["case"], encoding="utf-8")
         run.kind = found["kind"]
         run.keep()
         return run
@@ -188,7 +190,7 @@ class Page:
         """
         text = run.case.read_text(encoding="utf-8")
         if read_sheet(text) != self.data:
-            self.take(text, Path(run.title.rpartition(" of ")[2]).stem)
+            self.take(text, run.case.stem)
 
     def typed(self, key: str, text: str) -> None:
         """Take what was typed for a key."""
@@ -232,7 +234,7 @@ class Page:
     def files(self) -> dict[str, bytes]:
         """Case and data files of a run."""
         found = {path.name: path.read_bytes() for path in self.home.glob("*.csv")}
-        return found | {"case.toml": write_sheet(self.data).encode()}
+        return found | {f"{self.name}.toml": write_sheet(self.data).encode()}
 
     def run(self, kind: str, title: str, arguments: list[str]) -> Run | None:
         """Put a run of the valve into the queue; None where that is refused, which is told."""
@@ -276,7 +278,9 @@ class Page:
                 self._form()
                 self._parts()
                 with ui.expansion("All keys as text").classes("full"):
-                    self._text = ui.textarea().classes("full").props("rows=16").style("font-family: monospace")
+                    self._text = (
+                        ui.textarea().classes("full").props('rows=16 data-at="text"').style("font-family: monospace")
+                    )
                     ui.button("Take this text", on_click=lambda: self._attempt(self.take, self._text.value, self.name))
             with ui.column():
                 self._picture = ui.image().classes("drawing full")
@@ -313,7 +317,11 @@ class Page:
             with ui.row().style("align-items: center; gap: 8px"):
                 name = ui.input("Name").props("dense").style("width: 100px").props('data-at="rubber"')
                 shore = ui.input("Hardness, Shore A").props("dense").style("width: 150px").props('data-at="hardness"')
-                test = ui.select(["", *self._data_files()], label="or its test").style("width: 130px")
+                test = (
+                    ui.select(["", *self._data_files()], label="or its test")
+                    .style("width: 130px")
+                    .props('data-at="test"')
+                )
                 loss = ui.input("Loss factor").props("dense").style("width: 90px")
                 ui.button(
                     "Add", on_click=lambda: self._add_rubber(name.value, shore.value, test.value, loss.value)
@@ -340,10 +348,10 @@ class Page:
 
         with ui.expansion(heading).classes("full"):
             for number, row in enumerate(rows):
-                with ui.row().style("align-items: center; gap: 8px"):
+                with ui.row().style("align-items: center; gap: 8px; flex-wrap: nowrap"):
                     for name in names:
                         value, at = row.get(name, "") if isinstance(row, dict) else "", f"{key}.{number}.{name}"
-                        box = ui.input(name, value=str(value)).props(f'dense data-at="{at}"').style("width: 100px")
+                        box = ui.input(name, value=str(value)).props(f'dense data-at="{at}"').style("flex: 0 1 110px")
                         box.on_value_change(lambda event, at=at: self.typed(at, event.value or ""))
                     ui.button(icon="remove", on_click=lambda _, n=number: resize(n)).props("flat dense")
             ui.button("Add a row", on_click=lambda: resize(None)).props("flat")

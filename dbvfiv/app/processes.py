@@ -27,6 +27,8 @@ VALVES, KEPT, WAITING, LONGEST = 3, 40, 8, 6 * 3600.0
 PATIENCE, STUBBORN = 300.0, 5.0
 #: File of a record in the folder of its run; no data file of a case has such a name.
 RECORD = ".record.csv"
+#: Beginning of a command line.
+PROGRAM = (sys.executable, "-m", "dbvfiv")
 #: Largest line of an answer, bytes.
 LINE = 64 << 20
 #: Added to the priority number of processes that nobody's hand waits for.
@@ -65,26 +67,17 @@ class Worker:
         """Number of the process while it lives."""
         return self._process.pid if self._process is not None and self._process.returncode is None else None
 
-    async def _start(self) -> None:
+    async def start(self) -> None:
+        """Start the process, unless it lives."""
+        if self.pid is not None:
+            return
         environment = surroundings()
         command = (sys.executable, "-m", "dbvfiv.app.worker")
         pipes = {"stdin": asyncio.subprocess.PIPE, "stdout": asyncio.subprocess.PIPE, "limit": LINE}
         self._process = await asyncio.create_subprocess_exec(*command, env=environment, start_new_session=True, **pipes)
         _put_behind(self._process.pid, self._nice)
-        self._reader = asyncio.create_task(self._read(self._process))
-
-    async def _read(self, process: asyncio.subprocess.Process) -> None:
-        while line := await process.stdout.readline():
-            found = json.loads(line)
-            waiting = self._waiting.pop(found["id"], None)
-            if waiting is not None and not waiting.done():
-                waiting.set_result(found)
-        await process.wait()
-        self._opened = ""
-        for waiting in self._waiting.values():
-            if not waiting.done():
-                waiting.set_result({"error": "The process that computes ended; ask again.", "ended": True})
-        self._waiting.clear()
+        self._waiting, self._opened = {}, ""
+        self._reader = asyncio.create_task(_read(self._process, self._waiting))
 
     async def ask(self, do: str, **question: Any) -> Any:
         """Answer to a question.
@@ -94,8 +87,7 @@ class Worker:
         CaseError
             With the sentence of what went wrong.
         """
-        if self.pid is None:
-            await self._start()
+        await self.start()
         number = next(self._numbers)
         self._waiting[number] = waiting = asyncio.get_running_loop().create_future()
         try:
@@ -131,6 +123,20 @@ class Worker:
         if self.pid is not None:
             with contextlib.suppress(ProcessLookupError):
                 os.killpg(self.pid, signal.SIGKILL)
+
+
+async def _read(process: asyncio.subprocess.Process, asked: dict[int, asyncio.Future]) -> None:
+    """Hand the answers of a process to the questions that it was asked, until it ends."""
+    while line := await process.stdout.readline():
+        found = json.loads(line)
+        waiting = asked.pop(found["id"], None)
+        if waiting is not None and not waiting.done():
+            waiting.set_result(found)
+    await process.wait()
+    for waiting in asked.values():
+        if not waiting.done():
+            waiting.set_result({"error": "The process that computes ended; ask again.", "ended": True})
+    asked.clear()
 
 
 class Workers:
@@ -194,8 +200,13 @@ class Run:
 
     @property
     def case(self) -> Path:
-        """Case file."""
-        return self.folder / "case.toml"
+        """Case file, which has the name of the valve."""
+        return next(self.folder.glob("*.toml"), self.folder / "valve.toml")
+
+    @property
+    def is_live(self) -> bool:
+        """True where it runs or will."""
+        return self.state in ("running", "waiting")
 
     @property
     def can_resume(self) -> bool:
@@ -216,7 +227,7 @@ class Run:
             run = cls(folder, **json.loads((folder / "run.json").read_text()))
         except (OSError, ValueError, TypeError):
             return None
-        if run.state in ("running", "waiting"):
+        if run.is_live:
             run.state = "interrupted"
         return run
 
@@ -246,15 +257,15 @@ class Run:
     def commands(self) -> list[list[str]]:
         """Command lines, one after another; a study that was begun goes on in its file."""
         if self.kind == "report":
-            return [["report", "case.toml", "-o", "report.html", "--workers", "1", *self.arguments]]
+            return [["report", self.case.name, "-o", "report.html", "--workers", "1", *self.arguments]]
         if self.kind == "verdict":
             return [["verdict", RECORD, "--plots", "figures"]]
         if self.kind == "compare":
             beside = ["compare", RECORD, "result.h5", "-o", "figures/record.png"]
-            return [["modes", "case.toml", "-o", "result.h5", *self.arguments], beside]
+            return [["modes", self.case.name, "-o", "result.h5", *self.arguments], beside]
         if (self.folder / "result.h5").exists():
             return [["resume", "result.h5"]]
-        return [[self.kind, "case.toml", "-o", "result.h5", *self.arguments]]
+        return [[self.kind, self.case.name, "-o", "result.h5", *self.arguments]]
 
 
 class Runs:
@@ -287,7 +298,7 @@ class Runs:
         CaseError
             Where a user has too many.
         """
-        if sum(run.state in ("waiting", "running") for run in self.of(folder)) >= WAITING:
+        if sum(run.is_live for run in self.of(folder)) >= WAITING:
             raise CaseError(f"{WAITING} runs are waiting already; cancel one or wait.")
         run = self._make(folder, kind, title, files, arguments)
         self._enqueue(run)
@@ -334,7 +345,7 @@ class Runs:
         """End a run, which keeps what it found."""
         if run in self._queue:
             self._queue.remove(run)
-        if run.state in ("waiting", "running"):
+        if run.is_live:
             run.state = "cancelled"
             run.keep()
             if run.process is not None:
@@ -379,10 +390,11 @@ class Runs:
 
     async def _carry_out(self, run: Run, command: list[str], out: Any, errors: Any) -> int:
         """Exit status of a command line of a run."""
-        line = (sys.executable, "-m", "dbvfiv", *command)
         streams = {"stdin": asyncio.subprocess.DEVNULL, "stdout": out, "stderr": errors, "start_new_session": True}
         environment = surroundings(DBVFIV_BAR="1", COLUMNS="100")
-        run.process = await asyncio.create_subprocess_exec(*line, cwd=run.folder, env=environment, **streams)
+        run.process = await asyncio.create_subprocess_exec(
+            *PROGRAM, *command, cwd=run.folder, env=environment, **streams
+        )
         _put_behind(run.process.pid, BEHIND)
         if run.state != "running":  # cancelled while it was being started
             self._start(_insist(run.process))

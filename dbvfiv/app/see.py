@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import asyncio
+import re
 import time
+from itertools import groupby
 from typing import Any
 
 from nicegui import events, ui
@@ -46,26 +48,27 @@ class RunView:
     ----------
     page : Page
     run : Run
+    opens : bool
+        Show what it found as soon as it ends.
     """
 
-    def __init__(self, page: Any, run: Run):
-        self.page, self.run = page, run
-        with ui.card().classes("full").props(f'data-at="run {run.kind}"'):
-            with ui.row().classes("full").style("align-items: center"):
-                self._title = ui.label(run.title).style("font-weight: bold")
+    def __init__(self, page: Any, run: Run, opens: bool):
+        self.page, self.run, self._opens = page, run, opens and run.is_live
+        with ui.card().classes("full").props(f'data-at="run {run.kind}"') as self.card:
+            with ui.row().classes("full").style("align-items: center; gap: 4px 16px"):
+                ui.label(run.title).style("font-weight: bold")
                 self._state = ui.label().classes("note").props('data-at="state"')
                 self._cancel = ui.button("Cancel", on_click=lambda: page.site.runs.cancel(run)).props("flat dense")
                 self._resume = ui.button("Resume", on_click=lambda: page.site.runs.resume(run)).props("flat dense")
                 self._open = ui.button("Open", on_click=self.show).props("flat dense")
                 self._valve = ui.button("Its valve", on_click=self._take_case).props("flat dense")
-                ui.button("Delete", on_click=self._delete).props("flat dense")
+                ui.button("Delete", on_click=lambda: page.site.runs.delete(page.home, run)).props("flat dense")
             self._bar = ui.linear_progress(0, show_value=False).classes("full")
             self._body = ui.column().classes("full")
-        self.look()
 
     def look(self) -> None:
         """Bring bar and buttons up to date."""
-        run, live = self.run, self.run.state in ("running", "waiting")
+        run, live = self.run, self.run.is_live
         share, said = run.progress() if run.state == "running" else (float(run.state == "done"), "")
         took = f" in {run.ended - run.started:.0f} s" if run.state == "done" and run.started else ""
         if run.state == "running" and not said:
@@ -76,6 +79,9 @@ class RunView:
         self._resume.visible = run.can_resume
         self._open.visible = not live
         self._valve.visible = run.case.exists()
+        if self._opens and not live:
+            self._opens = False
+            self._showing = asyncio.create_task(self.show())
 
     def _take_case(self) -> None:
         try:
@@ -85,10 +91,6 @@ class RunView:
             return
         self.page.panels.value = "Describe"
 
-    def _delete(self) -> None:
-        self.page.site.runs.delete(self.page.home, self.run)
-        self.page.running.refresh()
-
     async def show(self) -> None:
         """Draw what the run found."""
         self._body.clear()
@@ -96,32 +98,60 @@ class RunView:
             await show_result(self.page, self.run)
 
 
+class RunList:
+    """Runs as cards, the newest first; those that stay keep what they show.
+
+    Parameters
+    ----------
+    page : Page
+    opens : bool
+        Show what a run found as soon as it ends.
+    """
+
+    def __init__(self, page: Any, opens: bool):
+        self._page, self._opens = page, opens
+        self._views: dict[str, RunView] = {}
+        self._column = ui.column().classes("full")
+
+    def show(self, runs: list[Run]) -> None:
+        """Bring the cards up to date."""
+        for name in self._views.keys() - {run.name for run in runs}:
+            self._views.pop(name).card.delete()
+        for place, run in enumerate(runs):
+            if run.name not in self._views:
+                with self._column:
+                    self._views[run.name] = RunView(self._page, run, self._opens)
+                self._views[run.name].card.move(target_index=place)
+            self._views[run.name].look()
+
+
 async def show_result(page: Any, run: Run) -> None:
     """Draw what a run printed and found."""
-    ui.label(run.output()).classes("text")
+    said, found = run.output(), {"figures": sorted(file.name for file in (run.folder / "figures").glob("*.png"))}
     if run.kind == "report" and run.page.exists():
         ui.link("Open the report", f"/files/{run.name}/report.html", new_tab=True)
     figures = run.folder / "figures"
-    drawn = sorted(file.name for file in figures.glob("*.png"))
     if run.kind in KINDS and run.page.exists():
         try:
             found = await page.site.workers.drawing.ask("result", path=str(run.page), figures=str(figures))
         except CaseError as error:
             ui.label(str(error)).classes("wrong")
             return
-        if not run.output():  # of a result that was made elsewhere
-            ui.label("\n".join(found["lines"])).classes("text")
+        said = said or "\n".join(found["lines"])  # of a result that was made elsewhere
         if run.kind == "map" and found["summary"].get("growth_rate"):
             show_map(page, run, found["summary"])
-        drawn = found["figures"]
         with ui.row():
             for name in found["tables"]:
                 ui.link(name, f"/files/{run.name}/figures/{name}").props("download")
             ui.link("result.h5", f"/files/{run.name}/result.h5").props("download")
-    for name in drawn:
-        address = f"/files/{run.name}/figures/{name}?{(figures / name).stat().st_mtime_ns}"
-        with ui.link(target=address).props(f'download="{name}" title="Save this figure"').classes("drawing full"):
-            ui.html(f'<img src="{address}" alt="{name}">', sanitize=False).classes("drawing full")
+    with ui.element("div").classes("figures"):
+        for name in found["figures"]:
+            address = f"/files/{run.name}/figures/{name}?{(figures / name).stat().st_mtime_ns}"
+            with ui.link(target=address).props(f'download="{name}" title="Save this figure"').classes("drawing"):
+                ui.html(f'<img src="{address}" alt="{name}">', sanitize=False).classes("drawing full")
+    # tables keep their columns, sentences are wrapped
+    for is_table, lines in groupby(said.split("\n"), lambda line: re.search(r"(\S|^) {2,}\S", line) is not None):
+        ui.label("\n".join(lines)).classes("text" if is_table else "note")
 
 
 def show_map(page: Any, run: Run, found: dict[str, Any]) -> None:
@@ -131,7 +161,7 @@ def show_map(page: Any, run: Run, found: dict[str, Any]) -> None:
     rows = [page.asking.shown(name) for name in names]
     x, y = ([value / row["scale"] for value in axis["values"]] for axis, row in zip(axes, rows))
     limit = max((abs(rate) for row in grid for rate in row if rate is not None), default=1.0)
-    bar = COLOUR_BAR | {"title": "Growth rate, 1/s", "y": -0.25}
+    bar = COLOUR_BAR | {"title": {"text": "Growth rate, 1/s"}, "y": -0.25}
     cells = {"type": "heatmap", "x": x, "y": y, "z": grid, "colorscale": "RdBu", "zmin": -limit, "zmax": limit}
     drawn = [cells | {"colorbar": bar}]
     for curve in found["onset_curves"]:
@@ -142,7 +172,7 @@ def show_map(page: Any, run: Run, found: dict[str, Any]) -> None:
         marker = {"symbol": "star", "size": 16, "color": "gold", "line": {"color": "black", "width": 1}}
         star = {name: [value / row["scale"]] for name, value, row in zip("xy", own, rows)}
         drawn.append({"type": "scatter", "mode": "markers", "marker": marker, "name": "this installation"} | star)
-    layout = {"height": 460, "margin": {"t": 10, "r": 10}, "showlegend": False}
+    layout = {"height": 480, "margin": {"t": 40, "r": 10}, "showlegend": False}
     for name, axis, row in zip("xy", axes, rows):
         layout[f"{name}axis"] = {"title": {"text": row["label"]}, "type": "log" if axis.get("log") else "linear"}
     figure = {"data": drawn, "layout": layout, "config": {"responsive": False, "displaylogo": False}}
@@ -177,15 +207,13 @@ class SeePanel:
             buttons = {title: ui.button(title, on_click=lambda _, title=title: self._ask(title)) for title in PICTURES}
         self._chance = buttons["Probability of chatter"]
         ui.label("Each is a run, which waits in its turn and is kept.").classes("note")
-        self._views: dict[str, RunView] = {}
-        self._awaited: set[Run | None] = set()
-        self._list = ui.column().classes("full")
+        self._list = RunList(self.page, opens=True)
         ui.timer(LOOK, self.refresh)
 
     def _ask(self, title: str) -> None:
         case = self.page.checked.case
         arguments = [] if case is None else arguments_of(case, title)
-        self._awaited.add(self.page.run(PICTURES[title][0], title, arguments))
+        self.page.run(PICTURES[title][0], title, arguments)
         self.refresh()
 
     def refresh(self) -> None:
@@ -196,15 +224,7 @@ class SeePanel:
         for run in self.page.site.runs.of(self.page.home):
             if run.title in PICTURES:
                 newest.setdefault(run.title, run)
-        if {title: view.run for title, view in self._views.items()} != newest:
-            self._list.clear()
-            with self._list:
-                self._views = {title: RunView(self.page, run) for title, run in newest.items()}
-        for view in self._views.values():
-            view.look()
-            if view.run.state == "done" and view.run in self._awaited:
-                self._awaited.discard(view.run)
-                asyncio.create_task(view.show())
+        self._list.show([*newest.values()])
 
 
 class RunsPanel:
@@ -217,7 +237,6 @@ class RunsPanel:
 
     def __init__(self, page: Any):
         self.page = page
-        self._views: dict[str, RunView] = {}
 
     def build(self) -> None:
         """Draw the panel."""
@@ -230,7 +249,7 @@ class RunsPanel:
             )
             drop.props("flat bordered").style("width: 230px; max-height: 56px")
         ui.label("What a study takes stands in its section of the case: Describe, all keys as text.").classes("note")
-        self._list = ui.column().classes("full")
+        self._list = RunList(self.page, opens=False)
         ui.timer(LOOK, self.refresh)
 
     def _add(self) -> None:
@@ -239,7 +258,7 @@ class RunsPanel:
 
     async def _take(self, event: events.UploadEventArguments) -> None:
         """Keep a result; judge a record, beside the modes of the valve at the values of the sliders."""
-        content, name, page = await event.file.read(), event.file.name[:40], self.page
+        content, name, page = await event.file.read(), re.sub(r"[^\w. -]", "_", event.file.name[-40:]), self.page
         event.sender.reset()
         try:
             if name.lower().endswith(".h5"):
@@ -258,10 +277,4 @@ class RunsPanel:
 
     def refresh(self) -> None:
         """Bring the list up to date."""
-        runs = {run.name: run for run in self.page.site.runs.of(self.page.home)}
-        if [*self._views] != [*runs]:
-            self._list.clear()
-            with self._list:
-                self._views = {name: RunView(self.page, run) for name, run in runs.items()}
-        for view in self._views.values():
-            view.look()
+        self._list.show(self.page.site.runs.of(self.page.home))

@@ -34,6 +34,8 @@ TOKEN, USER, YEAR = "dbvfiv_token", "dbvfiv_user", 365 * 86400
 BODY, PENALTY = 20 << 20, 1.0
 #: Kinds of files that are handed out.
 SHOWN = {".png", ".gif", ".svg", ".csv", ".html", ".h5", ".toml", ".txt"}
+#: What is said of more, before the line is cut.
+TOO_LARGE = (f"A file may have {BODY >> 20} MB.", ((b"content-type", b"text/plain"), (b"connection", b"close")))
 _LOGIN = """<!doctype html><meta name="viewport" content="width=device-width"><title>dbvfiv</title>
 <form method="post" action="/login" style="font: 1.1rem sans-serif; margin: 20vh auto; width: 18rem">
 <label>Password <input name="password" type="password" autofocus style="width: 100%"></label><p>{}</p>
@@ -108,7 +110,7 @@ class Guard:
         """Pass a request on whose body is not too large, by what it says and by what comes."""
         told = dict(scope["headers"]).get(b"content-length", b"0")
         if not told.isdigit() or int(told) > BODY:
-            await respond(send, 413, f"A file may have {BODY >> 20} MB.")
+            await respond(send, 413, *TOO_LARGE)
             return
         come, begun = 0, False
 
@@ -129,7 +131,7 @@ class Guard:
             await self.app(scope, counted, noted)
         except OverflowError:
             if not begun:
-                await respond(send, 413, f"A file may have {BODY >> 20} MB.")
+                await respond(send, 413, *TOO_LARGE)
 
 
 def read_cookies(scope: dict[str, Any]) -> dict[str, str]:
@@ -204,6 +206,7 @@ def build(site: Site, token: str, password: str = "") -> FastAPI:
 
     @asynccontextmanager
     async def lifespan(_: FastAPI):
+        await site.workers.drawing.start()  # it is ready by the time that a browser has opened the page
         yield
         await site.runs.end()
         site.workers.end()

@@ -125,6 +125,10 @@ class Tab:
         """Click a button by its words."""
         self._press("button, a.q-btn", words)
 
+    def unfold(self, heading: str) -> None:
+        """Open a part of the form."""
+        self._press(".q-expansion-item .q-item__label", heading)
+
     def fill(self, name: str, text: str) -> None:
         """Write into a field."""
         from selenium.webdriver.common.keys import Keys

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import http.client
 import os
 import random
 import re
 import signal
+import socket
 import time
+from contextlib import suppress
 
 import numpy as np
 import pytest
@@ -112,6 +115,211 @@ def click_cell(driver) -> None:
     driver.execute_script("arguments[0].scrollIntoView({block: 'center'})", image)
     x, y = -image.size["width"] // 2 + 6, image.size["height"] // 2 - 6
     ActionChains(driver).move_to_element_with_offset(image, x, y).pause(0.4).click().perform()
+
+
+def kept(driver, address: str) -> dict[str, bytes]:
+    """Files that the page links to, as the browser gets them."""
+    script = """const [links, told] = arguments;
+        Promise.all(links.map(l => fetch(l).then(r => r.ok ? r.arrayBuffer() : null)).map(p => p.then(b =>
+            b && Array.from(new Uint8Array(b.slice(0, 200)))))).then(told)"""
+    links = [e.get_attribute("href") for e in driver.find_elements("css selector", f"a[download][href*='{address}']")]
+    found = driver.execute_async_script(script, links)
+    assert links and None not in found
+    return {link.split("/")[-1].split("?")[0]: bytes(content) for link, content in zip(links, found)}
+
+
+def test_every_picture_is_drawn_and_saved(tmp_path):
+    driver = browser(*WIDE)
+    driver.set_script_timeout(30)
+    try:
+        unstable = COARSE.replace("beta = 0.003", "beta = 0.0003\nalpha = 0") + '[fluid]\ncontinuity = "quasi-steady"\n'
+        with served(tmp_path, unstable) as server:
+            tab = Tab(driver, server.address)
+            tab.go("See")
+            tab.wait(lambda: "CLOSURE" in tab.text.upper())
+            time.sleep(1.5)
+            assert "PROBABILITY" not in tab.text.upper()  # the case has no uncertainty
+            tab.go("Describe")
+            tab.drop("sure.toml", (unstable + "[uncertainty]\nsamples = 16\n").encode())
+            tab.wait(lambda: "samples = 16" in tab.at("text").get_attribute("value"))
+            tab.go("See")
+            tab.wait(lambda: "PROBABILITY" in tab.text.upper())
+            for title, kind in (
+                ("Head-loss curve", "steady"),
+                ("Root locus over head", "sweep"),
+                ("Stability map", "map"),
+                ("Cycle amplitude", "cycle"),
+                ("Closure", "closure"),
+                ("Probability of chatter", "uncertainty"),
+            ):
+                tab.click(title)
+                state = lambda kind=kind: tab.at(f"run {kind}").text  # noqa: E731
+                tab.wait(lambda state=state: "done in" in state() or "failed" in state(), 300)
+                assert "done in" in state(), state()
+                run = tab.wait(lambda kind=kind: tab.at(f"run {kind}").find_elements("tag name", "img"))
+                time.sleep(0.5)
+                shoot(driver, f"see-{kind}")
+                files = kept(driver, run[0].get_attribute("src").split("/")[-3])
+                figures = [n for n, content in files.items() if content.startswith(b"\x89PNG")]
+                tables = [n for n, content in files.items() if n.endswith(".csv") and b"," in content]
+                assert figures and tables and "result.h5" in files, (kind, files.keys())
+                assert len(figures) + len(tables) + 1 == len(files), files.keys()
+            assert not tab.errors()
+    finally:
+        driver.quit()
+
+
+def test_rubbers_records_and_results_are_dropped(tmp_path):
+    case = tmp_path / "six.toml"
+    case.write_text(COARSE)
+    valve, result = dbvfiv.load(case), tmp_path / "six.h5"
+    mode = next(m for m in valve.modes("1 m").modes if m.frequency > 0)
+    valve.replace({"valve.duckbill_length": "104 mm"}).steady(pressure=5e3, output=result)
+    stretch = np.linspace(1.05, 2.0, 12)
+    stress = 0.5 * (stretch - stretch**-2)
+    test = "stretch,stress [MPa]\n" + "".join(f"{a:.5g},{b:.5g}\n" for a, b in zip(stretch, stress))
+    seconds = np.arange(0, 4 * abs(1 / mode.growth_rate) + 40 / mode.frequency, 0.05 / mode.frequency)
+    ring = np.exp(mode.growth_rate * seconds) * np.cos(mode.angular_frequency * seconds)
+    record = "time [s],lip [mm]\n" + "".join(f"{a:.9g},{b:.9g}\n" for a, b in zip(seconds, ring))
+    driver = browser(*WIDE)
+    try:
+        with served(tmp_path) as server:
+            tab = Tab(driver, server.address)
+            tab.drop("soft.csv", test.encode())
+            tab.wait(lambda: "soft.csv is kept" in tab.text)
+            tab.unfold("Rubbers")
+            tab.fill("rubber", "soft")
+            tab.at("test").click()
+            tab._press(".q-item__label", "soft.csv")
+            tab.click("Add")
+            tab.wait(lambda: "kind fit" in tab.text and tab.at("fits").text == "It fits.")
+            tab.unfold("Layers, inside to outside")
+            before = tab.at("layers.0.material")
+            tab.fill("layers.0.material", "soft")
+            tab.wait(lambda: 'material = "soft"' in tab.at("text").get_attribute("value"))
+            assert tab.at("fits").text == "It fits." and before
+            tab.drop("dbv6.toml", COARSE.encode())  # the rubbers of the case again
+            tab.wait(lambda: 'material = "soft"' not in tab.at("text").get_attribute("value"))
+            tab.go("Ask")
+            tab.wait(tab.is_confirmed)
+            tab.fill("set pressure", "1\n")
+            tab.wait(lambda: not tab.is_confirmed(), 10)
+            tab.wait(tab.is_confirmed)
+            tab.go("Run")
+            tab.drop("bench.csv", record.encode())
+            tab.wait(lambda: "done in" in tab.at("run compare").text, 120)
+            tab.click("Open")
+            tab.wait(lambda: re.search(rf"lip.*: decayed.*It is mode {mode.number}\.", tab.text, re.DOTALL))
+            tab.wait(lambda: tab.at("run compare").find_elements("tag name", "img"))
+            shoot(driver, "record")
+            tab.drop("nonsense.h5", b"nonsense")
+            tab.wait(lambda: "nonsense.h5" in tab.text)
+            tab.drop("six.h5", result.read_bytes())
+            opened = tab.wait(lambda: tab.at("run steady"))
+            next(b for b in opened.find_elements("tag name", "button") if b.text.upper() == "OPEN").click()
+            tab.wait(lambda: opened.find_elements("tag name", "img"))
+            assert "nonsense.h5" not in opened.text
+            next(b for b in opened.find_elements("tag name", "button") if "VALVE" in b.text.upper()).click()
+            tab.wait(lambda: "279 mm long" in tab.text)
+            assert not tab.errors()
+        again = Served(tmp_path / "kept")
+        try:
+            tab = Tab(driver, again.address)
+            tab.go("Run")
+            tab.wait(lambda: tab.at("run steady") and tab.at("run compare"))
+            tab.click("Open")
+            tab.wait(lambda: tab.at("run steady").find_elements("tag name", "img"))
+        finally:
+            again.end()
+    finally:
+        driver.quit()
+
+
+def test_malformed_cases_are_told(tmp_path):
+    driver = browser(*WIDE)
+    try:
+        with served(tmp_path) as server:
+            tab = Tab(driver, server.address)
+            for text, said in (
+                ("valve = [", "TOML"),
+                ("[" * 5000, "nested"),
+                ("layers = [1, 2]", "layers"),
+                ('valve = "round"', "valve"),
+                ('[valve]\nkey_points = "../../../etc/passwd"', "without their folder"),
+            ):
+                tab.drop("bad.toml", text.encode())
+                tab.wait(lambda said=said: said in tab.at("wrong").text, 10)
+                if not tab.at("layers.0.thickness" if "layers" in text else "start").is_displayed():
+                    tab.unfold("Layers, inside to outside")
+                tab.click("Add a row")
+                assert server.process.poll() is None
+                tab.fill("valve.scale", "1\n")
+            tab.drop("dbv6.toml", COARSE.encode())
+            tab.wait(lambda: tab.at("fits").text == "It fits.", 10)
+            tab.drop("huge.toml", b"#" * (6 << 20))
+            tab.drop("picture.exe", b"MZ")
+            tab.wait(lambda: "is not taken" in tab.text, 10)
+            assert tab.at("fits").text == "It fits."
+    finally:
+        driver.quit()
+
+
+def test_others_come_in_by_a_password_and_see_their_own(tmp_path, monkeypatch):
+    monkeypatch.setenv("DBVFIV_APP_PASSWORD", "open sesame")
+    drivers = [browser(*WIDE), browser(*WIDE)]
+    try:
+        with served(tmp_path, COARSE, "--host", "0.0.0.0") as server:
+            assert "token" not in server.address
+            address = server.address.replace("0.0.0.0", "127.0.0.1")
+            tabs = []
+            for driver, length in zip(drivers, ("100 mm", "104 mm")):
+                driver.get(address)
+                for typed in ("open says me", "open sesame"):
+                    box = driver.find_element("name", "password")
+                    box.send_keys(typed + "\n")
+                    time.sleep(2.0)
+                tab = Tab(driver, address)
+                tab.fill("valve.duckbill_length", length)
+                tab.wait(lambda tab=tab: tab.at("fits").text == "It fits.")
+                tab.go("Run")
+                tab.click("Add to the queue")
+                tab.wait(lambda tab=tab: tab.at("run report"))
+                tabs.append(tab)
+            for tab, length in zip(tabs, ("100 mm", "104 mm")):
+                tab.driver.refresh()
+                tab.wait(lambda tab=tab: tab.at("fits").text == "It fits.")
+                assert tab.at("valve.duckbill_length").get_attribute("value") == length
+                tab.go("Run")
+                tab.wait(lambda tab=tab: tab.at("run report"))
+                assert len(tab.driver.find_elements("css selector", '[data-at="run report"]')) == 1
+    finally:
+        for driver in drivers:
+            driver.quit()
+
+
+def test_a_file_of_a_gigabyte_is_refused_as_it_comes(tmp_path):
+    with served(tmp_path) as server:
+        host = server.root.split("/")[2]
+        line = http.client.HTTPConnection(host, timeout=60)
+        line.request("GET", server.address.partition(host)[2])
+        told = line.getresponse()
+        cookies = "; ".join(c.split(";")[0] for c in told.headers.get_all("set-cookie"))
+        told.read()
+        line.request("GET", "/", headers={"cookie": cookies})
+        place = re.search(r"/_nicegui/client/[\w-]+/upload/\d+", line.getresponse().read().decode())[0]
+        before, sent = memory(server.process.pid), 0
+        head = f"POST {place} HTTP/1.1\r\nHost: {host}\r\nCookie: {cookies}\r\nTransfer-Encoding: chunked\r\n"
+        form = "Content-Type: multipart/form-data; boundary=b\r\n\r\n"
+        part = b'--b\r\nContent-Disposition: form-data; name="f"; filename="x.csv"\r\n\r\n'
+        with socket.create_connection(host.split(":"), 60) as stream, suppress(OSError):  # the server hangs up
+            stream.sendall(f"{head}{form}{len(part):x}\r\n".encode() + part + b"\r\n")
+            for _ in range(1024):
+                stream.sendall(b"100000\r\n" + bytes(1 << 20) + b"\r\n")
+                sent += 1
+        assert sent < 100 and memory(server.process.pid) < before + 100
+        line.close()
+        line.request("GET", "/", headers={"cookie": cookies})
+        assert line.getresponse().status == 200
 
 
 def test_narrow_pages_scroll_one_way(tmp_path):

@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from pathlib import Path
 
 import pytest
 from hypothesis import given as drawn
 from hypothesis import strategies as st
 
-from dbvfiv.app.sheet import change, check, given, read_sheet, write_sheet
+from dbvfiv.app.sheet import change, check, given, read_sheet, usual_value, write_sheet
 from dbvfiv.errors import CaseError
-from dbvfiv.studies.case import load_case
+from dbvfiv.studies.case import Case, load_case
 from tests.app.server import COARSE
 
 NUMBERS = st.integers(-(2**53), 2**53) | st.floats(allow_nan=False, allow_infinity=False) | st.booleans()
@@ -67,3 +68,14 @@ def test_what_is_no_sheet_is_a_sentence(text):
 @drawn(st.dictionaries(st.sampled_from(["valve", "layers", "mesh", "fluid", "drive"]), VALUES, max_size=3))
 def test_no_data_raise(data):
     check(data, Path("."))
+
+
+@drawn(st.dictionaries(st.sampled_from(["valve", "layers"]), VALUES, max_size=2), st.sampled_from(["", "1 mm"]))
+def test_changes_of_any_data_are_made_or_refused(data, typed):
+    for key in ("layers.0.thickness", "layers.7.angle", "valve.wall_map.1.to", "valve.scale"):
+        with suppress(CaseError):
+            change(data, key, typed)
+
+
+def test_usual_values_have_units():
+    assert usual_value(Case().drive, "pressure") == "18 kPa" and usual_value(Case().layers[2], "angle") == "54 deg"

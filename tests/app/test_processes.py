@@ -1,0 +1,111 @@
+"""Runs in their queue and workers behind the page: what does not end is killed, what goes wrong is a sentence."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import sys
+
+import pytest
+
+from dbvfiv.app import processes
+from dbvfiv.app.processes import Run, Runs, Worker
+from dbvfiv.errors import CaseError
+
+#: A program that ignores what asks it to end.
+STUBBORN = (
+    "import signal, time; signal.signal(signal.SIGTERM, signal.SIG_IGN); print('there', flush=True); time.sleep(60)"
+)
+
+
+async def until(condition, seconds: float = 20.0) -> None:
+    """Wait until something holds."""
+    for _ in range(int(seconds / 0.02)):
+        if condition():
+            return
+        await asyncio.sleep(0.02)
+    raise AssertionError(f"not within {seconds:g} s")
+
+
+@pytest.fixture
+def stubborn(monkeypatch, tmp_path):
+    """A queue whose runs do not end when they are asked to."""
+    (tmp_path / "stubborn.py").write_text(STUBBORN)
+    monkeypatch.setattr(processes, "STUBBORN", 0.2)
+    monkeypatch.setattr(processes, "PROGRAM", (sys.executable, str(tmp_path / "stubborn.py")))
+    return Runs(), tmp_path / "user"
+
+
+def test_runs_that_ignore_signals_are_killed(stubborn):
+    runs, home = stubborn
+
+    async def day() -> None:
+        first, second = (runs.add(home, "steady", f"steady {i}", {}, []) for i in range(2))
+        await until(lambda: "there" in first.output())
+        runs.cancel(first)
+        await until(lambda: first.process is None and "there" in second.output(), 30)
+        assert first.state == "cancelled" and first.can_resume
+        third = runs.add(home, "steady", "steady 2", {}, [])
+        await runs.end()
+        await until(lambda: second.process is None)
+        assert second.state == "interrupted" and third.process is None
+
+    asyncio.run(day())
+    assert [run.state for run in Runs().of(home)] == ["interrupted", "interrupted", "cancelled"]
+
+
+def test_a_run_that_is_cancelled_while_it_starts_ends(stubborn):
+    runs, home = stubborn
+
+    async def day() -> None:
+        run = runs.add(home, "steady", "steady", {}, [])
+        await asyncio.sleep(0)
+        runs.cancel(run)
+        await until(lambda: run.ended and run.process is None)
+        assert run.state == "cancelled"
+
+    asyncio.run(day())
+
+
+def test_users_keep_so_many(stubborn, monkeypatch):
+    runs, home = stubborn
+    monkeypatch.setattr(processes, "KEPT", 2)
+    for number in range(2):
+        runs.keep(home, f"{number}.h5", b"")
+    with pytest.raises(CaseError, match="2 results are kept"):
+        runs.keep(home, "3.h5", b"")
+
+
+def test_a_spoiled_journal_is_passed_over(tmp_path):
+    for number, text in enumerate(("", "{", '{"kind": 1}', '{"kind": "map", "title": "t", "process": 3, "x": 1}')):
+        folder = tmp_path / "runs" / str(number)
+        folder.mkdir(parents=True)
+        (folder / "run.json").write_text(text)
+    assert not Runs().of(tmp_path)
+    (folder / "run.json").write_text(json.dumps({"kind": "map", "title": "t", "state": "running"}))
+    assert Run.read(folder).state == "interrupted"
+
+
+@pytest.mark.slow
+def test_a_worker_says_what_went_wrong_and_answers_on(tmp_path):
+    (tmp_path / "bad.toml").write_text("[valve]\nlenght = 1")
+
+    async def day() -> None:
+        worker = Worker()
+        for question, said in (
+            ({"do": "open", "case": str(tmp_path / "bad.toml")}, "valve.lenght"),
+            ({"do": "predict", "values": {}}, "No valve is open"),
+            ({"do": "header", "path": str(tmp_path / "bad.toml")}, "bad.toml"),
+            ({"do": "nonsense"}, "failed unexpectedly"),
+        ):
+            with pytest.raises(CaseError, match=said):
+                await worker.ask(**question)
+        before = worker.pid
+        worker.end()
+        await until(lambda: worker.pid is None)
+        with pytest.raises(CaseError, match="No valve is open"):
+            await worker.ask("margin")
+        assert worker.pid != before
+        worker.end()
+
+    asyncio.run(day())
