@@ -70,6 +70,7 @@ class Page:
         self.data: dict[str, Any] = {}
         self.checked = Checked(None)
         self.name = "valve"
+        self._open = {"Sizes"}
         self._drawing: asyncio.Task | None = None
         self._told: list[Callable[[], None]] = []
 
@@ -277,7 +278,7 @@ class Page:
                 self._wrong = ui.label().classes("wrong").props('data-at="wrong"')
                 self._form()
                 self._parts()
-                with ui.expansion("All keys as text").classes("full"):
+                with self._part("All keys as text"):
                     self._text = (
                         ui.textarea().classes("full").props('rows=16 data-at="text"').style("font-family: monospace")
                     )
@@ -289,9 +290,15 @@ class Page:
     @ui.refreshable_method
     def _form(self) -> None:
         for heading, rows in FORM.items():
-            with ui.expansion(heading, value=heading == "Sizes").classes("full"), ui.element("div").classes("fields"):
+            with self._part(heading), ui.element("div").classes("fields"):
                 for key, label in rows:
                     self._field(key, label)
+
+    def _part(self, heading: str) -> ui.expansion:
+        """Part of the form, which stays open when the form is drawn anew."""
+        part = ui.expansion(heading, value=heading in self._open).classes("full")
+        part.on_value_change(lambda event: (self._open.add if event.value else self._open.discard)(heading))
+        return part
 
     def _field(self, key: str, label: str) -> None:
         section, name = key.split(".")
@@ -307,7 +314,7 @@ class Page:
     def _parts(self) -> None:
         self._rows("Layers, inside to outside", "layers", ("material", "thickness", "angle"))
         self._rows("Wall along the valve, from the lip", "valve.wall_map", ("to", "thickness"))
-        with ui.expansion("Rubbers").classes("full"):
+        with self._part("Rubbers"):
             own = self.data.get("materials", {})
             cards = (
                 {name: card for name, card in own.items() if isinstance(card, dict)} if isinstance(own, dict) else {}
@@ -346,7 +353,7 @@ class Page:
             self._parts.refresh()
             self.changed()
 
-        with ui.expansion(heading).classes("full"):
+        with self._part(heading):
             for number, row in enumerate(rows):
                 with ui.row().style("align-items: center; gap: 8px; flex-wrap: nowrap"):
                     for name in names:

@@ -154,7 +154,7 @@ def test_every_picture_is_drawn_and_saved(tmp_path):
             ):
                 tab.click(title)
                 state = lambda kind=kind: tab.at(f"run {kind}").text  # noqa: E731
-                tab.wait(lambda state=state: "done in" in state() or "failed" in state(), 300)
+                tab.wait(lambda state=state: "done in" in state() or "failed" in state(), 900)
                 assert "done in" in state(), state()
                 run = tab.wait(lambda kind=kind: tab.at(f"run {kind}").find_elements("tag name", "img"))
                 time.sleep(0.5)
@@ -171,9 +171,11 @@ def test_every_picture_is_drawn_and_saved(tmp_path):
 
 def test_rubbers_records_and_results_are_dropped(tmp_path):
     case = tmp_path / "six.toml"
-    case.write_text(COARSE)
+    ringing = COARSE.replace("beta = 0.003", "beta = 0.0005")
+    case.write_text(ringing)
     valve, result = dbvfiv.load(case), tmp_path / "six.h5"
-    mode = next(m for m in valve.modes("1 m").modes if m.frequency > 0)
+    mode = min((m for m in valve.modes("1 m").modes if m.frequency > 0), key=lambda m: m.damping_ratio)
+    assert 0 < mode.damping_ratio < 0.2
     valve.replace({"valve.duckbill_length": "104 mm"}).steady(pressure=5e3, output=result)
     stretch = np.linspace(1.05, 2.0, 12)
     stress = 0.5 * (stretch - stretch**-2)
@@ -183,7 +185,7 @@ def test_rubbers_records_and_results_are_dropped(tmp_path):
     record = "time [s],lip [mm]\n" + "".join(f"{a:.9g},{b:.9g}\n" for a, b in zip(seconds, ring))
     driver = browser(*WIDE)
     try:
-        with served(tmp_path) as server:
+        with served(tmp_path, ringing) as server:
             tab = Tab(driver, server.address)
             tab.drop("soft.csv", test.encode())
             tab.wait(lambda: "soft.csv is kept" in tab.text)
@@ -198,7 +200,7 @@ def test_rubbers_records_and_results_are_dropped(tmp_path):
             tab.fill("layers.0.material", "soft")
             tab.wait(lambda: 'material = "soft"' in tab.at("text").get_attribute("value"))
             assert tab.at("fits").text == "It fits." and before
-            tab.drop("dbv6.toml", COARSE.encode())  # the rubbers of the case again
+            tab.drop("dbv6.toml", ringing.encode())  # the rubbers of the case again
             tab.wait(lambda: 'material = "soft"' not in tab.at("text").get_attribute("value"))
             tab.go("Ask")
             tab.wait(tab.is_confirmed)
@@ -240,26 +242,28 @@ def test_malformed_cases_are_told(tmp_path):
     try:
         with served(tmp_path) as server:
             tab = Tab(driver, server.address)
+            tab.unfold("Layers, inside to outside")
             for text, said in (
                 ("valve = [", "TOML"),
-                ("[" * 5000, "nested"),
+                ("x = " + "[" * 5000, "nested"),
                 ("layers = [1, 2]", "layers"),
+                ('layers = [{ material = "CR" }, 7]', "layers"),
+                ('layers = "many"', "layers"),
                 ('valve = "round"', "valve"),
                 ('[valve]\nkey_points = "../../../etc/passwd"', "without their folder"),
             ):
                 tab.drop("bad.toml", text.encode())
-                tab.wait(lambda said=said: said in tab.at("wrong").text, 10)
-                if not tab.at("layers.0.thickness" if "layers" in text else "start").is_displayed():
-                    tab.unfold("Layers, inside to outside")
+                tab.wait(lambda said=said: said in tab.at("wrong").text, 20)
                 tab.click("Add a row")
-                assert server.process.poll() is None
-                tab.fill("valve.scale", "1\n")
+                time.sleep(0.5)
+                assert tab.at("wrong").text or "layers" not in text
             tab.drop("dbv6.toml", COARSE.encode())
-            tab.wait(lambda: tab.at("fits").text == "It fits.", 10)
-            tab.drop("huge.toml", b"#" * (6 << 20))
+            tab.wait(lambda: tab.at("fits").text == "It fits.", 20)
             tab.drop("picture.exe", b"MZ")
-            tab.wait(lambda: "is not taken" in tab.text, 10)
-            assert tab.at("fits").text == "It fits."
+            tab.wait(lambda: "is not taken" in tab.text, 20)
+            tab.drop("huge.toml", b"#" * (6 << 20))
+            time.sleep(1.0)
+            assert tab.at("fits").text == "It fits." and server.process.poll() is None
     finally:
         driver.quit()
 
