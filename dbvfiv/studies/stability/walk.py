@@ -9,6 +9,7 @@ from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field, replace
 
 import numpy as np
+from scipy.optimize import root_scalar
 
 from eigen import (
     Column,
@@ -24,6 +25,7 @@ from eigen.family import Reach
 from eigen.operator import edge_of
 
 from ...case.parameters import Mu
+from ...case.quantity import GRAVITY
 from ...errors import CaseError, NotValidError, SolveError
 from ...model import ValveModel
 from ...model.classes import linearise_class
@@ -41,6 +43,8 @@ from .verdict import Verdict
 
 #: Blends of the continuity laws whose fluid is kept, and factors whose relaxation is.
 _KEPT = 256
+#: Relative accuracy of the pressure at which valve and pump meet.
+MET = 1e-10
 #: Structural frequencies in vacuo that a band holds at least.
 LEAST_MODES = 10
 
@@ -304,6 +308,53 @@ class StabilityWalk:
             except SolveError:
                 path.pressure, path.q, path.slope = before
         self.equilibrium(place)
+
+    def lift(self, place: Mu) -> float:
+        """Pressure, Pa, at a place beyond that of the pump at its flow: a static lift; 0 without a pump.
+
+        Raises
+        ------
+        SolveError
+            If there is no steady state.
+        """
+        pump = self.built(place).model.pump
+        if pump is None:
+            return 0.0
+        return place.pressure - pump.density * GRAVITY * float(pump.curve(self.state(place).volume_flow))
+
+    def meet_pump(self, place: Mu, lift: float, q: np.ndarray | None = None) -> Mu:
+        """Parameter point at the pressure at which a pump with a lift delivers what the valve takes; the same without a
+        pump.
+
+        Parameters
+        ----------
+        place : Mu
+            With a pressure next to it.
+        lift : float, Pa
+        q : (n,) array, optional
+            Displacements next to those of its steady state.
+
+        Raises
+        ------
+        SolveError
+            If the curves do not meet near it within the pump's table.
+        """
+        pump = self.built(place).model.pump
+        if pump is None:
+            return place
+        self.settle(place, q)
+
+        def beyond(pressure: float) -> float:
+            return self.lift(place.at(pressure=pressure)) - lift
+
+        first, apart = place.pressure, beyond(place.pressure)
+        if abs(apart) <= MET * first:
+            return place
+        found = root_scalar(beyond, x0=first, x1=first - 0.5 * apart, rtol=MET, maxiter=20)
+        there = place.at(pressure=float(found.root))
+        if not found.converged or not pump.holds(self.state(there).volume_flow):
+            raise SolveError(f"Pump and valve do not meet within the pump's table near {first:.6g} Pa.")
+        return there
 
     def state(self, place: Mu) -> SteadyState:
         """Steady state of a place with what is read off it.

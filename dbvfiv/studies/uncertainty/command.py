@@ -34,9 +34,10 @@ class Keys(Section):
     )
     samples: StrictInt = key(256, "Samples of the inputs.", ge=16, le=1_000_000)
     seed: StrictInt = key(1, "Number that the samples follow from.", ge=0, le=2**31)
-    method: Literal["plain", "rare"] = key(
+    method: Literal["plain", "rare", "subset"] = key(
         "plain",
-        "Samples of the inputs as they are, or (rare) about the inputs of a rare flutter, with weights, at one state.",
+        "Samples of the inputs as they are, or, at one state, (rare) about the inputs of a rare flutter, with weights, "
+        "or (subset) in levels towards it, which take ten times as many and assume nothing of where it lies.",
     )
     inputs: Annotated[dict[StrictStr, StrictStr], BeforeValidator(flattened)] = key(
         {},

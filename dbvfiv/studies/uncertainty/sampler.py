@@ -58,6 +58,21 @@ class Found(NamedTuple):
         return cls(sample, value, OUTCOMES.index(verdict.outcome), *numbers, *read, apart, why)
 
 
+class Start(NamedTuple):
+    """Steady state of the case at a value of the range.
+
+    Attributes
+    ----------
+    q : (n,) array
+        Displacements.
+    lift : float, Pa
+        Behind a pump, its pressure beyond that of the pump's table, which samples share.
+    """
+
+    q: np.ndarray
+    lift: float
+
+
 def walk_of(plan: Plan, row: np.ndarray, solver: ColumnSolver) -> StabilityWalk:
     """Walk of a sample.
 
@@ -69,12 +84,14 @@ def walk_of(plan: Plan, row: np.ndarray, solver: ColumnSolver) -> StabilityWalk:
     return StabilityWalk(plan.redescribed(row), Observer(), solver=solver)
 
 
-def walks_at(plan: Plan, value: float, solver: ColumnSolver) -> At:
-    """Function from values of the inputs to the walk of a sample and its parameter point at a value of the range."""
+def walks_at(plan: Plan, value: float, start: Start, solver: ColumnSolver) -> At:
+    """Function from values of the inputs to the walk of a sample and its parameter point at a value of the range, where
+    the case has a steady state.
+    """
 
     def at(row: np.ndarray) -> tuple[StabilityWalk, Mu]:
         walk = walk_of(plan, row, solver)
-        return walk, plan.point(walk.case, row, **{plan.parameter: value})
+        return walk, walk.meet_pump(plan.point(walk.case, row, **{plan.parameter: value}), start.lift, start.q)
 
     return at
 
@@ -85,8 +102,8 @@ class Sampler:
     Parameters
     ----------
     plan : Plan
-    states : sequence of (n,) array or None
-        Displacements of the case at the values of the range; None where it has no steady state.
+    states : sequence of Start or None
+        Of the case at the values of the range; None where it has no steady state.
     neighbours : mapping, optional
         What samples have in common, by the numbers of the values; without it each is found with its full matrices.
     walk : StabilityWalk, optional
@@ -96,7 +113,7 @@ class Sampler:
     def __init__(
         self,
         plan: Plan,
-        states: Sequence[np.ndarray | None],
+        states: Sequence[Start | None],
         neighbours: Mapping[int, Neighbours] = {},
         walk: StabilityWalk | None = None,
     ):
@@ -115,9 +132,11 @@ class Sampler:
         value, walk = self.plan.values[number], self._walk
         places = [self.plan.point(self.plan.case, row, **{self.plan.parameter: value}) for row in rows]
         try:
-            if self.states[number] is None:
+            if (start := self.states[number]) is None:
                 raise SolveError("The valve of the case has no steady state there.")
-            walk.settle(places[0], self.states[number])
+            met = walk.meet_pump(places[0], start.lift, start.q).pressure
+            places = [place.at(pressure=met) for place in places]
+            walk.settle(places[0], start.q)
             state, column = walk.state(places[0]), walk.column(places, snapshots=min(len(places), 7))
             verdicts = [walk.sample(place, column, i, value).verdict for i, place in enumerate(places)]
         except (SolveError, CaseError) as error:
@@ -132,8 +151,10 @@ class Sampler:
             apart = near is not None
             try:
                 walk = walk or walk_of(self.plan, row, self._solver)
-                place = self.plan.point(walk.case, row, **{self.plan.parameter: value})
-                walk.settle(place, self.states[i] if near is None else near.state(row))
+                lift, q = (0.0, None) if self.states[i] is None else (self.states[i].lift, self.states[i].q)
+                q = q if near is None else near.state(row)
+                place = walk.meet_pump(self.plan.point(walk.case, row, **{self.plan.parameter: value}), lift, q)
+                walk.settle(place, q)
                 state = walk.state(place)
                 verdict = self._beside(i).verdict(walk, place, row) if near else None
                 apart = apart and verdict is None
@@ -142,7 +163,10 @@ class Sampler:
                 verdict = Verdict.undecided(str(error))
             yield Found.of(sample, value, verdict, state, apart)
 
+    def _walks(self, i: int) -> At:
+        return walks_at(self.plan, self.plan.values[i], self.states[i], ColumnSolver())
+
     def _beside(self, i: int) -> Beside:
         if i not in self._found:
-            self._found[i] = Beside(walks_at(self.plan, self.plan.values[i], ColumnSolver()), self._neighbours[i])
+            self._found[i] = Beside(self._walks(i), self._neighbours[i])
         return self._found[i]

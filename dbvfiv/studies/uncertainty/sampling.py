@@ -20,6 +20,12 @@ STEPS = 12
 DEFENSIVE = 0.1
 #: Regions of a rare event that are told apart.
 REGIONS = 2
+#: Independent runs of subset sampling; share of the samples of a level that lead to the next one (Au and Beck, Probab.
+#: Eng. Mech. 16, 2001, 263-277), levels at most, which reach 1e-12, and levels that samples are shared out among.
+RUNS, SHARE, LEVELS, USUAL = 4, 0.1, 12, 4
+#: Share of accepted steps that those of its chains are made for, and the first step (Papaioannou, Betz, Zwirglmaier and
+#: Straub, Probab. Eng. Mech. 41, 2015, 89-103).
+ACCEPTED, FIRST_STEP = 0.44, 0.6
 
 
 @dataclass(frozen=True)
@@ -62,9 +68,10 @@ def weighted(weights: np.ndarray, hits: np.ndarray, undecided: np.ndarray) -> Pr
     return Probability(value, max(low, 0.0), min(high, 1.0))
 
 
-def _mean(terms: np.ndarray) -> tuple[float, float, float]:
+def _mean(terms: np.ndarray, least: float = 0.0) -> tuple[float, float, float]:
     """Mean of independent terms, not negative, with the interval that holds those of Student for it and for its
-    logarithm: few large weights make its distribution skew, between normal and lognormal.
+    logarithm: few large weights make its distribution skew, between normal and lognormal. Their coefficient of
+    variation is `least` at least.
     """
     from scipy.stats import t
 
@@ -73,7 +80,8 @@ def _mean(terms: np.ndarray) -> tuple[float, float, float]:
         # none of n samples: three over the number of samples, were they of the density of the inputs
         return 0.0, 0.0, 1 - (0.5 * (1 - CONFIDENCE)) ** (1 / len(terms))
     freedom = max(float(terms.sum() ** 2 / (terms**2).sum()) - 1, 1.0)  # hits of equal weight that tell as much
-    reach = float(t.ppf(0.5 * (1 + CONFIDENCE), freedom)) * float(terms.std(ddof=1)) / np.sqrt(len(terms)) / mean
+    variation = max(float(terms.std(ddof=1)) / mean, least)
+    reach = float(t.ppf(0.5 * (1 + CONFIDENCE), freedom)) * variation / np.sqrt(len(terms))
     return mean, mean * (1 - reach), mean * np.exp(reach)
 
 
@@ -163,6 +171,60 @@ def approach(
         terms = log_weight + log_ndtr(g / smooth)
         density = density.fitted(z, np.exp(terms - terms.max()))
     return density
+
+
+def subset(
+    evaluate: Callable[[np.ndarray, np.ndarray], np.ndarray], dimension: int, samples: int, seed: int
+) -> Probability:
+    """Probability of a rare event, where a performance is positive, by subset sampling: levels of samples of the inputs
+    beyond ever higher performances, which assume no centres or shapes of the event.
+
+    Independent runs give the interval, so that correlations within and between their levels are in it; it is no
+    narrower than that of independent samples in each level, where few runs agree by chance.
+
+    Parameters
+    ----------
+    evaluate : callable
+        From scores (m, d) and the logarithms (m,) of the probability of their level to performances (m,), NaN where
+        undecided.
+    dimension, samples : int
+        Number of inputs, and of samples by and large.
+    """
+    count = max(32, round(samples / (RUNS * (1 + (USUAL - 1) * (1 - SHARE)))))
+    runs = [_subset_run(evaluate, dimension, count, np.random.default_rng([seed, run])) for run in range(RUNS)]
+    decided, doubtful, squares = np.array(runs).T
+    least = float(np.sqrt(squares.mean()))
+    (value, low, _), (_, _, high) = _mean(decided, least), _mean(doubtful, least)
+    return Probability(value, max(low, 0.0), min(high, 1.0))
+
+
+def _subset_run(evaluate, dimension: int, count: int, random: np.random.Generator) -> tuple[float, float, float]:
+    """Probability from one run, undecided samples of its last level not counted and counted as hits, and the square of
+    its coefficient of variation were all samples of a level independent.
+    """
+    square, scores, log_level, step = 0.0, random.standard_normal((count, dimension)), 0.0, FIRST_STEP
+    values = evaluate(scores, np.zeros(count))
+    undecided = int(np.isnan(values).sum())
+    for _ in range(LEVELS):
+        values = np.nan_to_num(values, nan=-np.inf)
+        bound = np.sort(values)[-max(2, round(SHARE * count)) - 1]
+        seeds = np.flatnonzero(values > bound)
+        if bound >= 0 or not len(seeds):
+            break
+        log_level, square = log_level + np.log(len(seeds) / count), square + 1 / len(seeds) - 1 / count
+        chain, undecided = [(scores[seeds], values[seeds])], 0
+        for k in range(-(-count // len(seeds)) - 1):
+            here, own = chain[-1]
+            ahead = np.sqrt(1 - step**2) * here + step * random.standard_normal(here.shape)
+            new = evaluate(ahead, np.full(len(ahead), log_level))
+            undecided += int(np.isnan(new).sum())
+            taken = new > bound
+            chain.append((np.where(taken[:, None], ahead, here), np.where(taken, new, own)))
+            step = min(1.0, step * np.exp((taken.mean() - ACCEPTED) / np.sqrt(k + 1)))
+        scores, values = (np.concatenate(parts)[:count] for parts in zip(*chain))
+    hits, level = float(np.mean(values > 0)), float(np.exp(log_level))
+    square += (1 / hits - 1) / count if hits else 0.0
+    return level * hits, level * min(hits + undecided / count, 1.0), square
 
 
 def _variation(terms: np.ndarray) -> float:

@@ -28,8 +28,8 @@ from ..stability.walk import StabilityWalk
 from ..study import Study
 from ..workers import Lost, Work, Workers
 from . import figures
-from .sampler import Found, Sampler, walks_at
-from .sampling import CONFIDENCE, Probability, Shifted, approach, counted, shares, weighted
+from .sampler import Found, Sampler, Start, walks_at
+from .sampling import CONFIDENCE, Probability, Shifted, approach, counted, shares, subset, weighted
 
 SAMPLES, NUMBERS = "samples", "numbers"
 #: Notes: reason of an undecided sample; error of the space that samples share at a value of the range; a sample found
@@ -43,7 +43,7 @@ _SAMPLES = (
     Column("frequency", "Hz", "Of that mode"),
     Column("damping_ratio", "", "Of the least damped oscillating mode"),
     Column("opening", "m^2", "Area between the lips"),
-    Column("flow", "m^3/s", "Volume flow"),
+    Column("flow", "m^3/s", "Volume flow; 0 of a bill that is moulded shut and sealed"),
 )
 _NUMBERS = (
     Column("sample", "", "Number of the sample", "i8"),
@@ -56,6 +56,8 @@ _NUMBERS = (
 _TABLES = TableSpec(SAMPLES, _SAMPLES, chunk=512), TableSpec(NUMBERS, _NUMBERS, chunk=512)
 #: Samples that a worker takes at a time: of valves that share their states, and of valves with their own.
 SHARED, OWN = 64, 4
+#: What a bill that is moulded shut may be besides the outcome of its verdict.
+NOT_SEALED = "not sealed"
 #: Samples from which a space that they share pays; valves that it is made of, and that its error is measured on, with
 #: the seed of their inputs, which no samples have.
 PAYS, TAKEN, CHECKS, NEAR_SEED = 48, 6, 4, 2**31 + 1
@@ -93,16 +95,16 @@ def run(session: Session, record: GrowingRecord, workers: int | str | None = Non
     """
     case, plan = session.case, Plan(session.case)
     check_scan(case, plan.parameter)
-    if case.has_pump:
+    if case.has_pump and any(one.name == "pressure" for one in plan.inputs):
         raise CaseError(
-            "Behind a pump every sampled valve has an operating point of its own, which is not asked yet; give "
-            "drive.pressure and no upstream.pump.",
-            key="upstream.pump",
+            "uncertainty.inputs holds the pressure, and behind a pump each sampled valve has that at which both meet; "
+            "leave it out, or the pump.",
+            key="uncertainty.inputs",
         )
-    if case.uncertainty.method == "rare" and len(plan.values) > 1:
+    if case.uncertainty.method != "plain" and len(plan.values) > 1:
         raise CaseError(
-            f"uncertainty.method is 'rare' with {len(plan.values)} values of {plan.parameter}, and samples are drawn "
-            "about the flutter of one state; leave uncertainty.over out, or method.",
+            f"uncertainty.method is {case.uncertainty.method!r} with {len(plan.values)} values of {plan.parameter}, "
+            "and samples are drawn towards the flutter of one state; leave uncertainty.over out, or method.",
             key="uncertainty.method",
         )
     plan.scores_of(np.zeros((1, len(plan.inputs))))  # correlations are checked before anything is solved
@@ -117,17 +119,23 @@ def run(session: Session, record: GrowingRecord, workers: int | str | None = Non
         sampling = _Sampling(plan, record, team, Sampler(plan, states, neighbours, walk))
         if case.uncertainty.method == "rare":
             sampling.rare()
+        elif case.uncertainty.method == "subset":
+            sampling.subset()
         else:
             independent = quasi_random(case.uncertainty.samples, len(plan.inputs), case.uncertainty.seed)
             sampling.verdicts(independent, np.zeros(len(independent)), 0)
 
 
-def _states_of_case(plan: Plan, walk: StabilityWalk, record: GrowingRecord) -> list[np.ndarray | None]:
-    """Displacements of the case itself at the values of the range; what has none is said."""
-    states: list[np.ndarray | None] = []
+def _states_of_case(plan: Plan, walk: StabilityWalk, record: GrowingRecord) -> list[Start | None]:
+    """Steady states of the case itself at the values of the range; what has none is said."""
+    own = Mu.of(plan.case)
+    lift = 0.0 if plan.parameter == "pressure" else walk.lift(own)
+    states: list[Start | None] = []
     for value in plan.values:
         try:
-            states.append(walk.equilibrium(Mu.of(plan.case).at(**{plan.parameter: value})))
+            place = own.at(**{plan.parameter: value})
+            lift = walk.lift(place) if plan.parameter == "pressure" else lift
+            states.append(Start(walk.equilibrium(walk.meet_pump(place, lift)), lift))
         except SolveError as error:
             record.fail(str(error))
             states.append(None)
@@ -136,7 +144,7 @@ def _states_of_case(plan: Plan, walk: StabilityWalk, record: GrowingRecord) -> l
     return states
 
 
-def _neighbours(plan: Plan, states: list[np.ndarray | None], record: GrowingRecord) -> dict[int, Neighbours]:
+def _neighbours(plan: Plan, states: list[Start | None], record: GrowingRecord) -> dict[int, Neighbours]:
     """Neighbours of the case at each value, whose space samples share, where that pays and can be had."""
     found: dict[int, Neighbours] = {}
     if plan.is_surrounding or plan.case.uncertainty.samples < PAYS:
@@ -150,13 +158,13 @@ def _neighbours(plan: Plan, states: list[np.ndarray | None], record: GrowingReco
         where = f"{value / row.scale:.4g} {row.shown_unit}".rstrip()
         record.progress(f"space that samples share at {where}, of {1 + len(near)} valves")
         with suppress(SolveError, CaseError, ArithmeticError, ValueError):  # each sample is then found by itself
-            at = walks_at(plan, value, ColumnSolver())
-            found[i] = find_neighbours(at, origin, ahead, state, near[:TAKEN], near[TAKEN:])
+            at = walks_at(plan, value, state, ColumnSolver())
+            found[i] = find_neighbours(at, origin, ahead, state.q, near[:TAKEN], near[TAKEN:])
             record.note(_SPACE, value=value, error=found[i].error)
     return found
 
 
-def _start(case: dict, states: list[np.ndarray | None], neighbours: dict[int, Neighbours]) -> Sampler:
+def _start(case: dict, states: list[Start | None], neighbours: dict[int, Neighbours]) -> Sampler:
     return Sampler(Plan(Case.from_dict(case)), states, neighbours)
 
 
@@ -165,12 +173,15 @@ def _found(sampler: Sampler, first: int, numbers: np.ndarray) -> list[Found]:
 
 
 def _performance(outcome: int, damping_ratio: float) -> float:
-    """Distance of a sample beyond flutter; NaN where it is undecided."""
-    return np.nan if OUTCOMES[outcome] == UNDECIDED else -damping_ratio
+    """Distance of a sample beyond flutter; NaN where undecided, minus infinity where it cannot flutter."""
+    name = OUTCOMES[outcome]
+    return np.nan if name == UNDECIDED else -damping_ratio if name in (FLUTTERS, STABLE) else -np.inf
 
 
 def _are(found: dict[str, np.ndarray], outcome: str) -> np.ndarray:
-    """True for samples of an outcome."""
+    """True for samples of an outcome, and for those that flow passes, of a bill that is moulded shut."""
+    if outcome == NOT_SEALED:
+        return found["flow"] > 0
     return found["outcome"] == OUTCOMES.index(outcome)
 
 
@@ -255,6 +266,18 @@ class _Sampling:
         scores = density.draw(max(32, round(FINAL * asked.samples)), random)
         self.verdicts(scores, density.log_weight(scores), next(stages))
 
+    def subset(self) -> None:
+        """Samples of levels towards a rare flutter."""
+        stages = iter(range(10000))
+
+        def evaluate(scores: np.ndarray, log_level: np.ndarray) -> np.ndarray:
+            stage = next(stages)
+            self.record.progress(f"step {stage} towards flutter, {len(scores)} samples")
+            return self.verdicts(scores, log_level, stage)
+
+        asked = self.plan.case.uncertainty
+        subset(evaluate, len(self.plan.inputs), asked.samples, asked.seed)
+
 
 class UncertaintyResult(StudyResult):
     """Probability of each outcome over a range, and what decides it.
@@ -310,20 +333,32 @@ class UncertaintyResult(StudyResult):
 
     def probability(self, value: float, outcome: str = FLUTTERS) -> Probability:
         """Probability of an outcome at a value of the range."""
-        found = self.at(value)
+        found, method = self.at(value), self.case.uncertainty.method
         hits, undecided = _are(found, outcome), _are(found, UNDECIDED)
-        if self.case.uncertainty.method == "plain":
+        if method == "plain":
             return counted(int(hits.sum()), int(undecided.sum()), len(hits))
+        if method == "subset":
+            return self._by_levels(found) if outcome == FLUTTERS and self.complete else Probability(np.nan, 0.0, 1.0)
         last = found["stage"] == found["stage"].max(initial=0)
         return weighted(found["weight"][last], hits[last], undecided[last])
 
+    def _by_levels(self, found: dict[str, np.ndarray]) -> Probability:
+        """Probability of flutter by subset sampling, which asks for the kept samples in their order."""
+        values = iter(map(_performance, found["outcome"], found["damping_ratio"]))
+        asked = self.case.uncertainty
+
+        def evaluate(scores: np.ndarray, _log_level: np.ndarray) -> np.ndarray:
+            return np.array([next(values) for _ in scores])
+
+        return subset(evaluate, len(self.plan.inputs), asked.samples, asked.seed)
+
     def point(self, value: float) -> dict[str, Any]:
         """Numbers at a value of the range: ``probability`` of flutter among the decided samples with its ``interval``,
-        ``samples``, ``undecided``, ``shared`` (decided on the space that samples share), ``outcomes`` by their names,
-        ``percentiles`` (2.5, 50, 97.5) and ``decides``.
+        ``samples``, ``undecided``, ``shared`` (decided on the space that samples share), ``outcomes`` by their names
+        (with ``not sealed`` of a bill that is moulded shut), ``percentiles`` (2.5, 50, 97.5) and ``decides``.
         """
         found, flutter = self.at(value), self.probability(value)
-        names = (FLUTTERS, DIVERGES, NOT_VALID, STABLE)
+        names = (FLUTTERS, DIVERGES, NOT_VALID, STABLE, *((NOT_SEALED,) if self.case.valve.is_preset else ()))
         others = {name: self.probability(value, name) for name in names}
         plain = found["stage"] == 0
         spreads = {name: _percentiles(found[name][plain]) for name in _SPREADS}

@@ -5,7 +5,7 @@ import pytest
 from scipy.stats import norm
 
 from dbvfiv.studies.inputs import quasi_random
-from dbvfiv.studies.uncertainty.sampling import approach, counted, shares, weighted
+from dbvfiv.studies.uncertainty.sampling import approach, counted, shares, subset, weighted
 
 #: Stiffnesses 1 + 0.1 z1 and 1.5 + 0.1 z2 of two modes that a circulatory force couples.
 SPREAD, APART = 0.1, 0.5
@@ -66,6 +66,22 @@ def test_intervals_of_rare_samples_hold_the_probability():
     values = np.array([one.value for one in found])
     plain = (1 - chance(force)) / chance(force) / (values.std() / chance(force)) ** 2
     assert np.mean(used) < plain / 50
+
+
+def test_intervals_of_subset_sampling_hold_the_probability():
+    """A probability of 1e-3 by levels, at a half of the samples that an equal error takes of the inputs as they are."""
+    force, used = 0.0316, []
+
+    def evaluate(scores, _log_level):
+        used.append(len(scores))
+        return growth(scores, force)
+
+    found = [subset(evaluate, 2, 1500, seed) for seed in range(100)]
+    assert sum(one.low <= chance(force) <= one.high for one in found) >= 95
+    values = np.array([one.value for one in found])
+    assert np.mean(values) == pytest.approx(chance(force), rel=0.15)
+    plain = (1 - chance(force)) / chance(force) / (values.std() / chance(force)) ** 2
+    assert sum(used) / 100 < plain / 2
 
 
 def test_two_regions_are_both_found():

@@ -21,6 +21,8 @@ from tests.small_valves import SMALL, load_small
 LINE = "cases/dbv12-in-line.toml"
 KEYS = {"uncertainty.samples": 16, "drive.pressure": 4e3, "fluid.density": 20.0, "damping.alpha": 0.0}
 OWN = {"thickness": "normal(4 %)", "materials.CR.stiffness_factor": "lognormal(1.2)", "beta": "lognormal(0.002, 2)"}
+PUMP = {"upstream.length": 20.0, "upstream.diameter": 0.3, "upstream.friction": 0.02, "fluid.density": 1000.0}
+PUMP |= {"upstream.pump": [[0, 3.0], [0.03, 2.6], [0.06, 1.8], [0.1, 0.3]]}
 
 
 def load(**changes):
@@ -92,6 +94,40 @@ def test_surroundings_are_asked_side_by_side(valve):
 
 
 @pytest.mark.slow
+def test_samples_behind_a_pump_have_operating_points_of_their_own():
+    keys = {name: value for name, value in KEYS.items() if name != "drive.pressure"} | PUMP
+    found = load_small(keys).uncertainty(inputs={"thickness": "normal(4 %)", "beta": "lognormal(0.002, 2)"})
+    samples = found.at(found.plan.values[0])
+    assert np.ptp(samples["flow"]) > 0.01 * samples["flow"].mean()
+    thickness, beta = samples["inputs"][3]
+    modes = load_small(keys, {"valve.thickness_factor": thickness, "damping.beta": beta}).modes()
+    assert modes.state.volume_flow == pytest.approx(samples["flow"][3], rel=1e-8)
+    assert modes.verdict.outcome == OUTCOMES[samples["outcome"][3]]
+    assert modes.verdict.growth_rate == pytest.approx(samples["growth_rate"][3], rel=1e-5)
+
+
+@pytest.mark.slow
+def test_a_bill_that_is_moulded_shut_may_be_sealed_or_not():
+    """Below the heads that crack its samples none lets flow pass, between them some do."""
+    keys = {**SMALL, "uncertainty.samples": 16, "uncertainty.inputs": {"sealing": "lognormal(1.5)"}}
+    moulded = dbvfiv.load("cases/dbv12-moulded.toml", keys)
+    found = moulded.uncertainty(over="pressure=0.02 m,0.09 m")
+    shares = [point["outcomes"]["not sealed"]["probability"] for point in found.points]
+    assert shares[0] == 0.0 < shares[1] < 1.0
+
+
+@pytest.mark.slow
+def test_subset_sampling_agrees_with_plain_samples(valve, tmp_path):
+    """A run of levels that is read from its file again, and one of the inputs as they are."""
+    inputs = OWN | {"beta": "lognormal(0.004, 1.6)"}
+    levels = valve.replace({"uncertainty.method": "subset"})
+    found = levels.uncertainty(inputs=inputs, samples=400, output=tmp_path / "levels.h5")
+    (one,), (plain,) = found.points, valve.uncertainty(inputs=inputs, samples=400).points
+    assert one["interval"][0] < plain["interval"][1] and plain["interval"][0] < one["interval"][1]
+    assert load_result(tmp_path / "levels.h5").points == found.points
+
+
+@pytest.mark.slow
 def test_a_rare_flutter_is_found_with_few_samples(valve):
     """Interval of weighted samples beside that of plain ones at a probability of a few per cent."""
     inputs = OWN | {"beta": "lognormal(0.004, 1.6)"}
@@ -138,6 +174,10 @@ def test_a_sealing_pressure_may_be_uncertain():
             "no numbers can be correlated so",
         ),
         ({"uncertainty.inputs": {"pressure": "normal(5 %)"}, "uncertainty.over": "pressure=0.1 m:1 m:3"}, "moves"),
+        (
+            {**PUMP, "uncertainty.inputs": {"pressure": "normal(5 %)"}},
+            "that at which both meet",
+        ),
         ({"uncertainty.method": "rare", "uncertainty.over": "pressure=0.1 m:1 m:3"}, "one state"),
         ({"uncertainty.workers": "few"}, "neither a number nor an address"),
         ({"uncertainty.samples": 3}, "at least 16"),
