@@ -11,7 +11,7 @@ from .basis import (
 from .certificate import Certificate, CertifiedSpectrum, certified_spectrum, listed_unstable
 from .columns import Column, ColumnSolver
 from .count import Count, unstable_count
-from .derivative import PencilDerivative, difference, eigenvalue_derivative
+from .derivative import eigenvalue_derivative
 from .factor import SingularShiftError, Workspace
 from .family import PencilFamily, ReducedFamily
 from .krylov import KrylovPairs, krylov_pairs
@@ -37,7 +37,6 @@ __all__ = [
     "NotConvergedError",
     "NotPositiveError",
     "Oval",
-    "PencilDerivative",
     "PencilFamily",
     "ReducedFamily",
     "Relaxation",
@@ -49,7 +48,6 @@ __all__ = [
     "TransferBasis",
     "Workspace",
     "certified_spectrum",
-    "difference",
     "eigenvalue_derivative",
     "krylov_pairs",
     "largest_pairs",

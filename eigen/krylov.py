@@ -63,11 +63,6 @@ class KrylovPairs:
         return f"<KrylovPairs: {len(self.eigenvalues)} pairs, {found}, {self.applications} applications>"
 
 
-def _apply(matrix, x):
-    """Sparse product that keeps a real matrix real."""
-    return real_apply(matrix, x) if matrix.dtype.kind == "f" else matrix @ x
-
-
 #: Steps before convergence is looked at, and between looks at least.
 FIRST, EVERY = 30, 10
 #: Relative error of theta up to which a pair counts as converged; Newton's corrections do the rest.
@@ -81,8 +76,8 @@ FAR = 10.0
 class _Operator:
     """(F - sigma E)^-1 E with every structural part kept as coefficients of common vectors.
 
-    The transposed pencil is one of the same form, with G and J^T, B and -R^T exchanged; B then has a part with
-    lambda^2, for which lambda U is kept among the unknowns.
+    The transposed pencil is one of the same form, whose inner unknowns act with lambda^2 as well, for which lambda U is
+    kept among the unknowns.
     """
 
     def __init__(self, shifted: ShiftedPencil, transposed: bool):
@@ -90,18 +85,7 @@ class _Operator:
         self.shifted, self.transposed = shifted, transposed
         self.n, self.b = p.n, p.b
         self.scale = abs(s) or 1.0
-        turn = (lambda a: a.T.tocsr()) if transposed else (lambda a: a)
-        self._M = turn(p.M)
-        # sigma M + C, one product less where there is no C
-        self._C = turn(shifted.damping_shifted) if p.C.nnz else None
-        self._relaxing = [turn(matrix) for matrix in p.relaxing]
-        self._G, self._J = (p.J.T.tocsr(), p.G.T.tocsr()) if transposed else (p.G, p.J)
-        zero = np.zeros((p.b, p.m))
-        if transposed:
-            self._A = (p.A1.T, p.A2.T)
-            self._B, self._R, self._S1 = (-p.R1.T, -p.R2.T), (-p.B1.T, zero), p.S1.T
-        else:
-            self._A, self._B, self._R, self._S1 = (p.A1, p.A2), (p.B1, zero.T), (p.R1, p.R2), p.S1
+        self._relaxing = [matrix.T.tocsr() if transposed else matrix for matrix in p.relaxing]
         self.times = np.zeros(0) if p.relaxation is None else p.relaxation.times
         self._below = 1.0 / (1.0 + s * self.times)
         strengths = np.zeros((0, 0)) if p.relaxation is None else p.relaxation.strengths
@@ -120,16 +104,12 @@ class _Operator:
         s = self.shifted.shift
         sums = np.vstack([c[1:2] * self.scale, c[:1], self._weights @ c[2:]])
         v, q, *relaxed = (Q @ sums.T).T.copy()
-        f = real_apply(self._M, v + s * q) if self._C is None else real_apply(self._M, v) + _apply(self._C, q)
+        inner, rate = u[0], self.scale * u[1]
+        # T(lambda) - T(s) over lambda - s: T_1 + (lambda + s) T_2
+        ahead = (v + s * q, rate + s * inner)
+        f, g = self.shifted.pencil.polynomial(None, (q, inner), ahead, transposed=self.transposed)
         for matrix, x in zip(self._relaxing, relaxed):
-            f += real_apply(matrix, x)
-        g = self._S1 @ u[0]
-        if self._G.shape[1]:
-            yv, yq = self._J @ v, self._J @ q
-            motion = self._A[1] @ yv + (self._A[0] + s * self._A[1]) @ yq
-            inner = (self._B[0] + s * self._B[1]) @ u[0] + self._B[1] @ u[1] * self.scale
-            f -= real_apply(self._G, motion + inner)
-            g = g + self._R[1] @ yv + (self._R[0] + s * self._R[1]) @ yq
+            f = f + real_apply(matrix, x)
         solve = self.shifted.solve_transposed if self.transposed else self.shifted.solve
         q, inner = solve(-f, -g)
         return (q, inner) if isinstance(s, complex) else (q.real, inner.real)  # a PETSc of complex numbers

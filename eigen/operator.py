@@ -3,7 +3,7 @@ r"""Parameter-separable operator: structure with a low-rank coupling and relaxin
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, fields, replace
+from dataclasses import KW_ONLY, dataclass, fields, replace
 from functools import cached_property
 
 import numpy as np
@@ -116,24 +116,8 @@ ALIKE = 1e-7
 FLUID_PARTS = ("A0", "A1", "A2", "B0", "B1", "R0", "R1", "R2", "S0", "S1")
 
 
-@dataclass(frozen=True, eq=False, kw_only=True)
-class FluidParts:
-    """Parts of the coupling of a pencil, see `CoupledPencil`; a missing one is zero."""
-
-    A0: np.ndarray | None = None
-    A1: np.ndarray | None = None
-    A2: np.ndarray | None = None
-    B0: np.ndarray | None = None
-    B1: np.ndarray | None = None
-    R0: np.ndarray | None = None
-    R1: np.ndarray | None = None
-    R2: np.ndarray | None = None
-    S0: np.ndarray | None = None
-    S1: np.ndarray | None = None
-
-
 @dataclass(frozen=True, eq=False)
-class CoupledPencil(FluidParts):
+class CoupledPencil:
     r"""Structure and fluid of a linearised coupled state.
 
     .. math::
@@ -179,6 +163,17 @@ class CoupledPencil(FluidParts):
     G: sp.csr_matrix | None = None
     J: sp.csr_matrix | None = None
     relaxation: Relaxation | None = None
+    _: KW_ONLY
+    A0: np.ndarray | None = None
+    A1: np.ndarray | None = None
+    A2: np.ndarray | None = None
+    B0: np.ndarray | None = None
+    B1: np.ndarray | None = None
+    R0: np.ndarray | None = None
+    R1: np.ndarray | None = None
+    R2: np.ndarray | None = None
+    S0: np.ndarray | None = None
+    S1: np.ndarray | None = None
 
     def __repr__(self) -> str:
         relaxing = "" if self.relaxation is None else f", {self.relaxation.branches} relaxation times"
@@ -277,40 +272,87 @@ class CoupledPencil(FluidParts):
         """Values A(s), B(s), R(s), S(s) of the fluid polynomials."""
         return fluid_values(vars(self), s)
 
-    def terms(self, s: complex, q: np.ndarray, U: np.ndarray):
-        """Vectors whose sums are the two block rows of T(s) x.
+    def polynomial(self, *vectors, transposed: bool = False) -> tuple[np.ndarray, np.ndarray]:
+        """Sum T_0 x_0 + T_1 x_1 + T_2 x_2 of the coefficients of 1, lambda and lambda^2, what relaxes left out.
 
         Parameters
         ----------
-        s : complex or array, shape (k,)
-        q : array, shape (n,) or (n, k)
-        U : array, shape (b,) or (b, k)
+        vectors : pairs (q, U), arrays of shape (n,) or (n, k) and (b,) or (b, k), real or complex
+            None for one that is not there.
+        transposed : bool
+            With the transposes of the coefficients.
 
         Returns
         -------
-        structure : list of arrays, shape (n,) or (n, k)
+        f, g : arrays of shape (n, ...) and (b, ...)
+        """
+        forces, slope = (self.J.T, self.G.T) if transposed else (self.G, self.J)
+        f, inner = 0.0, 0.0
+        for x, matrix, fluid in zip(vectors, (self.K, self.C, self.M), self._bordered):
+            if x is None:
+                continue
+            q, u = x
+            f = f + real_apply(matrix.T if transposed else matrix, q)
+            inner = inner + (fluid.T if transposed else fluid) @ np.concatenate([real_apply(slope, q), u])
+        return f + real_apply(forces, inner[: self.m]), inner[self.m :]
+
+    @cached_property
+    def _bordered(self) -> list[np.ndarray]:
+        """[-A, -B; R, S] of each power of lambda, (m + b, m + b): with (G, 1) and (J, 1) beside it all that couples."""
+        none = {"B2": np.zeros_like(self.B0), "S2": np.zeros_like(self.S0)}
+        A, B, R, S = ([none.get(f"{n}{k}", getattr(self, f"{n}{k}", None)) for k in range(3)] for n in "ABRS")
+        return [np.block([[-a, -b], [r, s]]) for a, b, r, s in zip(A, B, R, S)]
+
+    def apply(self, s, q: np.ndarray, u: np.ndarray, transposed: bool = False) -> tuple[np.ndarray, np.ndarray]:
+        """T(s) x of vectors (q, u), each column with an s of its own where s is (k,); see `polynomial`."""
+        f, g = self.polynomial((q, u), (s * q, s * u), (s * s * q, s * s * u), transposed=transposed)
+        return f + self._relaxed(s, q, transposed), g
+
+    def apply_derivative(self, s, q: np.ndarray, u: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """T'(s) x of vectors (q, u), as `apply`."""
+        f, g = self.polynomial(None, (q, u), (2 * s * q, 2 * s * u))
+        return f + (0.0 if self.relaxation is None else self._weighted(self.relaxation.slopes(s), q)), g
+
+    def _relaxed(self, s, q: np.ndarray, transposed: bool = False) -> np.ndarray | float:
+        """Sum of phi_g(s) K_g q."""
+        return 0.0 if self.relaxation is None else self._weighted(self.relaxation.factors(s), q, transposed)
+
+    def _weighted(self, factors, q: np.ndarray, transposed: bool = False) -> np.ndarray:
+        """Sum of K_g q with factors (g, ...)."""
+        parts = ((x, matrix.T if transposed else matrix) for x, matrix in zip(factors, self.relaxing))
+        return sum(x * real_apply(matrix, q) for x, matrix in parts)
+
+    def terms(self, s: np.ndarray, q: np.ndarray, U: np.ndarray):
+        """Terms whose sums are the two block rows of T(s) x, which residuals are measured against.
+
+        Parameters
+        ----------
+        s : array, shape (k,)
+        q, U : arrays, shapes (n, k) and (b, k)
+
+        Returns
+        -------
+        structure : list of arrays, shape (n, k)
             Inertia, damping, stiffness, minus the coupling through y, minus that through U; then what relaxes.
-        fluid : list of arrays, shape (b,) or (b, k)
+        fluid : list of arrays, shape (b, k)
         """
         y = real_apply(self.J, q)
         motion = self.A0 @ y + s * (self.A1 @ y) + s**2 * (self.A2 @ y)
-        inner = self.B0 @ U + s * (self.B1 @ U)
-        structure = [
-            s**2 * real_apply(self.M, q),
-            s * real_apply(self.C, q),
-            real_apply(self.K, q),
-            -real_apply(self.G, motion),
-            -real_apply(self.G, inner),
-        ]
-        structure += self.relaxed(s, q)
+        structure = [s**2 * real_apply(self.M, q), s * real_apply(self.C, q), real_apply(self.K, q)]
+        structure += [-real_apply(self.G, part) for part in (motion, self.B0 @ U + s * (self.B1 @ U))]
+        if self.relaxation is not None:
+            structure += [x * real_apply(k, q) for x, k in zip(self.relaxation.factors(s), self.relaxing)]
         fluid = [self.R0 @ y, s * (self.R1 @ y), s**2 * (self.R2 @ y), self.S0 @ U, s * (self.S1 @ U)]
         return structure, fluid
 
-    def relaxed(self, s: complex, q: np.ndarray) -> list[np.ndarray]:
-        """phi_g(s) K_g q of each part of the stiffness that relaxes; shapes as in `terms`."""
-        if self.relaxation is None:
-            return []
-        return [x * real_apply(matrix, q) for x, matrix in zip(self.relaxation.factors(s), self.relaxing)]
+    def projected(self, V: np.ndarray) -> CoupledPencil:
+        """Pencil on a space (n, k): an operator of the same form."""
+        relaxation = self.relaxation
+        if relaxation is not None:
+            parts = [V.T @ (matrix @ V) for matrix in relaxation.matrices]
+            relaxation = Relaxation(parts, relaxation.strengths, relaxation.times)
+        M, C, K = (V.T @ (matrix @ V) for matrix in (self.M, self.C, self.K))
+        return replace(self, M=M, C=C, K=K, G=V.T @ self.G, J=self.J @ V, relaxation=relaxation)
 
     def first_order(self) -> tuple[np.ndarray, np.ndarray]:
         """Dense F, E with F x = lambda E x, x = (q, lambda q, U, z); for small pencils.

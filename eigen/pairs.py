@@ -228,8 +228,7 @@ def newton(pencil: CoupledPencil, eigenvalue: complex, q, u, *, workspace: Works
         if shifted is None:
             break
         l = shifted.shift  # the place of the factor, not the eigenvalue itself
-        f, g = derivative_times(pencil, l, q, u)
-        y, w = shifted.solve(f, g)
+        y, w = shifted.solve(*pencil.apply_derivative(l, q, u))
         along = np.vdot(q, y) + np.vdot(u, w)
         if not np.isfinite(along) or along == 0:
             break
@@ -253,20 +252,6 @@ def factored_beside(pencil: CoupledPencil, eigenvalue, workspace: Workspace):
         except SingularShiftError:
             continue
     return None
-
-
-def derivative_times(pencil: CoupledPencil, s: complex, q, u):
-    """T'(s) x for one vector, or columns with their own s; shapes as (q, u)."""
-    y = real_apply(pencil.J, q)
-    f = (
-        2 * s * real_apply(pencil.M, q)
-        + real_apply(pencil.C, q)
-        - real_apply(pencil.G, pencil.A1 @ y + 2 * s * (pencil.A2 @ y) + pencil.B1 @ u)
-    )
-    if pencil.relaxation is not None:
-        f = f + sum(x * real_apply(m, q) for x, m in zip(pencil.relaxation.slopes(s), pencil.relaxing))
-    g = pencil.R1 @ y + 2 * s * (pencil.R2 @ y) + pencil.S1 @ u
-    return f, g
 
 
 def _norm(matrix) -> float:
@@ -372,9 +357,8 @@ def polish(pencil, shifted, batch, tolerance) -> None:
         if not bad.size:
             return
         values, q, u = batch.values[bad], batch.q[:, bad], batch.u[:, bad]
-        structure, fluid = pencil.terms(values, q, u)
-        dq, du = shifted.solve(sum(structure), sum(fluid))
-        eq, eu = shifted.solve(*derivative_times(pencil, values, q, u))
+        dq, du = shifted.solve(*pencil.apply(values, q, u))
+        eq, eu = shifted.solve(*pencil.apply_derivative(values, q, u))
         along = np.sum(q.conj() * eq, axis=0) + np.sum(u.conj() * eu, axis=0)
         step = (np.sum(q.conj() * dq, axis=0) + np.sum(u.conj() * du, axis=0)) / along
         step = np.where(values.imag == 0, step.real, step)

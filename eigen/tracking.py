@@ -289,7 +289,6 @@ def _merged_planes(first, second, rows, cols, forward, backward, confidence):
 
 def _predict(state: _State, pencil: CoupledPencil) -> np.ndarray:
     """l - w^H T_new(l) x, a Newton step on the new pencil (w^H T' x = 1)."""
-    structure, fluid = pencil.terms(state.values, state.q, state.u)
-    f, g = sum(structure), sum(fluid)
+    f, g = pencil.apply(state.values, state.q, state.u)
     move = np.sum(state.w.conj() * f, axis=0) + np.sum(state.W.conj() * g, axis=0)
     return np.where(np.isfinite(move), state.values - move, state.values)

@@ -57,7 +57,9 @@ class ValveMemoryForms:
 
     def slope(self, motion: Motion) -> np.ndarray:
         """T'(s) x, complex (n + l,)."""
-        return slope_of(self._coupled, motion.rate, motion.vector)
+        n = self.model.size
+        x = motion.vector
+        return np.concatenate(self._coupled.apply_derivative(motion.rate, x[:n], x[n:]))
 
     def state(self, motion: Motion) -> np.ndarray:
         """Displacements, velocities and flow unknowns (2 n + l,)."""
@@ -136,17 +138,6 @@ class ValveMemoryForms:
         return tuple(np.split(joined, [n, 2 * n, 3 * n, 3 * n + inner]))
 
 
-def slope_of(pencil: CoupledPencil, s: complex, x: np.ndarray) -> np.ndarray:
-    """T'(s) x (n + b,) of a pencil, what relaxes included."""
-    q, u = x[: pencil.n], x[pencil.n :]
-    y = real_apply(pencil.J, q)
-    force = 2 * s * real_apply(pencil.M, q) + real_apply(pencil.C, q)
-    force = force - real_apply(pencil.G, pencil.A1 @ y + 2 * s * (pencil.A2 @ y) + pencil.B1 @ u)
-    if pencil.relaxation is not None:
-        force = force + sum(f * real_apply(k, q) for f, k in zip(pencil.relaxation.slopes(s), pencil.relaxing))
-    return np.concatenate([force, pencil.R1 @ y + 2 * s * (pencil.R2 @ y) + pencil.S1 @ u])
-
-
 class PencilAt:
     """T(s) of a coupled pencil as products and solves in (q, U).
 
@@ -165,26 +156,16 @@ class PencilAt:
         return factored(self.pencil, self.s)
 
     def matvec(self, x):
-        n = self.pencil.n
-        structure, fluid = self.pencil.terms(self.s, x[:n], x[n:])
-        return np.concatenate([sum(structure), sum(fluid)])
+        return np.concatenate(self.pencil.apply(self.s, *self._parts(x)))
 
     def rmatvec(self, x):
-        p, s = self.pencil, self.s
-        w, c = x[: p.n], x[p.n :]
-        A, B, R, S = p.fluid_at(s)
-        t = real_apply(p.G.T.tocsr(), w)
-        force = s * s * real_apply(p.M.T.tocsr(), w) + s * real_apply(p.C.T.tocsr(), w) + real_apply(p.K.T.tocsr(), w)
-        if p.relaxation is not None:
-            factors = p.relaxation.factors(s)
-            force = force + sum(f * real_apply(k.T.tocsr(), w) for f, k in zip(factors, p.relaxing))
-        force = force + real_apply(p.J.T.tocsr(), R.T @ c - A.T @ t)
-        return np.concatenate([force, S.T @ c - B.T @ t])
+        return np.concatenate(self.pencil.apply(self.s, *self._parts(x), transposed=True))
 
     def solve(self, rhs):
-        n = self.pencil.n
-        return np.concatenate(self._factor.solve(rhs[:n], rhs[n:]))
+        return np.concatenate(self._factor.solve(*self._parts(rhs)))
 
     def solve_transpose(self, rhs):
-        n = self.pencil.n
-        return np.concatenate(self._factor.solve_transposed(rhs[:n], rhs[n:]))
+        return np.concatenate(self._factor.solve_transposed(*self._parts(rhs)))
+
+    def _parts(self, x):
+        return x[: self.pencil.n], x[self.pencil.n :]

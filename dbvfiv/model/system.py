@@ -21,7 +21,6 @@ import numpy as np
 
 from continuation import OutOfDomain, Spectrum, System
 from eigen import CoupledPencil, SearchOptions, SingularShiftError, Workspace, leading_modes
-from eigen.operator import real_apply
 
 from ..case.parameters import SYSTEM_NAMES
 from ..errors import SolveError
@@ -263,33 +262,25 @@ class ValveLinearisation:
         return x[:n], x[n : 2 * n], x[2 * n :]
 
     def matvec(self, x):
-        p = self.pencil
         q, v, u = self._parts(x)
-        yq, yv = real_apply(p.J, q), real_apply(p.J, v)
-        force = real_apply(p.K, q) + real_apply(p.C, v) - real_apply(p.G, p.A0 @ yq + p.A1 @ yv + p.B0 @ u)
-        return np.concatenate([v, -force, -(p.R0 @ yq + p.R1 @ yv + p.S0 @ u)])
+        f, g = self.pencil.polynomial((q, u), (v, 0.0 * u))
+        return np.concatenate([v, -f, -g])
 
     def rmatvec(self, x):
-        p = self.pencil
-        a, w, c = self._parts(x)
-        t = real_apply(p.G.T.tocsr(), w)
-        back = p.J.T.tocsr()
-        q = -real_apply(p.K.T.tocsr(), w) + real_apply(back, p.A0.T @ t - p.R0.T @ c)
-        v = a - real_apply(p.C.T.tocsr(), w) + real_apply(back, p.A1.T @ t - p.R1.T @ c)
-        return np.concatenate([q, v, p.B0.T @ t - p.S0.T @ c])
+        a, *rest = self._parts(x)
+        q, u = self.pencil.polynomial(rest, transposed=True)
+        v, _ = self.pencil.polynomial(None, rest, transposed=True)
+        return np.concatenate([-q, a - v, -u])
 
     def mass_matvec(self, x):
-        p = self.pencil
         q, v, u = self._parts(x)
-        y = real_apply(p.J, v)
-        return np.concatenate([q, real_apply(p.M, v) - real_apply(p.G, p.A2 @ y + p.B1 @ u), p.R2 @ y + p.S1 @ u])
+        return np.concatenate([q, *self.pencil.polynomial(None, (0.0 * v, u), (v, u))])
 
     def mass_rmatvec(self, x):
-        p = self.pencil
-        a, w, c = self._parts(x)
-        t = real_apply(p.G.T.tocsr(), w)
-        v = real_apply(p.M.T.tocsr(), w) + real_apply(p.J.T.tocsr(), p.R2.T @ c - p.A2.T @ t)
-        return np.concatenate([a, v, p.S1.T @ c - p.B1.T @ t])
+        a, *rest = self._parts(x)
+        v, _ = self.pencil.polynomial(None, None, rest, transposed=True)
+        _, u = self.pencil.polynomial(None, rest, transposed=True)
+        return np.concatenate([a, v, u])
 
     def shifted(self, shift: complex) -> _Shifted:
         return _Shifted(self, shift)
@@ -337,16 +328,14 @@ class _Shifted:
     def solve(self, rhs):
         p, s = self.linear.pencil, self.shift
         r1, r2, r3 = self.linear._parts(rhs)
-        y = real_apply(p.J, r1)
-        carried = real_apply(p.C, r1) + s * real_apply(p.M, r1) - real_apply(p.G, (p.A1 + s * p.A2) @ y)
-        q, u = self._factor.solve(-r2 - carried, -r3 - (p.R1 + s * p.R2) @ y)
+        still = 0.0 * r3
+        f, g = p.polynomial(None, (r1, still), (s * r1, still))
+        q, u = self._factor.solve(-r2 - f, -r3 - g)
         return np.concatenate([q, r1 + s * q, u])
 
     def solve_transpose(self, rhs):
         p, s = self.linear.pencil, self.shift
         rq, rv, ru = self.linear._parts(rhs)
         w, c = self._factor.solve_transposed(-(rq + s * rv), -ru)
-        t = real_apply(p.G.T.tocsr(), w)
-        back = real_apply(p.J.T.tocsr(), (p.R1 + s * p.R2).T @ c - (p.A1 + s * p.A2).T @ t)
-        a = rv + real_apply(p.C.T.tocsr(), w) + s * real_apply(p.M.T.tocsr(), w) + back
-        return np.concatenate([a, w, c])
+        carried, _ = p.polynomial(None, (w, c), (s * w, s * c), transposed=True)
+        return np.concatenate([rv + carried, w, c])

@@ -8,7 +8,7 @@ import pytest
 from continuation.normal_form import Motion
 from continuation.system import expand
 from dbvfiv.model.dynamics import linearise
-from dbvfiv.model.memory_forms import PencilAt, ValveMemoryForms, slope_of
+from dbvfiv.model.memory_forms import PencilAt, ValveMemoryForms
 from dbvfiv.model.system import ValveSystem
 
 from .test_relaxing_wall import relaxing_valve
@@ -50,7 +50,7 @@ def test_pencil_and_its_slope(valve, steady, parameters, directions):
     assert pencil.solve_transpose(pencil.rmatvec(y)) == pytest.approx(y, abs=1e-6 * np.abs(y).max())
     step = 1e-4 * abs(s)
     difference = (forms.pencil(s + step).matvec(x) - forms.pencil(s - step).matvec(x)) / (2 * step)
-    slope = slope_of(pencil.pencil, s, x)
+    slope = forms.slope(Motion(s, x))
     assert slope == pytest.approx(difference, abs=1e-6 * np.abs(slope).max())
 
 

@@ -20,8 +20,7 @@ from functools import cached_property
 
 import numpy as np
 
-from eigen import CoupledPencil, Mode, Relaxation
-from eigen.derivative import difference, eigenvalue_derivative
+from eigen import CoupledPencil, Mode, eigenvalue_derivative
 
 from ...case.parameters import DESIGN, PARAMETERS, SURROUNDINGS, Mu
 from ...errors import CaseError
@@ -192,20 +191,18 @@ class Neighbourhood:
     def _eigenvalues(self, ends, places, apart: float) -> tuple[complex, ...]:
         if not self.modes:
             return ()
-        here, *pencils = _with_common_times(
-            self._pencil, *(self._linearised(end, q).pencil(end[2]) for end, q in zip(ends, places))
-        )
-        change = difference(*pencils, apart)
-        if self.model.outside is None or places[0] is places[1]:
-            return tuple(eigenvalue_derivative(here, mode, change) for mode in self.modes)
-        density = self.model.case.outside.density(self.mu["density"])
-        below, above = (self.resisting(model, q, self._motions) for (model, _, _), q in zip(ends, places))
-        slope, count = density * (above - below) / apart, len(self.modes)
+        below, above = (self._linearised(end, q).pencil(end[2]) for end, q in zip(ends, places))
+        outside = np.zeros((self.model.size, len(self.modes)), complex)
+        if self.model.outside is not None and places[0] is not places[1]:
+            density = self.model.case.outside.density(self.mu["density"])
+            less, more = (self.resisting(model, q, self._motions) for (model, _, _), q in zip(ends, places))
+            outside = density * (more - less) @ np.vstack([np.eye(len(self.modes)), 1j * np.eye(len(self.modes))])
         found = []
-        for i, mode in enumerate(self.modes):
-            outside = slope[:, i] + 1j * slope[:, count + i]
-            inertia = lambda x, outside=outside: change.M @ x + outside  # noqa: E731
-            found.append(eigenvalue_derivative(here, mode, replace(change, M=inertia)))
+        for mode, resisting in zip(self.modes, outside.T):
+            x = mode.eigenvalue, mode.q, mode.u
+            (f, g), (f_below, g_below) = above.apply(*x), below.apply(*x)
+            change = (f - f_below + mode.eigenvalue**2 * resisting) / apart, (g - g_below) / apart
+            found.append(eigenvalue_derivative(self._pencil, mode, change))
         return tuple(found)
 
     def _linearised(self, end, q: np.ndarray):
@@ -291,26 +288,6 @@ def unit_of(case: Case, name: str) -> str:
     if quantity.startswith(("nu", "poisson", "x_0")):
         return ""
     return {"thickness": "m", "angle": "deg", "density": "kg/m^3"}.get(quantity, "Pa")
-
-
-def _with_common_times(*pencils: CoupledPencil) -> list[CoupledPencil]:
-    """Pencils whose relaxations, if any, have the same parts and times.
-
-    A fitted series may leave out a time, and a factor of zero on the loss factors leaves none.
-    """
-    known = [pencil.relaxation for pencil in pencils if pencil.relaxation is not None]
-    if not known:
-        return list(pencils)
-    times = np.unique(np.concatenate([relaxation.times for relaxation in known]))
-
-    def common(relaxation: Relaxation | None) -> Relaxation:
-        strengths = np.zeros((len(known[0].matrices), len(times)))
-        if relaxation is None:
-            return known[0].replace(strengths, times)
-        strengths[:, np.searchsorted(times, relaxation.times)] = relaxation.strengths
-        return relaxation.replace(strengths, times)
-
-    return [replace(pencil, relaxation=common(pencil.relaxation)) for pencil in pencils]
 
 
 def _inward(name: str, value: float, h: float) -> int:
