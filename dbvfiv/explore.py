@@ -19,6 +19,7 @@ import numpy as np
 
 from eigen import FamilyReduction, ReducedFamily
 from eigen.columns import TOLERANCE
+from eigen.reduction import HELD
 
 from .case.parameters import PARAMETERS, Mu
 from .errors import CaseError, SolveError
@@ -31,9 +32,9 @@ from .studies.stability.place import check_scan, is_surrounding
 from .studies.stability.verdict import UNDECIDED, Verdict
 from .studies.stability.walk import StabilityWalk
 
-#: Leading modes that a reduced operator takes where it is made, and those whose error it is held to, which it takes
-#: where it is enriched; with four everywhere a space is half as large again and answers in twice the time.
-TAKEN, HELD = 4, 2
+#: Leading modes that a reduced operator takes where it is made; where it is enriched it takes those whose error it is
+#: held to, as with four everywhere a space is half as large again and answers in twice the time.
+TAKEN = 4
 #: Share of its value in the case, and multiple of it, that a parameter is offered from and to.
 OFFERED = {"pressure": (0.1, 2.5), "density": (0.5, 1.5), "pipe_length": (0.2, 5.0)}
 #: The same of the damping.
@@ -180,9 +181,7 @@ class Explorer:
         family = self.walk.family(place)
         if self._space is None or self._space[0].family is not family:
             reduction = self.walk.built(place).solver.reduction(family)
-            banded = family.relaxation(place) is None and np.isfinite(family.reach(place).band)
-            first = reduction.wide if banded else reduction.coarse
-            self._space = reduction, reduction.fine(first, [place], TAKEN), self._corners(place)
+            self._space = reduction, reduction.fine(reduction.first([place]), [place], TAKEN), self._corners(place)
 
     def bounded(self, **values: float) -> Answer:
         """Prediction with its bound, on a reduced operator that is enriched where this is too large. Where the
@@ -239,7 +238,7 @@ class Explorer:
         if refusal:
             return Answer(place, state, Verdict.not_valid(refusal), confirmed=True)
         spectrum = self.walk.spectrum(place, self.case.modes.count)
-        found = self.walk.sample(place, self.walk.column([place], spectra=[spectrum]))
+        found = self.walk.sample(place, self.walk.cell(place, spectrum))
         counts, region = (found.unstable, found.counted, found.certain), {"line": found.line, "band": found.band}
         values = np.asarray(spectrum.eigenvalues)
         return Answer(place, state, Verdict.of(values, *counts, **region), values, 0.0, True)
@@ -264,11 +263,15 @@ class Explorer:
         interrupted.
         """
         reduction, space, corners = self._space
-        bound = np.nan if self.interrupted() else _bound(reduction, space, place)
-        if bound > TOLERANCE and not self.interrupted():
-            space = reduction.deeper(space, [place], HELD)
-            self._space = reduction, space, corners
-            bound = np.nan if self.interrupted() else _bound(reduction, space, place)
+        for enriched in (False, True):
+            if self.interrupted():
+                return np.nan
+            if enriched:
+                space = reduction.deeper(space, [place], HELD)
+                self._space = reduction, space, corners
+            bound = np.nan if self.interrupted() else reduction.error(space, [place])
+            if not bound > TOLERANCE:
+                break
         return bound
 
     def _predicted(self, place: Mu, state: SteadyState, bound: float) -> Answer:
@@ -280,11 +283,3 @@ class Explorer:
         if values.size and abs(values[0].real) <= bound * abs(values[0]):
             found = replace(found, outcome=UNDECIDED, reason=f"The leading mode is neutral within {bound:.1g}. {said}")
         return Answer(place, state, found, values, bound)
-
-
-def _bound(reduction: FamilyReduction, space: ReducedFamily, place: Mu) -> float:
-    """Relative change of the leading eigenvalues under a correction with the full matrices."""
-    pairs = space.pairs(place, HELD)
-    if not pairs.values.size:
-        return 0.0
-    return float((np.abs(reduction.correction(pairs, place)) / np.maximum(np.abs(pairs.values), 1.0)).max())

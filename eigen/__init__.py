@@ -9,7 +9,7 @@ from .basis import (
     lowest_frequencies,
 )
 from .certificate import Certificate, CertifiedSpectrum, certified_spectrum, listed_unstable
-from .columns import Column, ColumnSolver
+from .columns import Cell, Column, ColumnSolver, ReducedColumn
 from .count import Count, unstable_count
 from .derivative import eigenvalue_derivative
 from .factor import SingularShiftError, Workspace
@@ -24,6 +24,7 @@ from .tracking import Branches, TrackOptions, track
 __all__ = [
     "CLEAR",
     "Branches",
+    "Cell",
     "Certificate",
     "CertifiedSpectrum",
     "Column",
@@ -38,6 +39,7 @@ __all__ = [
     "NotPositiveError",
     "Oval",
     "PencilFamily",
+    "ReducedColumn",
     "ReducedFamily",
     "Relaxation",
     "SearchOptions",

@@ -11,8 +11,8 @@ import scipy.linalg as la
 import scipy.sparse as sp
 import scipy.sparse.linalg as spla
 
-from .factor import MumpsFactorization, SingularShiftError, StructureMatrices, Workspace
-from .operator import FLUID_PARTS, CoupledPencil, Relaxation
+from .factor import SingularShiftError, Workspace
+from .operator import CoupledPencil
 
 #: Squares of lengths that rounding leaves, relative to one.
 ROUNDING = 1e-15
@@ -173,9 +173,8 @@ class TransferBasis:
 
     The space V holds the lowest modes of (K + K^T)/2 and M, and what they leave out
     statically: K^-1 G for the forces and K^-T J^T for the motions, compressed. The pencil
-    projected on V keeps its form, with k in place of n unknowns, so everything of this
-    package works on it: H(lambda) = J (lambda^2 M + lambda C + K)^-1 G, leading modes, count. What relaxes of the
-    stiffness is projected likewise; modes and corrections are those of the stiffness at a typical frequency.
+    projected on V (`CoupledPencil.projected`) keeps its form, with k in place of n unknowns. Modes and corrections are
+    those of the stiffness at a typical frequency.
 
     Parameters
     ----------
@@ -200,110 +199,38 @@ class TransferBasis:
     >>> pencil = CoupledPencil(M=np.eye(2), C=0.1 * np.eye(2), K=np.diag([1.0, 4.0]),
     ...                        G=G, J=G.T, A0=[[0.5]])
     >>> basis = TransferBasis(pencil, modes=1)
-    >>> basis.reduced(pencil).n
+    >>> pencil.projected(basis.V).n
     1
     """
 
     def __init__(self, pencil: CoupledPencil, *, modes: int = 24, compression: float = 1e-7):
-        self._G, self._J, self._M = pencil.G, pencil.J, pencil.M
-        self._projected: dict[int, tuple[object, np.ndarray]] = {}
         typical = _at_typical_frequency(pencil)
-        values, vectors = _lowest_modes(typical, modes)
+        values, vectors = lowest_modes(typical, modes)
         self.structural_frequencies = _frequencies(pencil, values, vectors)
         self.V = np.zeros((pencil.n, 0))
-        self._extend(vectors)
+        self._extend(pencil.M, vectors, ROUNDING**0.5)
         if pencil.m and self.V.shape[1] < pencil.n:
-            self._extend(self._static_corrections(typical, values), compression)
+            lowest = np.sqrt(max(np.abs(values).min(), 1e-12 * np.abs(values).max()))
+            factor = Workspace().factored_near(typical.replace(C=0.0 * pencil.M), (0.0, 0.1 * lowest, lowest))
+            parts = [factor.solve(pencil.G.toarray()).real, factor.solve_transposed(pencil.J.toarray().T).real]
+            self._extend(pencil.M, np.hstack([p / (np.linalg.norm(p) or 1.0) for p in parts]), compression)
 
     @property
     def size(self) -> int:
         """Number k of basis vectors."""
         return self.V.shape[1]
 
-    def _static_corrections(self, pencil, values):
-        lowest = np.sqrt(max(np.abs(values).min(), 1e-12 * np.abs(values).max()))
-        structure = StructureMatrices(pencil.replace(C=sp.csr_matrix(pencil.C.shape)))
-        factor = MumpsFactorization(structure)
-        # a little inertia stands in where the stiffness itself is singular
-        for shift in (0.0, 0.1 * lowest, lowest):
-            try:
-                factor.refactor(structure.values(shift))
-                parts = [factor.solve(pencil.G.toarray()).real, factor.solve_transposed(pencil.J.toarray().T).real]
-            except SingularShiftError:
-                continue
-            if all(np.isfinite(p).all() for p in parts):
-                return np.hstack([p / (np.linalg.norm(p) or 1.0) for p in parts])
-        return np.zeros((pencil.n, 0))
-
-    def enlarge(self, *vectors, compression: float = 1e-7) -> int:
-        """Add vectors, shape (n, j), real or complex; returns the new size."""
-        columns = [part for v in vectors for part in ((v.real, v.imag) if np.iscomplexobj(v) else (v,))]
-        self._extend(np.hstack(columns), compression)
-        return self.size
-
-    def enlarged(self, *vectors, compression: float = 1e-7) -> TransferBasis:
-        """A larger basis; this one stays as it is."""
+    def enlarged(self, pencil: CoupledPencil, *vectors, compression: float = 1e-7) -> TransferBasis:
+        """Larger basis with vectors (n, j) of its pencil besides, real or complex; this one stays as it is."""
         other = copy(self)
-        other._projected = {}
-        other.enlarge(*vectors, compression=compression)
+        columns = [part for v in vectors for part in ((v.real, v.imag) if np.iscomplexobj(v) else (v,))]
+        other._extend(pencil.M, np.hstack(columns), compression)
         return other
 
-    def _extend(self, X, compression: float = 1e-10):
-        """M-orthonormalise X against V and keep the directions that matter."""
-        X = outside(self.V, self._M, X, compression)
+    def _extend(self, mass, X, compression: float):
+        """Append what vectors have outside the space, as far as it matters."""
         room = self.V.shape[0] - self.V.shape[1]
-        self.V = np.hstack([self.V, X[:, :room]])
-        self._projected.clear()
-        self._structure = (None, None, None, None), None
-        self._reduced_G = self.V.T @ self._G
-        self._reduced_J = self._J @ self.V
-
-    def project(self, matrix) -> np.ndarray:
-        """V^T matrix V; kept as long as the same matrix object comes again."""
-        known = self._projected.get(id(matrix))
-        if known is None or known[0] is not matrix:
-            if len(self._projected) > 16:
-                self._projected.clear()
-            known = (matrix, self.V.T @ (matrix @ self.V))
-            self._projected[id(matrix)] = known
-        return known[1]
-
-    def reduced(self, pencil: CoupledPencil, *, damping: np.ndarray | None = None) -> CoupledPencil:
-        """The pencil on the basis.
-
-        Parameters
-        ----------
-        pencil : CoupledPencil
-            Same G and J as the basis was made for.
-        damping : ndarray, shape (k, k), optional
-            V^T C V, where it is known more cheaply, as
-            alpha * project(M) + beta * project(Ks).
-        """
-        C = self.project(pencil.C) if damping is None else damping
-        matrices = (self.project(pencil.M), C, self.project(pencil.K))
-        known = (*matrices, pencil.relaxation)
-        if not all(a is b for a, b in zip(known, self._structure[0])):
-            structure = CoupledPencil(
-                *matrices, self._reduced_G, self._reduced_J, relaxation=self._relaxation(pencil.relaxation)
-            )
-            self._structure = known, structure
-        return self._structure[1].replace(**{name: getattr(pencil, name) for name in FLUID_PARTS})
-
-    def transfer(self, pencil: CoupledPencil, s: complex) -> np.ndarray:
-        """H(s) = J (s^2 M + s C + K)^-1 G, with what relaxes, on the basis, shape (m, m)."""
-        D = s * s * self.project(pencil.M) + s * self.project(pencil.C) + self.project(pencil.K)
-        if pencil.relaxation is not None:
-            D = D + sum(x * self.project(m) for x, m in zip(pencil.relaxation.factors(s), pencil.relaxing))
-        return self._reduced_J @ np.linalg.solve(D, self._reduced_G)
-
-    def _relaxation(self, relaxation: Relaxation | None) -> Relaxation | None:
-        if relaxation is None:
-            return None
-        return Relaxation([self.project(m) for m in relaxation.matrices], relaxation.strengths, relaxation.times)
-
-    def lift(self, vectors: np.ndarray) -> np.ndarray:
-        """Full structural vectors from reduced ones, shape (n, j)."""
-        return self.V @ vectors
+        self.V = np.hstack([self.V, outside(self.V, mass, X, compression)[:, :room]])
 
 
 def lowest_frequencies(pencil: CoupledPencil, count: int, workspace: Workspace | None = None) -> np.ndarray:
@@ -328,7 +255,7 @@ def lowest_frequencies(pencil: CoupledPencil, count: int, workspace: Workspace |
     >>> np.round(lowest_frequencies(pencil, 2), 6)
     array([1., 2.])
     """
-    return _frequencies(pencil, *_lowest_modes(_at_typical_frequency(pencil, workspace), count, workspace))
+    return _frequencies(pencil, *lowest_modes(_at_typical_frequency(pencil, workspace), count, workspace))
 
 
 def _at_typical_frequency(pencil, workspace=None):
@@ -337,7 +264,7 @@ def _at_typical_frequency(pencil, workspace=None):
     if relaxation is None:
         return pencil
     elastic = pencil.replace(relaxation=None)
-    square = float(_lowest_modes(elastic, 1, workspace)[0][0])
+    square = float(lowest_modes(elastic, 1, workspace)[0][0])
     omega = TYPICAL * np.sqrt(square) if square > 0 else float(np.exp(-np.log(relaxation.times).mean()))
     stiffer = sum(x * m for x, m in zip(relaxation.factors(1j * omega).real, relaxation.matrices))
     return elastic.replace(K=(pencil.K + stiffer).tocsr())
@@ -355,7 +282,7 @@ def _frequencies(pencil, squares, vectors, steps: int = 4):
     return omega / (2 * np.pi)
 
 
-def _lowest_modes(pencil, count, workspace=None):
+def lowest_modes(pencil, count, workspace=None):
     """Squares of the lowest angular frequencies of the symmetric structure, ascending, and its modes."""
     symmetric = ((pencil.K + pencil.K.T) * 0.5).tocsr()
     count = min(count, pencil.n)
@@ -367,9 +294,9 @@ def _lowest_modes(pencil, count, workspace=None):
 
 def _lowest_by_inverse(stiffness, mass, count, workspace):
     """Lowest modes of a large symmetric pencil by shift and invert a little below zero."""
-    unit = np.median(stiffness.diagonal()) / np.median(mass.diagonal())
+    shift = 1e-8 * np.median(stiffness.diagonal()) / np.median(mass.diagonal())
     structure = CoupledPencil(M=mass, C=sp.csr_matrix(mass.shape), K=stiffness)
-    shift = 1e-8 * unit
+    # a little below zero; where that is an eigenvalue, a little farther
     for _ in range(6):
         try:
             factor = workspace.factored(structure, float(np.sqrt(shift)))

@@ -96,13 +96,13 @@ def distant_pairs(
     """
     if spectrum.left_q is not None:
         return None
-    values, q, u, _, _ = all_pairs(pencil if basis is None else basis.reduced(pencil), left=False)
+    values, q, u, _, _ = all_pairs(pencil if basis is None else pencil.projected(basis.V), left=False)
     unstable = np.flatnonzero(values.real > line)
     unstable = unstable[np.argsort(-values.real[unstable])]
     chosen = list(unstable[values.imag[unstable] == 0][:MOST])
     if options.max_frequency is None:
         chosen += list(unstable[values.imag[unstable] > 2 * np.pi * spectrum.band][:MOST])
-    starts = [(values[i], q[:, i] if basis is None else basis.lift(q[:, i]), u[:, i]) for i in chosen]
+    starts = [(values[i], q[:, i] if basis is None else basis.V @ q[:, i], u[:, i]) for i in chosen]
     workspace = Workspace()
     pairs = []
     for start in starts:
@@ -289,9 +289,9 @@ def _finer(pencil, basis, found, finer) -> TransferBasis:
     """A basis that answers better than the one that left a count open."""
     spectrum = found.spectrum
     if finer == 1 and len(spectrum):  # a mode that is all but neutral has to be met to a fraction of its growth rate
-        return basis.enlarged(*(q for q in (spectrum.q, spectrum.left_q) if q is not None))
+        return basis.enlarged(pencil, *(q for q in (spectrum.q, spectrum.left_q) if q is not None))
     checked = _checks(spectrum, found.count, finer - 1, basis)
-    return basis.enlarged(*responses(pencil, checked), compression=DISTINCT)
+    return basis.enlarged(pencil, *responses(pencil, checked), compression=DISTINCT)
 
 
 def _judged(pencil, options, search, spectrum, basis, finer=0, within=None):
@@ -300,7 +300,7 @@ def _judged(pencil, options, search, spectrum, basis, finer=0, within=None):
     """
     model, scale = pencil, None
     if basis is not None:
-        model, scale = basis.reduced(pencil), 2 * np.pi * (float(basis.structural_frequencies[0]) or 1.0)
+        model, scale = pencil.projected(basis.V), 2 * np.pi * (float(basis.structural_frequencies[0]) or 1.0)
 
     def counted(band=None):
         # a structure that loses stability by itself has very many modes beyond a band that hardly decay
@@ -321,8 +321,8 @@ def _judged(pencil, options, search, spectrum, basis, finer=0, within=None):
         if distant is not None:
             spectrum = joined(spectrum, distant, winding.line)
             if basis is not None:
-                basis = basis.enlarged(distant.q)
-                model = basis.reduced(pencil)
+                basis = basis.enlarged(pencil, distant.q)
+                model = pencil.projected(basis.V)
             winding = counted()
     settled = winding.certain and winding.number == listed_unstable(spectrum, winding)
     if not settled and np.isfinite(spectrum.band):
@@ -335,7 +335,7 @@ def _judged(pencil, options, search, spectrum, basis, finer=0, within=None):
     listed = listed_unstable(spectrum, winding)
     error = None
     if model is not pencil:
-        error = response_error(pencil, basis, _checks(spectrum, winding, finer, basis))
+        error = response_error(pencil, model, _checks(spectrum, winding, finer, basis))
     trusted = winding.certain and (error is None or error < TRUSTED)
     certificate = Certificate(listed, winding.number, trusted, winding.line, winding.band)
     return CertifiedSpectrum(spectrum, winding, certificate, error), basis
@@ -347,16 +347,16 @@ def listed_unstable(spectrum: Spectrum, count: Count) -> int:
     return spectrum.select(inside).count_right_of(count.line)
 
 
-def response_error(pencil: CoupledPencil, basis: TransferBasis, frequencies) -> float:
-    """Largest error of log det of the condensed pencil made by the basis, at i 2 pi f."""
-    worst = 0.0
-    for s, factor in _factored(pencil, frequencies):
+def response_error(pencil: CoupledPencil, reduced: CoupledPencil, frequencies) -> float:
+    """Largest error of log det of the condensed pencil made by a reduced one, at i 2 pi f."""
+    worst, small, forces = 0.0, StructureMatrices(reduced), reduced.G.toarray()
+    for s, factor in _factored(pencil, frequencies if pencil.m else ()):
         exact = real_apply(pencil.J, factor.solve(pencil.G.toarray().astype(complex)))
         coupling, _ = pencil.fluid.condensed([s])
-        small = [np.eye(pencil.m) - coupling[0] @ H for H in (exact, basis.transfer(pencil, s))]
-        if pencil.m:
-            ratio = np.linalg.det(np.linalg.solve(small[0], small[1]))
-            worst = max(worst, float(abs(np.log(ratio))) if ratio != 0 else np.inf)
+        other = reduced.J @ np.linalg.solve(small.matrix(s).toarray(), forces)
+        both = [np.eye(pencil.m) - coupling[0] @ H for H in (exact, other)]
+        ratio = np.linalg.det(np.linalg.solve(*both))
+        worst = max(worst, float(abs(np.log(ratio))) if ratio != 0 else np.inf)
     return worst
 
 

@@ -9,6 +9,7 @@ real MUMPS refactorisation, the equivalent real form of twice the size 6 times.
 from __future__ import annotations
 
 import weakref
+from contextlib import suppress
 from functools import cached_property
 
 import numpy as np
@@ -239,13 +240,11 @@ class MumpsFactorization:
 
     def solve_transposed(self, b: np.ndarray) -> np.ndarray:
         """Solve with the transpose (not the adjoint)."""
-        if b.ndim == 2:
-            return np.stack([self.solve_transposed(column) for column in b.T], axis=1) if b.shape[1] else np.array(b)
-        if self._splits(b):
-            return self.solve_transposed(b.real) + 1j * self.solve_transposed(b.imag)
-        self._rhs_array[:] = b
-        self._factor.solveTranspose(self._rhs, self._out)
-        return self._out_array.copy()
+        self._factor.setMumpsIcntl(9, 0)  # MUMPS solves with the transpose, whole blocks too, when told so
+        try:
+            return self.solve(b)
+        finally:
+            self._factor.setMumpsIcntl(9, 1)
 
     def _splits(self, b):
         return np.iscomplexobj(b) and self.dtype.kind == "f"
@@ -442,6 +441,20 @@ class Workspace:
             return ScaledLU(structure.columns(structure.values(shift)))
         factor.refactor(structure.values(shift))
         return factor
+
+    def factored_near(self, pencil: CoupledPencil, shifts):
+        """LU of the structure at the first of some shifts at which it is regular.
+
+        Raises
+        ------
+        SingularShiftError
+            If it is at none.
+        """
+        *others, last = shifts
+        for shift in others:
+            with suppress(SingularShiftError):
+                return self.factored(pencil, shift)
+        return self.factored(pencil, last)
 
 
 class ShiftedPencil:

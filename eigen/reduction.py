@@ -9,78 +9,21 @@ from __future__ import annotations
 
 import weakref
 from collections.abc import Hashable, Iterator
-from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 import scipy.linalg as la
 import scipy.sparse as sp
 
-from .basis import TransferBasis, orthonormal
-from .factor import MumpsFactorization, SingularShiftError, StructureMatrices, Workspace
+from .basis import lowest_modes, orthonormal
+from .factor import Workspace
 from .family import Pairs, PencilFamily, ReducedFamily
-from .operator import CoupledPencil, Relaxation, fluid_values, real_apply
+from .operator import CoupledPencil, Relaxation
 
-
-class StaticSolver:
-    """Block solves with K and its transpose; the symbolic factorisation is kept between families of one pattern."""
-
-    def __init__(self):
-        self._structure = None
-        self._factor = None
-
-    def factor(self, family: PencilFamily) -> None:
-        """Factor K of a family; where it is singular a little inertia stands in.
-
-        Raises
-        ------
-        SingularShiftError
-        """
-        pencil = CoupledPencil(family.mass, sp.csr_matrix(family.mass.shape), family.stiffness)
-        if self._structure is not None and self._structure.fits(pencil):
-            self._structure.load(pencil)
-        else:
-            self._structure = StructureMatrices(pencil)
-            self._factor = MumpsFactorization(self._structure)
-        self._refactor(np.array([0.0, 0.0, 1.0]))
-
-    def factor_sum(self, matrices: StructureMatrices, weights: np.ndarray) -> None:
-        """Factor a sum of matrices of one pattern, weights as of its data; where it is singular a little inertia stands
-        in.
-
-        Raises
-        ------
-        SingularShiftError
-        """
-        if self._structure is not matrices:
-            self._structure, self._factor = matrices, MumpsFactorization(matrices)
-        self._refactor(weights)
-
-    def _refactor(self, weights: np.ndarray) -> None:
-        inertia = np.eye(len(weights))[0]
-        for shift in (0.0, 20.0, 100.0):
-            try:
-                return self._factor.refactor((weights + shift**2 * inertia) @ self._structure.data)
-            except SingularShiftError:
-                continue
-        raise SingularShiftError("The stiffness of the family is singular.")
-
-    def solve(self, right: np.ndarray) -> np.ndarray:
-        """K^-1 of columns (n, k), real or complex."""
-        return self._factor.solve(right)
-
-    def solve_transposed(self, right: np.ndarray) -> np.ndarray:
-        """K^-T of columns (n, k)."""
-        inner = getattr(self._factor, "_factor", None)
-        if not hasattr(inner, "setMumpsIcntl"):
-            return self._factor.solve_transposed(right)
-        inner.setMumpsIcntl(9, 0)  # MUMPS solves whole blocks with the transpose when told so
-        try:
-            return self._factor.solve(right)
-        finally:
-            inner.setMumpsIcntl(9, 1)
-
-
+#: Frequencies, rad/s, whose inertia stands in where a stiffness is singular.
+SINGULAR = (0.0, 20.0, 100.0)
+#: Leading modes whose error a reduced model is held to.
+HELD = 2
 #: Static corrections below this share of the largest are left out of the first space.
 COMPRESSION = 1e-4
 #: Share of the floor down to which vectors are taken into the second space.
@@ -102,48 +45,15 @@ GUARD, REFINED = 6, 8
 SETTLED, SAME = 1e-6, 1e-10
 
 
-@dataclass(frozen=True)
-class _Products:
-    """Parts that a residual needs of structural vectors, whatever their eigenvalues: their images under M, K, the
-    damping of the material (None without), what relaxes, and the coupling.
-    """
-
-    mass: np.ndarray
-    stiffness: np.ndarray
-    damping: np.ndarray | None
-    relaxing: list[np.ndarray]
-    coupled: np.ndarray
-
-    def __getitem__(self, own: slice) -> _Products:
-        damping = None if self.damping is None else self.damping[:, own]
-        relaxing = [image[:, own] for image in self.relaxing]
-        return _Products(self.mass[:, own], self.stiffness[:, own], damping, relaxing, self.coupled[:, own])
-
-
-class _Block:
-    """Eigenpairs at several parameter points of one relaxation side by side; `columns` says which are whose."""
-
-    def __init__(self, family: PencilFamily, several: list[Pairs], points):
-        self.several, self.points = several, points
-        sizes = [len(pairs.values) for pairs in several]
-        ends = np.cumsum(sizes)
-        self.columns = [slice(end - size, end) for size, end in zip(sizes, ends)]
-        self.values = np.concatenate([pairs.values for pairs in several])
-        self.beta = np.repeat([family.rayleigh(mu)[1] for mu in points], sizes)
-        self.q, self.w = np.hstack([pairs.q for pairs in several]), np.hstack([pairs.w for pairs in several])
-
-
 class FamilyReduction:
     """Small models of a family, and what the full matrices say about them.
 
     Parameters
     ----------
     family : PencilFamily
-    solver, stiffened : StaticSolver, optional
+    static, stiffened : Workspace, optional
         Keep the symbolic factorisation between families of one pattern: of the stiffness, and of that which a typical
         motion sees where parts of it relax.
-    workspace : Workspace, optional
-        Keeps the pattern of the structure likewise.
 
     Raises
     ------
@@ -151,19 +61,18 @@ class FamilyReduction:
         If the stiffness is singular.
     """
 
-    def __init__(
-        self,
-        family: PencilFamily,
-        solver: StaticSolver | None = None,
-        stiffened: StaticSolver | None = None,
-        workspace: Workspace | None = None,
-    ):
-        self.family, self._workspace = family, workspace or Workspace()
-        self._matrices: StructureMatrices | None = None
-        self.solver = solver or StaticSolver()
-        self.solver.factor(family)
-        self._stiffened, self._relaxed = stiffened or StaticSolver(), None
+    def __init__(self, family: PencilFamily, static: Workspace | None = None, stiffened: Workspace | None = None):
+        self.family = family
+        self.solver = (static or Workspace()).factored_near(self._elastic(family.stiffness), SINGULAR)
+        self._workspace, self._stiffened = stiffened or Workspace(), (None, None)
+        #: Of a family next to another one: frequency, shares and solver of that.
+        self._beside: tuple | None = None
         family.model = weakref.ref(self)
+
+    def _elastic(self, stiffness) -> CoupledPencil:
+        """Undamped structure with a stiffness."""
+        mass = self.family.mass
+        return CoupledPencil(mass, sp.csr_matrix(mass.shape), stiffness)
 
     @cached_property
     def coarse(self) -> ReducedFamily:
@@ -183,21 +92,28 @@ class FamilyReduction:
     @cached_property
     def wide(self) -> ReducedFamily:
         """First stage with the lowest motions of the structure itself, for bands that damping does not end."""
+        lowest = lowest_modes(self._elastic(self.family.stiffness), LOWEST)[1]
+        return ReducedFamily(self.family, np.hstack([lowest, self.coarse.V]), COMPRESSION)
+
+    def first(self, points) -> ReducedFamily:
+        """First stage for some parameter points: with the lowest motions where all modes of a band are close to
+        neutral, as they are where only it makes modes leading.
+        """
         family = self.family
-        structure = CoupledPencil(family.mass, sp.csr_matrix(family.mass.shape), family.stiffness)
-        lowest = TransferBasis(structure, modes=LOWEST).V
-        return ReducedFamily(family, np.hstack([lowest, self.coarse.V]), COMPRESSION)
+        banded = any(family.relaxation(mu) is None and np.isfinite(family.reach(mu).band) for mu in points)
+        return self.wide if banded else self.coarse
 
     def beside(self, family: PencilFamily, space: np.ndarray, mu: Hashable) -> FamilyReduction:
         """Reduced model of an operator next to this one, on a space (n, k) that serves both, without a factorisation;
         `mu` is a parameter point of this one whose relaxation is that of both by and large.
         """
+        other = object.__new__(FamilyReduction)
+        other.family, other.solver = family, self.solver
+        other.coarse = other.wide = ReducedFamily(family, space, COMPRESSION)
         relaxation = self.family.relaxation(mu)
-        typical, stiffened = (1.0, np.zeros(0)), self.solver
-        if relaxation is not None:
-            typical = self._typical(mu)
-            stiffened = self._stiffened_by(relaxation.factors(1j * typical[0]).real, relaxation)
-        return _ReductionBeside(family, space, self.solver, typical, stiffened)
+        other._beside = () if relaxation is None else (*self._typical(mu), self._stiffened_by(relaxation, mu))
+        family.model = weakref.ref(other)
+        return other
 
     def lowest_frequencies(self, count: int) -> np.ndarray:
         """Lowest frequencies of the undamped symmetric structure, Hz, ascending, as the function of that name has them;
@@ -206,6 +122,8 @@ class FamilyReduction:
         family, coarse = self.family, self.coarse
         squares, turn = la.eigh(0.5 * (coarse.stiffness + coarse.stiffness.T))
         order = np.argsort(np.abs(squares))[: count + GUARD]  # those next to zero, as shift and invert finds them
+        if self._beside is not None:
+            return np.sqrt(np.maximum(np.sort(squares[order][:count]), 0.0)) / (2 * np.pi)
         X, squares = coarse.V @ turn[:, order], squares[order]
         symmetric = ((family.stiffness + family.stiffness.T) * 0.5).tocsr()
         KX, MX = symmetric @ X, family.mass @ X
@@ -223,41 +141,9 @@ class FamilyReduction:
                 return np.sort(np.sqrt(np.maximum(found, 0.0))) / (2 * np.pi)
         return np.zeros(0)
 
-    def _products(self, q, beta: float, relaxation: Relaxation | None, left: bool = False) -> _Products:
-        family = self.family
-        turn = (lambda a: a.T) if left else (lambda a: a)
-        q = np.asarray(q, complex)
-        return _Products(
-            real_apply(family.mass, q),
-            real_apply(turn(family.stiffness), q),
-            real_apply(turn(family.damping), q) if beta else None,
-            [] if relaxation is None else [real_apply(turn(matrix), q) for matrix in relaxation.matrices],
-            real_apply(family.forces.T if left else family.slope, q),
-        )
-
-    def _residual(self, products: _Products, values, u, mu, left: bool = False):
-        """T(lambda) x of pairs, or T^H w of left vectors: force part (n, k) and inner part (b, k)."""
-        family, s, y = self.family, np.conj(values) if left else values, products.coupled
-        alpha, beta = family.rayleigh(mu)
-        force = products.mass * (s * s + alpha * s) + products.stiffness
-        if products.damping is not None:
-            force += products.damping * (beta * s)
-        if products.relaxing:
-            for factor, image in zip(family.relaxation(mu).factors(s), products.relaxing):
-                force += image * factor
-        parts = family.coupling(mu)
-        inner = np.zeros((u.shape[0], len(values)), complex)
-        pressure = np.zeros_like(y)
-        for i, value in enumerate(s):
-            A, B, R, S = fluid_values(parts, value)
-            if left:
-                pressure[:, i] = A.T @ y[:, i] - R.T @ u[:, i]
-                inner[:, i] = -B.T @ y[:, i] + S.T @ u[:, i]
-            else:
-                pressure[:, i] = A @ y[:, i] + B @ u[:, i]
-                inner[:, i] = R @ y[:, i] + S @ u[:, i]
-        force -= real_apply(family.slope.T if left else family.forces, pressure)
-        return force, inner
+    def operator(self, mu: Hashable) -> CoupledPencil:
+        """Full operator at a parameter point, with the scale of inner unknowns that reduced ones have."""
+        return PencilFamily.at(self.family, mu)
 
     def _corrected(self, several: list[Pairs], points) -> list[tuple[np.ndarray, np.ndarray]]:
         """Right and left structural vectors corrected with the full matrices, (n, k) each, those of one relaxation in
@@ -266,54 +152,58 @@ class FamilyReduction:
         found, relaxations = {}, [self.family.relaxation(mu) for mu in points]
         for relaxation in {id(own): own for own in relaxations}.values():
             members = [i for i, own in enumerate(relaxations) if own is relaxation]
-            block = _Block(self.family, [several[i] for i in members], [points[i] for i in members])
-            found |= zip(members, self._block_corrected(block, relaxation))
+            alike = [several[i] for i in members], [points[i] for i in members]
+            found |= zip(members, self._corrected_alike(*alike, relaxation))
         return [found[i] for i in range(len(points))]
 
-    def _block_corrected(self, block: _Block, relaxation) -> Iterator[tuple[np.ndarray, np.ndarray]]:
-        # far from the leading modes T is nearly (1 + lambda beta) K
-        values, solver, passes, scale = block.values, self.solver, 1, 1.0 / (1.0 + block.values * block.beta)
-        if relaxation is not None:
-            # with the stiffness that a typical motion sees, and repeated for what that differs from one mode and one
-            # part to another
-            frequency, share = self._typical(block.points[0])
-            typical = relaxation.factors(1j * frequency).real
-            solver, passes = self._stiffened_by(typical, relaxation), CORRECTIONS
-            scale = (1.0 + share @ typical) / (1.0 + values * block.beta + share @ relaxation.factors(values))
-        q, w = block.q, block.w
-        for _ in range(passes):
-            force, back = self._forces(block, q, relaxation), self._forces(block, w, relaxation, left=True)
-            q, w = q - solver.solve(force) * scale, w - solver.solve_transposed(back) * np.conj(scale)
-        return ((q[:, own], w[:, own]) for own in block.columns)
+    def _corrected_alike(self, several, points, relaxation) -> Iterator[tuple[np.ndarray, np.ndarray]]:
+        """The same at points of one relaxation.
 
-    def _forces(self, block: _Block, vectors: np.ndarray, relaxation, left: bool = False) -> np.ndarray:
-        """Force parts of the residuals of a block with other structural vectors, (n, k)."""
-        products = self._products(vectors, block.beta.max(initial=0.0), relaxation, left)
-        return np.hstack(
-            [
-                self._residual(products[own], pairs.values, pairs.c if left else pairs.u, mu, left)[0]
-                for own, pairs, mu in zip(block.columns, block.several, block.points)
-            ]
-        )
+        Far from the leading modes T is nearly (1 + lambda beta) K. Where parts relax, K is the stiffness that a typical
+        motion sees, and corrections are repeated for what that differs from one mode and one part to another.
+        """
+        operators, sizes = [self.operator(mu) for mu in points], np.cumsum([len(pairs.values) for pairs in several])
+        solver, passes, scales = self.solver, 1, []
+        if relaxation is not None:
+            frequency, share = self._typical(points[0])
+            typical = 1.0 + share @ relaxation.factors(1j * frequency).real
+            solver, passes = self._stiffened_by(relaxation, points[0]), CORRECTIONS
+        for pairs, mu in zip(several, points):
+            below = 1.0 + pairs.values * self.family.rayleigh(mu)[1]
+            relaxed = 0.0 if relaxation is None else share @ relaxation.factors(pairs.values)
+            scales.append((1.0 if relaxation is None else typical) / (below + relaxed))
+        scale = np.concatenate(scales)
+        right, left = [pairs.q for pairs in several], [pairs.w for pairs in several]
+        for _ in range(passes):
+            each = list(zip(operators, several, right, left))
+            force = np.hstack([T.apply(pairs.values, q, pairs.u)[0] for T, pairs, q, _ in each])
+            back = np.hstack([T.apply(pairs.values.conj(), w, pairs.c, True)[0] for T, pairs, _, w in each])
+            force, back = solver.solve(force) * scale, solver.solve_transposed(back) * scale.conj()
+            right, left = (
+                [x - step for x, step in zip(vectors, np.hsplit(steps, sizes))]
+                for vectors, steps in ((right, force), (left, back))
+            )
+        return zip(right, left)
 
     def _typical(self, mu) -> tuple[float, np.ndarray]:
         """Angular frequency of typical motions, rad/s, and shares of the relaxing parts in the stiffness, (g,)."""
+        if self._beside:
+            return self._beside[:2]
         coarse = self.coarse
         squares = la.eigvalsh(0.5 * (coarse.stiffness + coarse.stiffness.T))
         low = squares[squares > 0][:TYPICAL]
         frequency = float(np.exp(0.5 * np.log(low).mean())) if low.size else 1.0
         return frequency, np.array([m.diagonal().sum() for m in coarse.relaxation(mu).matrices]) / squares.sum()
 
-    def _stiffened_by(self, factors: np.ndarray, relaxation: Relaxation) -> StaticSolver:
-        """Solver of the stiffness with its relaxing parts as stiff as factors say; that of the last one is kept."""
-        if self._relaxed is not relaxation:
-            if self._matrices is None:
-                mass = self.family.mass
-                pencil = CoupledPencil(mass, sp.csr_matrix(mass.shape), self.family.stiffness, relaxation=relaxation)
-                self._matrices = self._workspace.structure(pencil)
-            self._stiffened.factor_sum(self._matrices, np.array([0.0, 0.0, 1.0, *factors]))
-            self._relaxed = relaxation
-        return self._stiffened
+    def _stiffened_by(self, relaxation: Relaxation, mu: Hashable):
+        """Factor of the stiffness as a typical motion sees it; that of the last relaxation is kept."""
+        if self._beside:
+            return self._beside[2]
+        if self._stiffened[0] is not relaxation:
+            factors = relaxation.factors(1j * self._typical(mu)[0]).real
+            stiffness = self.family.stiffness + sum(x * m for x, m in zip(factors, relaxation.matrices))
+            self._stiffened = relaxation, self._workspace.factored_near(self._elastic(stiffness), SINGULAR)
+        return self._stiffened[1]
 
     def fine(self, first: ReducedFamily, points, most: int = 4) -> ReducedFamily:
         """Second stage: a space made of the corrected leading vectors of a first one at some parameter points."""
@@ -354,52 +244,26 @@ class FamilyReduction:
         than those left out of the space, whose inertia the corrections lack, are not made worse.
         """
         right, left = self._corrected([pairs], [mu])[0]
-        beta, relaxation = self.family.rayleigh(mu)[1], self.family.relaxation(mu)
-        added = right - pairs.q, left - pairs.w
-        own, further = (self._products(x, beta, relaxation) for x in (pairs.q, added[0]))
-        here = self._residual(own, pairs.values, pairs.u, mu)
-        there = self._residual(further, pairs.values, np.zeros_like(pairs.u), mu)
+        added, T = (right - pairs.q, left - pairs.w), self.operator(mu)
+        own, none = (pairs.w, pairs.c), np.zeros_like(pairs.c)
+        here = T.apply(pairs.values, pairs.q, pairs.u)
+        there = T.apply(pairs.values, added[0], np.zeros_like(pairs.u))
 
         def times(left, inner, right):
             return np.einsum("ij,ij->j", left.conj(), right[0]) + np.einsum("ij,ij->j", inner.conj(), right[1])
 
-        both = times(added[1], np.zeros_like(pairs.c), there)
+        both = times(added[1], none, there)
         both[both == 0.0] = np.inf  # vectors that are exact are not corrected
-        top = times(pairs.w, pairs.c, here)
-        top -= times(pairs.w, pairs.c, there) * times(added[1], np.zeros_like(pairs.c), here) / both
-        # T' by a difference quotient, good enough for the size of a correction
-        step = 1e-3 * np.maximum(np.abs(pairs.values), 1.0)
-        ahead = self._residual(own, pairs.values + step, pairs.u, mu)
-        return -top * step / (times(pairs.w, pairs.c, ahead) - times(pairs.w, pairs.c, here))
+        top = times(*own, here) - times(*own, there) * times(added[1], none, here) / both
+        return -top / times(*own, T.apply_derivative(pairs.values, pairs.q, pairs.u))
 
-
-class _ReductionBeside(FamilyReduction):
-    """Reduced model of a family next to another one, whose factored stiffness corrects the vectors of both.
-
-    What the space lacks is of first order in the difference of the two; one correction leaves its product with that
-    difference, and of an eigenvalue, which left and right vectors give, the square.
-    """
-
-    def __init__(self, family: PencilFamily, space: np.ndarray, solver: StaticSolver, typical, stiffened: StaticSolver):
-        self.family, self._space, self.solver = family, space, solver
-        self._known = typical, stiffened
-        family.model = weakref.ref(self)
-
-    @cached_property
-    def coarse(self) -> ReducedFamily:
-        return ReducedFamily(self.family, self._space, COMPRESSION)
-
-    @property
-    def wide(self) -> ReducedFamily:
-        return self.coarse
-
-    def lowest_frequencies(self, count: int) -> np.ndarray:
-        squares = la.eigvalsh(0.5 * (self.coarse.stiffness + self.coarse.stiffness.T))
-        found = np.sort(squares[np.argsort(np.abs(squares))[:count]])
-        return np.sqrt(np.maximum(found, 0.0)) / (2 * np.pi)
-
-    def _typical(self, mu) -> tuple[float, np.ndarray]:
-        return self._known[0]
-
-    def _stiffened_by(self, factors: np.ndarray, relaxation: Relaxation) -> StaticSolver:
-        return self._known[1]
+    def error(self, model: ReducedFamily, points, most: int = HELD) -> float:
+        """Largest relative change of leading eigenvalues of a reduced model under a correction with the full matrices,
+        at some points.
+        """
+        worst = 0.0
+        for mu in points:
+            pairs = model.pairs(mu, most)
+            change = np.abs(self.correction(pairs, mu)) / np.maximum(np.abs(pairs.values), 1.0)
+            worst = max(worst, float(change.max(initial=0.0)))
+        return worst

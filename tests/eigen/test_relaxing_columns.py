@@ -170,7 +170,7 @@ def test_columns_carry_certificates_whatever_relaxes():
         values = dense(family, condition)
         leading = family.reach(condition).leading(values)[0]
         assert column.growth_rate[i] == pytest.approx(leading.real, abs=1e-6 * abs(leading))
-        assert column.unstable[i] == column.counted[i] == (values.real > 0).sum()
+        assert column.unstable[i] == column.cells[i].certificate.counted == (values.real > 0).sum()
 
 
 def test_correction_is_that_of_newton_on_the_full_pencil():

@@ -65,7 +65,7 @@ def three_routes(
     walk.give(place, q)
     # the reduced-order model is made beside the state itself
     column = walk.column([place.at(beta=share * BETA) for share in (0.9, 0.95, 1.05, 1.1)])
-    reduced = column.nearest(place, eigenvalue)
+    reduced = column.model.nearest(place, eigenvalue)
     lip = model.shell.dofs.index[model.mesh.rows[0, 0], 1]
     rings = []
     for count in steps:

@@ -539,12 +539,12 @@ def critical_damping_factor(walk: StabilityWalk, place: Mu, verdict: Verdict) ->
         modes = values[oscillates(values)]
         return float(modes.real.max()) if modes.size else np.nan
 
-    rates = [growth(row) for row in line.column.leading]
+    rates = [growth(cell.leading) for cell in line.column.cells]
     for a, b, low, high in zip(factors[:-1], factors[1:], rates[:-1], rates[1:]):
         if not (np.isfinite(low) and np.isfinite(high)):
             return np.nan
         if low * high <= 0 and line.is_reduced:
-            at = lambda factor: growth(line.column.eigenvalues(line.place(own * factor)))  # noqa: E731
+            at = lambda factor: growth(line.column.model.eigenvalues(line.place(own * factor)))  # noqa: E731
             found = brentq(at, min(a, b), max(a, b), rtol=ACCURACY)
             return float(f"{found:.8g}")  # rounding of factorisations would part a resumed run from a whole one
     return np.nan

@@ -228,7 +228,7 @@ class OnsetSearch:
 
     def _beside(self, value: float) -> Sample:
         """Sample of the full model."""
-        return Sample.of(value, self.walk.column([self.place(value)]), 0, np.inf)
+        return Sample.of(value, self.walk.cell(self.place(value)), np.inf)
 
     def critical(self, place: Mu, eigenvalue: complex):
         """The mode of the full pencil at a place that an eigenvalue found otherwise belongs to.

@@ -12,8 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from eigen import Column as Cells
-from eigen import Spectrum
+from eigen import Cell, Column, ReducedColumn, Spectrum
 
 from ...case.axis import Level
 from ...case.parameters import Mu
@@ -45,7 +44,7 @@ class OnsetCorrection:
 
     Parameters
     ----------
-    column : eigen.Column
+    model : eigen.ReducedColumn
     place : callable
         From a value along the line to its parameter point.
     direct : callable
@@ -54,7 +53,7 @@ class OnsetCorrection:
         Of the crossing; neutral by default.
     """
 
-    column: Cells
+    model: ReducedColumn
     place: Callable[[float], Mu]
     direct: Callable[[float], np.ndarray]
     level: Level = Level()
@@ -89,7 +88,7 @@ class OnsetCorrection:
 
     def _small(self, value: float, near: complex) -> complex | None:
         """Eigenvalue of the small model; None where it has none near, as where all cells needed the full matrices."""
-        found = self.column.nearest(self.place(value), near)
+        found = self.model.nearest(self.place(value), near)
         return found if abs(found - near) <= MOVED * max(abs(near), 1.0) else None
 
     def _slope(self, eigenvalue, value: float, near: complex) -> float:
@@ -103,7 +102,7 @@ class OnsetCorrection:
         found = self._small(value, near)
         if found is None:
             return None
-        change = self.column.corrected(self.place(value), found)
+        change = self.model.corrected(self.place(value), found)
         return found + change if abs(change) < SAME * max(abs(found), 1.0) else None
 
     def _by_solving(self, value: float, near: complex) -> complex | None:
@@ -209,7 +208,7 @@ class ParameterLine:
         return is_surrounding(self.walk.case, self.parameter)
 
     @cached_property
-    def column(self) -> Cells | None:
+    def column(self) -> Column | None:
         """Cells at the values, with their reduced-order model; None where each value has its own steady state.
 
         Raises
@@ -223,7 +222,7 @@ class ParameterLine:
     @property
     def is_reduced(self) -> bool:
         """True where there is a reduced-order model."""
-        return self.column is not None and self.column.cell is not None
+        return self.column is not None and self.column.model is not None
 
     @property
     def error(self) -> float:
@@ -239,8 +238,8 @@ class ParameterLine:
             If a steady state that all of them share was not found.
         """
         try:
-            for i, value in enumerate(self.values if self.column is not None else ()):
-                self.samples[value] = replace(self.walk.sample(self.place(value), self.column, i, value), key=self.key)
+            for value, cell in zip(self.values, () if self.column is None else self.column.cells):
+                self.samples[value] = replace(self.walk.sample(self.place(value), cell, value), key=self.key)
         except NotValidError:  # at all of them
             refused = {v: Sample(v, refusal=self.walk.refusal(self.place(v)), key=self.key) for v in self.values}
             self.samples |= refused
@@ -255,7 +254,7 @@ class ParameterLine:
         """
         if value not in self.samples:
             try:
-                sample = self.walk.sample(self.place(value), self._cell(value, spectrum), value=value)
+                sample = self.walk.sample(self.place(value), self._cell(value, spectrum), value)
             except NotValidError as error:
                 sample = Sample(value, refusal=str(error))
             except (SolveError, CaseError) as error:
@@ -268,17 +267,17 @@ class ParameterLine:
             self.walk.recall(self.place(value))
         return self.samples[value]
 
-    def _cell(self, value: float, spectrum: Spectrum | None = None) -> Cells:
+    def _cell(self, value: float, spectrum: Spectrum | None = None) -> Cell:
         """Leading eigenvalues at a value and their certificate."""
         place = self.place(value)
         if self.stays:
             self.walk.require_valid(place)
             if self.is_reduced:
-                return self.column.cell(place)
-        return self.walk.column([place], spectra=None if spectrum is None else [spectrum])
+                return self.column.model.cell(place)
+        return self.walk.cell(place, spectrum)
 
     def _is_certified(self, value: float) -> bool:
-        return bool(self._cell(value).certified[0])
+        return self._cell(value).certificate.agrees
 
     def spectrum(self, value: float) -> np.ndarray:
         """Leading eigenvalues of the full pencil.
@@ -296,7 +295,7 @@ class ParameterLine:
                 raise SolveError(sample.failure or sample.refusal)
             return sample
         if self.is_reduced:
-            return Sample(value, self.column.eigenvalues(self.place(value)))
+            return Sample(value, self.column.model.eigenvalues(self.place(value)))
         return Sample(value, self.spectrum(value))
 
     def _inside(self, value: float) -> Sample:
@@ -306,7 +305,7 @@ class ParameterLine:
         counted = value in self.samples or (self.counts == "all" and not self.place(value).loss_factor)
         if counted or not self.is_reduced:
             return self._scanned(value)
-        return Sample(value, self.column.eigenvalues(self.place(value)))
+        return Sample(value, self.column.model.eigenvalues(self.place(value)))
 
     def bracket(self, crossing: Crossing, tolerance: float) -> tuple[float, complex]:
         """Value and eigenvalue of a crossing as samples have it, without a correction.
@@ -325,7 +324,7 @@ class ParameterLine:
         """Leading eigenvalues at a value, without a count where the reduced-order model has them."""
         if self.is_reduced:
             self.walk.require_valid(self.place(value))
-            return self.column.eigenvalues(self.place(value))
+            return self.column.model.eigenvalues(self.place(value))
         return self._scanned(value).eigenvalues
 
     def locate(
@@ -341,7 +340,7 @@ class ParameterLine:
         value, eigenvalue = locate(scan or self.scan, crossing, tolerance)
         if not self.is_reduced:
             return LineOnset(value, eigenvalue, abs(eigenvalue.real) / max(abs(eigenvalue), 1.0))
-        correct = OnsetCorrection(self.column, self.place, self.spectrum, level)
+        correct = OnsetCorrection(self.column.model, self.place, self.spectrum, level)
         found, frequency, residual = correct(value, abs(eigenvalue.imag) / (2 * np.pi))
         if np.isfinite(residual):
             return LineOnset(found, level.eigenvalue(2 * np.pi * frequency), residual)

@@ -4,7 +4,7 @@ States and added mass are linear in the numbers that tell the valves apart, from
 difference each. A state is made exact by Newton's method; the linearised equations of every valve are its own, but for
 the added mass, whose error is of second order and measured on further valves. They project on one space of the leading
 motions of several of these valves; what that lacks of a valve is told by a correction with its full matrices and the
-factors of the first one (`eigen.ColumnSolver.beside`). Growth rates decide where they are clear of both errors.
+factors of the first one (`eigen.columns.cell_beside`). Growth rates decide where they are clear of both errors.
 """
 
 from __future__ import annotations
@@ -15,8 +15,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from eigen import Column, ColumnSolver, FamilyReduction
+from eigen import Cell, FamilyReduction
 from eigen.basis import orthonormal, outside
+from eigen.columns import cell_beside
 
 from ...case.parameters import Mu
 from ...model.dynamics import linearise
@@ -163,7 +164,7 @@ def _errors(at: At, near: Neighbours, checks: np.ndarray) -> Iterator[float]:
         if walk.refusal(place):
             yield 0.0
             continue
-        exact, found = walk.column([place]).leading[0], beside.column(walk, place, row)[0].leading[0]
+        exact, found = walk.cell(place).leading, beside.cell(walk, place, row)[0].leading
         exact = exact[exact.imag > 0][:WATCHED]
         apart = np.abs(exact[:, None] - found).min(axis=1) / np.abs(exact)
         yield float(apart.max(initial=0.0)) / near.square(row)
@@ -179,7 +180,7 @@ class Beside:
     """
 
     def __init__(self, at: At, near: Neighbours):
-        self.near, self._solver = near, ColumnSolver()
+        self.near = near
         walk, self._place = at(near.origin)
         walk.settle(self._place, near.q)
         self._first = FamilyReduction(walk.family(self._place))
@@ -190,19 +191,19 @@ class Beside:
         linear = linearise(built.model, walk.equilibrium(place), place.pressure, added=self.near.added_mass(row))
         return ValveFamily(linear, modes.max_frequency, modes.count)
 
-    def column(self, walk: StabilityWalk, place: Mu, row: np.ndarray) -> tuple[Column, ValveFamily]:
+    def cell(self, walk: StabilityWalk, place: Mu, row: np.ndarray) -> tuple[Cell, ValveFamily]:
         """Cell of a neighbour whose state its walk has, and its family."""
         family, near = self.family(walk, place, row), self.near
         reduction = self._first.beside(family, near.space, self._place)
-        return self._solver.beside(reduction, place, near.error * near.square(row), SAFETY), family
+        return cell_beside(reduction, place, near.error * near.square(row), SAFETY), family
 
     def verdict(self, walk: StabilityWalk, place: Mu, row: np.ndarray) -> Verdict | None:
         """Verdict on a neighbour whose state its walk has; None where growth rates are not clear of errors."""
         if refusal := walk.refusal(place):
             return Verdict.not_valid(refusal)
         with suppress(ArithmeticError, ValueError):
-            column, family = self.column(walk, place, row)
+            cell, family = self.cell(walk, place, row)
             sealed = family.linear.seal is not None
-            found = Sample.of(np.nan, column, 0, family.leading(place).claimed, sealed).verdict
+            found = Sample.of(np.nan, cell, family.leading(place).claimed, sealed).verdict
             return found if found.certain else None
         return None

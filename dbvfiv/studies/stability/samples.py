@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from eigen import Column as Cells
+from eigen import Cell
 from eigen.columns import DIRECT, MISSING
 
 from ...record.record import GrowingRecord, Record
@@ -80,11 +80,11 @@ class Sample:
     key: SampleKey = SampleKey()
 
     @classmethod
-    def of(cls, value: float, cells: Cells, cell: int, claimed: float, sealed: bool = False) -> Sample:
-        """Sample of a cell of a column; `claimed` is the frequency, Hz, up to which the search speaks for the state."""
-        own = cells.certificate(cell)
+    def of(cls, value: float, cell: Cell, claimed: float, sealed: bool = False) -> Sample:
+        """Sample of a cell; `claimed` is the frequency, Hz, up to which the search speaks for the state."""
+        own = cell.certificate
         band, counts = min(own.band, claimed), (own.unstable, own.counted, own.certain)
-        return cls(value, np.asarray(cells.leading[cell])[:KEPT], *counts, own.line, band, sealed, int(cells.how[cell]))
+        return cls(value, np.asarray(cell.leading)[:KEPT], *counts, own.line, band, sealed, cell.how)
 
     @cached_property
     def growth(self) -> np.ndarray:

@@ -12,12 +12,14 @@ import numpy as np
 from scipy.optimize import root_scalar
 
 from eigen import (
+    Cell,
     Column,
     ColumnSolver,
     CoupledPencil,
     PencilFamily,
     Relaxation,
     SearchOptions,
+    Spectrum,
     Workspace,
     lowest_frequencies,
 )
@@ -502,14 +504,24 @@ class StabilityWalk:
         with name_state_in_failures(places[0].pressure):
             points = [places[i] for i in sound]
             column = self.built(places[0]).solver.solve(family, points, snapshots, edges, spectra, count)
-        return column if len(sound) == len(places) else column.spread(sound, len(places))
+        cells = dict(zip(sound, column.cells))
+        return replace(column, cells=tuple(cells.get(i, Cell()) for i in range(len(places))))
 
-    def sample(self, place: Mu, column: Column, cell: int = 0, value: float = np.nan) -> Sample:
-        """Sample of a place from its cell of a column; `value` is that of the parameter of a line."""
+    def cell(self, place: Mu, spectrum: Spectrum | None = None) -> Cell:
+        """Cell of one place with the full operator, whose leading modes may be known.
+
+        Raises
+        ------
+        NotValidError, SolveError
+        """
+        return self.column([place], spectra=None if spectrum is None else [spectrum]).cells[0]
+
+    def sample(self, place: Mu, cell: Cell, value: float = np.nan) -> Sample:
+        """Sample of a place from its cell; `value` is that of the parameter of a line."""
         if refusal := self.refusal(place):
             return Sample(value, refusal=refusal)
         sealed = self.family(place).linear.seal is not None
-        return Sample.of(value, column, cell, self.search(place).claimed, sealed)
+        return Sample.of(value, cell, self.search(place).claimed, sealed)
 
     def verdict(self, place: Mu, spectrum=None) -> Verdict:
         """Verdict on one place; its leading modes with the full pencil may be known.
@@ -520,6 +532,6 @@ class StabilityWalk:
             If there is no steady state, or its spectrum was not found.
         """
         try:
-            return self.sample(place, self.column([place], spectra=None if spectrum is None else [spectrum])).verdict
+            return self.sample(place, self.cell(place, spectrum)).verdict
         except NotValidError as error:
             return Verdict.not_valid(str(error))

@@ -109,9 +109,9 @@ class Tracking:
 
     def _error(self, value: float) -> float:
         """Largest relative correction, by the full matrices, of the leading eigenvalues of the reduced-order model."""
-        mu, column = self.line.place(value), self.line.column
-        leading = column.eigenvalues(mu)[: self.options.count]
-        return max((abs(column.corrected(mu, x)) / max(abs(x), 1.0) for x in leading), default=0.0)
+        mu, model = self.line.place(value), self.line.column.model
+        leading = model.eigenvalues(mu)[: self.options.count]
+        return max((abs(model.corrected(mu, x)) / max(abs(x), 1.0) for x in leading), default=0.0)
 
     @property
     def is_reduced(self) -> bool:
@@ -123,7 +123,7 @@ class Tracking:
         value = float(value)
         if value not in self.pencils:
             mu = self.line.place(value)
-            family = self.line.column if self.is_reduced else self.walk.family(mu)
+            family = self.line.column.model if self.is_reduced else self.walk.family(mu)
             self.pencils[value] = family.at(mu)
             self.values[self.pencils[value]] = value
         return self.pencils[value]

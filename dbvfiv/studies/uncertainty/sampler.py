@@ -138,7 +138,7 @@ class Sampler:
             places = [place.at(pressure=met) for place in places]
             walk.settle(places[0], start.q)
             state, column = walk.state(places[0]), walk.column(places, snapshots=min(len(places), 7))
-            verdicts = [walk.sample(place, column, i, value).verdict for i, place in enumerate(places)]
+            verdicts = [walk.sample(*pair, value).verdict for pair in zip(places, column.cells)]
         except (SolveError, CaseError) as error:
             state, verdicts = None, [Verdict.undecided(str(error))] * len(places)
         for k, verdict in enumerate(verdicts):
