@@ -40,7 +40,7 @@ def test_small_models_without_any_mode_leave_it_to_the_full_matrices():
 @pytest.mark.parametrize("direct", [lambda value: np.zeros(0, complex), lambda value: np.array([1.0 + 99.0j])])
 def test_an_onset_that_nothing_holds_stays_where_it_was_found(direct):
     nothing = corrected_by(lambda value: np.zeros(0, complex))
-    value, frequency, left = OnsetCorrection(nothing.column, nothing.place, direct)(SMALL, 1.5)
+    value, frequency, left = OnsetCorrection(nothing.model, nothing.place, direct)(SMALL, 1.5)
     assert (value, frequency) == (SMALL, 1.5) and np.isnan(left)
 
 
@@ -49,4 +49,4 @@ def test_states_that_cannot_be_solved():
         raise SolveError("No state.")
 
     nothing = corrected_by(lambda value: np.zeros(0, complex))
-    assert np.isnan(OnsetCorrection(nothing.column, nothing.place, refused)(SMALL, 1.5)[2])
+    assert np.isnan(OnsetCorrection(nothing.model, nothing.place, refused)(SMALL, 1.5)[2])
