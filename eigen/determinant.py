@@ -123,14 +123,12 @@ class Oscillators(NamedTuple):
         return found[found.imag > 0]
 
 
+#: Unit of rounding.
+EPS = np.finfo(float).eps
 #: Numbers at most in one stack of dense matrices.
 _STACK = 1_000_000
-#: Order up to which a structure is represented by its eigenvectors.
-_MODAL_BELOW = 160
-#: Number of places after which a larger one that does not relax is too.
-_MODAL_AFTER = 300
-#: Condition of those eigenvectors beyond which it is not.
-_LARGEST_CONDITION = 1e6
+#: Condition of eigenvectors beyond which they do not represent a structure: its square root of rounding is lost.
+_LARGEST_CONDITION = 0.01 * EPS**-0.5
 #: Damping over angular frequency of reference oscillators that may have no other.
 _LIGHT = 0.02
 
@@ -156,7 +154,7 @@ class Structure:
     dense_below = 400
 
     def __init__(self, pencil: CoupledPencil, line: float = 0.0, keep: bool = False):
-        self.pencil, self.line, self._evaluations = pencil, line, 0
+        self.pencil, self.line = pencil, line
         self._known: dict[complex, tuple[np.ndarray, complex]] | None = {} if keep else None
         self._dense = pencil.n <= self.dense_below
         if abs(pencil.M - pencil.M.T).max() > 1e-10 * abs(pencil.M).max():
@@ -181,7 +179,6 @@ class Structure:
         return tuple(np.concatenate(parts) for parts in zip(*pieces))
 
     def _tried(self, z):
-        self._evaluations += z.size
         try:
             return self._structure_at(z) if self._dense else self._sparse_structure_at(complex(z[0]))
         except (SingularShiftError, np.linalg.LinAlgError):
@@ -226,29 +223,20 @@ class Structure:
             self._parts = [x.toarray() for x in (p.M, p.C, p.K, *self._reference)]
             own = [self._parts[2], self._parts[1], self._parts[0], *(x.toarray() for x in p.relaxing)]
             self._flat = np.stack(own).reshape(len(own), -1)
-            self._oscillators = None
-            if self._relaxation is not None or p.n > _MODAL_BELOW:
-                parts = np.array([x.toarray() for x in passive]).reshape(-1, p.n, p.n)
-                mass, damping, stiffness = (self._parts[i] for i in (0, 3, 4))
-                modes = Oscillators.of(mass, damping, stiffness, parts, self._relaxation)
-                if changed:  # what was negative no longer damps
-                    modes = modes._replace(damping=modes.damping + _LIGHT * np.sqrt(np.maximum(modes.squares, 0.0)))
-                self._oscillators = modes
+            parts = np.array([x.toarray() for x in passive]).reshape(-1, p.n, p.n)
+            modes = Oscillators.of(*(self._parts[i] for i in (0, 3, 4)), parts, self._relaxation)
+            if changed:  # what was negative no longer damps
+                modes = modes._replace(damping=modes.damping + _LIGHT * np.sqrt(np.maximum(modes.squares, 0.0)))
+            self._oscillators = modes
             self._G, self._J = p.G.toarray(), p.J.toarray()
             self._mass_log = np.linalg.slogdet(self._parts[0])[1]
-            self._modes, self._modal = None, p.relaxation is None
-            if p.n <= _MODAL_BELOW:
-                self._take_modes()
+            elastic = p.relaxation is None
+            self._modes = _StructureModes.of(*self._parts[:3], self._G, self._J) if elastic else None
             return
         self._structure = StructureMatrices(p)
         if not self.structure_is_reference:
             twin = CoupledPencil(M=p.M, C=self._reference[0], K=self._reference[1], relaxation=self._relaxation)
             self._twin = StructureMatrices(twin)
-
-    def _take_modes(self):
-        """Represent the structure by its eigenvectors, if they can stand for it."""
-        if self._modal:
-            self._modes, self._modal = _StructureModes.of(*self._parts[:3], self._G, self._J), False
 
     @cached_property
     def inertance(self) -> np.ndarray:
@@ -260,25 +248,12 @@ class Structure:
     def reference_zeros(self) -> np.ndarray:
         """Eigenvalues of the reference in the upper half-plane, relative to the line.
 
-        All of them for a dense pencil, estimated mode by mode where the stiffness relaxes; none are computed for a
-        sparse one.
+        Estimated mode by mode for a dense pencil; none are computed for a sparse one.
         """
-        if not self._dense:
-            return np.zeros(0, complex)
-        if self._oscillators is not None:
-            return self._oscillators.zeros(self._relaxation)
-        values = self._every_reference_zero
-        return values[values.imag > 0]
-
-    @cached_property
-    def _every_reference_zero(self):
-        M, _, _, C, K = self._parts
-        return la.eigvals(_first_order(M, C, K))
+        return self._oscillators.zeros(self._relaxation) if self._dense else np.zeros(0, complex)
 
     def _structure_at(self, z):
         """H at a stack of places, shape (k, m, m), and log det D - log det D_ref there."""
-        if self._evaluations > _MODAL_AFTER:
-            self._take_modes()
         if self._modes is not None:
             H, total = self._modes.response(self.line + z)
         else:
@@ -288,9 +263,7 @@ class Structure:
             H, total = self._J @ response, total - self._mass_log
         if self.structure_is_reference:
             return H, np.zeros(z.size)
-        if self._oscillators is not None:
-            return H, total - np.log(self._oscillators.values(self._relaxation, z)).sum(axis=1)
-        return H, total - np.log(z[:, None] - self._every_reference_zero).sum(axis=1)
+        return H, total - np.log(self._oscillators.values(self._relaxation, z)).sum(axis=1)
 
     def _dynamic_stiffness(self, s):
         """s^2 M + s C + K and what relaxes at a stack of places, shape (k, n, n)."""

@@ -19,56 +19,6 @@ import scipy.sparse.linalg as spla
 
 from .operator import CoupledPencil, real_apply
 
-#: Share of entries from which on a row counts as full.
-FULL = 0.3
-
-
-class FullRows:
-    """A real sparse matrix (m, n) whose full rows are kept as such: dense products read no indices.
-
-    Parameters
-    ----------
-    matrix : sparse, shape (m, n)
-
-    Examples
-    --------
-    >>> import numpy as np
-    >>> import scipy.sparse as sp
-    >>> split = FullRows(sp.csr_matrix([[0.0, 0.0, 0.0, 1.0], [1.0, 2.0, 3.0, 4.0]]))
-    >>> split @ np.ones(4)
-    array([ 1., 10.])
-    >>> split.transposed(np.ones(2))
-    array([1., 2., 3., 5.])
-    """
-
-    def __init__(self, matrix: sp.spmatrix):
-        matrix = matrix.tocsr()
-        self.shape = matrix.shape
-        full = np.diff(matrix.indptr) > FULL * matrix.shape[1]
-        self._full, self._rest = np.flatnonzero(full), np.flatnonzero(~full)
-        self._dense = matrix[self._full].toarray()
-        self._sparse = matrix[self._rest] if full.any() else matrix
-        self._sparse_transposed = self._sparse.T.tocsr()
-
-    def __matmul__(self, x: np.ndarray) -> np.ndarray:
-        """Product with an array (n,) or (n, k), real or complex."""
-        if not self._full.size:
-            return real_apply(self._sparse, x)
-        out = np.empty((self.shape[0], *x.shape[1:]), np.result_type(x, float))
-        out[self._rest] = real_apply(self._sparse, x)
-        out[self._full] = _real_times(self._dense, x)
-        return out
-
-    def transposed(self, x: np.ndarray) -> np.ndarray:
-        """Product of the transpose with an array (m,) or (m, k)."""
-        if not self._full.size:
-            return real_apply(self._sparse_transposed, x)
-        return real_apply(self._sparse_transposed, x[self._rest]) + _real_times(self._dense.T, x[self._full])
-
-
-def _real_times(matrix, x):
-    return matrix @ x.real + 1j * (matrix @ x.imag) if np.iscomplexobj(x) else matrix @ x
-
 
 class SingularShiftError(ArithmeticError):
     """The matrix at a shift is singular to working precision."""
@@ -468,11 +418,6 @@ class ShiftedPencil:
     factor : object with solve, solve_transposed
         LU of the structure, sigma^2 M + sigma C + K and what relaxes.
 
-    Attributes
-    ----------
-    motion : FullRows
-        J.
-
     Raises
     ------
     SingularShiftError
@@ -484,11 +429,10 @@ class ShiftedPencil:
         self.pencil, self.factor = pencil, factor
         self.shift = shift.real if shift.imag == 0.0 else shift
         self._A, self._B, self._R, self._S = pencil.fluid_at(self.shift)
-        self.motion = FullRows(pencil.J)
         # m further right-hand sides, once
         self.response = factor.solve(pencil.G.toarray())
-        self.transfer = self.motion @ self.response
-        small = condensed_matrix(self._A, self._B, self._R, self._S, self.transfer)
+        transfer = real_apply(pencil.J, self.response)
+        small = condensed_matrix(self._A, self._B, self._R, self._S, transfer)
         # rows and columns differ by powers of the fluid's density: equilibrate before pivoting
         self._row = _scale(small, 1)
         self._col = _scale(small * self._row[:, None], 0)
@@ -515,7 +459,7 @@ class ShiftedPencil:
         q = self.factor.solve(f)
         if self._small is None:
             return q, np.array(g)
-        y = self.motion @ q
+        y = real_apply(self.pencil.J, q)
         right = np.concatenate([self._A @ y, g - self._R @ y])
         unknown = _times(self._col, self._back(_times(self._row, right), 0))
         m = self._A.shape[0]
@@ -533,7 +477,7 @@ class ShiftedPencil:
         unknown = _times(self._row, self._back(_times(self._col, right), 1))
         z, W = unknown[:m], unknown[m:]
         h = self._A.T @ z - self._R.T @ W
-        return self.factor.solve_transposed(f + self.motion.transposed(h)), W
+        return self.factor.solve_transposed(f + real_apply(self.pencil.J.T, h)), W
 
     def _back(self, right, transposed):
         if np.iscomplexobj(right) and not np.iscomplexobj(self._small[0]):

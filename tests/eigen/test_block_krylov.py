@@ -1,15 +1,13 @@
-"""Largest eigenpairs by blocks against dense ones; products with rows that are full."""
+"""Largest eigenpairs by blocks against dense ones."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
 import scipy.linalg as la
-import scipy.sparse as sp
 
 import eigen.basis
 from eigen import NotConvergedError, NotPositiveError, largest_pairs
-from eigen.factor import FullRows
 
 
 def problem(n: int, values, seed: int = 0):
@@ -69,15 +67,3 @@ def test_what_is_not_positive_or_does_not_converge_is_told(monkeypatch):
     monkeypatch.setattr(eigen.basis, "MOST_BLOCKS", 2)
     with pytest.raises(NotConvergedError, match="Fewer than 6 eigenpairs converged in a Krylov space of 6 vectors"):
         found(a, k, 6, 3)
-
-
-@pytest.mark.parametrize("rows", [[], [1, 4], [0, 1, 2, 3, 4, 5]])
-def test_products_with_full_rows(rows):
-    rng = np.random.default_rng(2)
-    matrix = np.where(rng.random((6, 50)) < 0.1, rng.standard_normal((6, 50)), 0.0)
-    matrix[rows] = rng.standard_normal((len(rows), 50))
-    split = FullRows(sp.csr_matrix(matrix))
-    for x, y in ((rng.standard_normal(50), rng.standard_normal(6)), (rng.random((50, 3)), rng.random((6, 3)))):
-        for unit in (1.0, 1.0 + 2.0j):
-            np.testing.assert_allclose(split @ (unit * x), unit * (matrix @ x), rtol=1e-12, atol=1e-13)
-            np.testing.assert_allclose(split.transposed(unit * y), unit * (matrix.T @ y), rtol=1e-12, atol=1e-13)
