@@ -124,8 +124,8 @@ def test_each_onset_over_alpha_is_listed_once_and_shown_by_its_sides(coarse_case
 def test_nothing_is_claimed_beside_a_value_without_a_certificate(coarse_case, monkeypatch):
     honest = StabilityWalk.sample
 
-    def doubtful(self, *arguments, value, **more):
-        sample = honest(self, *arguments, value=value, **more)
+    def doubtful(self, place, cell, value):
+        sample = honest(self, place, cell, value)
         return replace(sample, certain=sample.certain and abs(value - 100.0) > 1e-6)
 
     monkeypatch.setattr(StabilityWalk, "sample", doubtful)
