@@ -168,9 +168,9 @@ class Page:
             found = await self.site.workers.drawing.ask("header", path=str(run.page))
             if isinstance(content, bytes):
                 stay_inside(read_sheet(found["case"]))
-        except CaseError:
+        except CaseError as error:
             self.site.runs.delete(self.home, run)
-            raise
+            raise CaseError(str(error).replace(str(run.page), name)) from None
         (run.folder / f"{Path(name).stem}.toml").write_text(found["case"], encoding="utf-8")
         run.kind = found["kind"]
         run.keep()

@@ -247,7 +247,7 @@ class RunsPanel:
             drop = ui.upload(
                 label="Drop a record or result", auto_upload=True, max_file_size=LARGEST, on_upload=self._take
             )
-            drop.props("flat bordered").style("width: 230px; max-height: 56px")
+            drop.props("flat bordered").style("width: 270px; max-height: 56px")
         ui.label("What a study takes stands in its section of the case: Describe, all keys as text.").classes("note")
         self._list = RunList(self.page, opens=False)
         ui.timer(LOOK, self.refresh)

@@ -147,8 +147,8 @@ class Tab:
 
     def drop(self, name: str, content: bytes) -> None:
         """Drop a file on the box of the panel that is shown."""
-        boxes = self.driver.find_elements("css selector", ".q-uploader")
-        box = next(box for box in boxes if box.is_displayed())
+        boxes = lambda: self.driver.find_elements("css selector", ".q-uploader")  # noqa: E731
+        box = self.wait(lambda: next((box for box in boxes() if box.is_displayed()), None))
         script = """const [box, name, data] = arguments, moved = new DataTransfer();
             moved.items.add(new File([Uint8Array.from(atob(data), c => c.charCodeAt(0))], name));
             const told = kind => new DragEvent(kind, {bubbles: true, cancelable: true, dataTransfer: moved});

@@ -245,7 +245,7 @@ def test_malformed_cases_are_told(tmp_path):
             tab.unfold("Layers, inside to outside")
             for text, said in (
                 ("valve = [", "TOML"),
-                ("x = " + "[" * 5000, "nested"),
+                ("x = " + "[" * 5000, "recursion"),
                 ("layers = [1, 2]", "layers"),
                 ('layers = [{ material = "CR" }, 7]', "layers"),
                 ('layers = "many"', "layers"),
