@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from time import process_time
+
 import numpy as np
 import pytest
 
 import dbvfiv
 from dbvfiv.errors import CaseError
+from tests.app.server import COARSE as COARSE_SIX
 
 COARSE = {"mesh.around": 6, "mesh.along": 8}
 
@@ -58,3 +61,28 @@ def test_what_cannot_be_asked_is_said(explorer):
         explorer.predict(thickness=1.0)
     with pytest.raises(CaseError, match="pressure is given as -5"):
         explorer.predict(pressure=-5.0)
+
+
+@pytest.mark.slow
+def test_a_move_takes_so_much_of_a_processor(tmp_path):
+    """What a quiet processor answers in, whatever else it does: the 6-inch valve on its own mesh of 28 x 48."""
+    text = COARSE_SIX.replace("around = 6", "around = 28").replace("along = 8", "along = 48")
+    (tmp_path / "six.toml").write_text(text.replace('model = "rayleigh"\nbeta = 0.003', 'model = "loss factor"'))
+    explorer = dbvfiv.load(tmp_path / "six.toml").explore()
+    explorer.predict()
+    while explorer.prepare():
+        pass
+    chance, asked = np.random.default_rng(8), dict(explorer.base)
+    asked = {name: asked[name] for name in explorer.ranges}
+    taken = {True: [], False: []}
+    for number in range(60):
+        name = "pressure" if number % 3 == 2 else ("density", "loss_factor")[number % 2]
+        asked[name] = chance.uniform(*explorer.ranges[name])
+        begun = process_time()
+        explorer.predict(**asked)
+        taken[explorer.moves(name)].append(process_time() - begun)
+        explorer.bounded(**asked)
+    for moves, seconds in taken.items():
+        middle, most = np.percentile(seconds, (50, 95))
+        print(f"state {'moves' if moves else 'stays'}: median {middle:.3f} s, 95 % {most:.3f} s of a processor")
+    assert np.median(taken[False]) <= 0.2 and np.median(taken[True]) <= 2.0

@@ -145,6 +145,12 @@ ALL = (
         {"dbv36.pdf": "report-page.png"},
         study=False,
     ),
+    Made(
+        "page",
+        "python -m tests.app.pictures {folder}",
+        {"describe.png": "app-describe.png", "ask.png": "app-ask.png", "see.png": "app-see.png"},
+        study=False,
+    ),
     Made("valve", "dbvfiv plot cases/dbv4-wide.toml -o {folder}", {"valve.png": "valve-described.png"}, False),
     Made(
         "flow",

@@ -10,7 +10,6 @@ from typing import Any
 
 from nicegui import ui
 
-from ..case.parameters import PARAMETERS
 from ..errors import CaseError
 
 #: Colour bar below a figure, so that a narrow page keeps its width.
@@ -112,15 +111,9 @@ class AskPanel:
                 self.values[name] = min(max(value, row["low"]), row["high"])
                 slider.value = self.values[name] / row["scale"]
 
-    def shown(self, name: str) -> dict[str, Any]:
-        """Scale, label and own value of a parameter as the sliders show it."""
-        row = PARAMETERS[name]
-        own = self._rows.get(name, {"scale": row.scale, "title": row.title, "unit": row.shown_unit, "own": None})
-        return own | {"label": f"{own['title']}, {own['unit']}".rstrip(", ")}
-
     async def _follow(self, file: Path, values: dict[str, float]) -> None:
         """Answer moves of the sliders, the last one always, until another valve is opened."""
-        predictor, confirmer = self.page.site.workers.of(file)
+        predictor, confirmer = self.page.site.workers.of(file, self)
         self._status.text = "The valve is being built; the first answer takes longest."
         try:
             found = await predictor.about(file, "open")
@@ -178,7 +171,7 @@ class AskPanel:
                 scale, step = row["scale"], (row["high"] - row["low"]) / row["scale"] / STEPS
                 low, high, own = row["low"] / scale, row["high"] / scale, row["own"] / scale
                 moves = " (changes the steady state)" if row["moves"] else ""
-                ui.label(f"{self.shown(name)['label']}{moves}").classes("note")
+                ui.label(label_of(row) + moves).classes("note")
                 with ui.row().classes("full").style("flex-wrap: nowrap; align-items: center"):
                     slider = ui.slider(min=low, max=high, step=step, value=own).props(f'data-at="slide {name}"')
                     box = (
@@ -232,7 +225,7 @@ class AskPanel:
         if self._file is None or not self.values:
             return None
         try:
-            return await self.page.site.workers.of(self._file)[number].about(self._file, do, values=self.values)
+            return await self.page.site.workers.of(self._file, self)[number].about(self._file, do, values=self.values)
         except CaseError as error:
             self.page.tell(str(error))
 
@@ -272,6 +265,7 @@ class AskPanel:
 
     def close(self) -> None:
         """Stop following."""
+        self.page.site.workers.leave(self)
         for task in (self._task, self._confirming):
             if task is not None:
                 with contextlib.suppress(Exception):
@@ -295,6 +289,11 @@ def _space(found: dict[str, Any], colour: str) -> dict[str, Any]:
 
 #: Axes of the figure and of the valve.
 _AXES = (("x", "z"), ("y", "x"), ("z", "y"))
+
+
+def label_of(row: dict[str, Any]) -> str:
+    """Label of a parameter with its unit."""
+    return f"{row['title']}, {row['unit']}".rstrip(", ")
 
 
 def _short(value: float) -> str:

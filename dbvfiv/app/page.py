@@ -36,7 +36,7 @@ body { font-family: 'DejaVu Sans', Arial, sans-serif; background: #f6f7f9 }
 .figures { display: grid; grid-template-columns: repeat(auto-fit, minmax(min(100%, 520px), 1fr)); gap: 12px }
 .figures { width: 100% } .figures > * { max-width: 760px }
 .drawing img { width: 100%; background: white; border-radius: 6px } .full { width: 100% }
-.numbers { display: grid; grid-template-columns: repeat(auto-fill, minmax(130px, 1fr)); gap: 8px; width: 100% }
+.numbers { display: grid; grid-template-columns: repeat(auto-fill, minmax(150px, 1fr)); gap: 8px; width: 100% }
 .number { background: white; border-radius: 6px; padding: 8px 10px } .number b { font-size: 1.25rem; display: block }
 .text { white-space: pre; overflow-x: auto; font: 12px 'DejaVu Sans Mono', monospace; max-width: 100%; width: 100% }
 .predicted, .confirmed { border-left: 4px solid #d98200; padding-left: 10px } .confirmed { border-color: #2e7d32 }

@@ -140,20 +140,37 @@ async def _read(process: asyncio.subprocess.Process, asked: dict[int, asyncio.Fu
 
 
 class Workers:
-    """Workers of the valves that were asked last: one predicts, one confirms; and one that draws for all."""
+    """Workers of the valves that were asked last: one predicts, one confirms; and one that draws for all.
+
+    A pair that nobody asks any more goes on with the next valve: what it has imported and compiled serves again.
+    """
 
     def __init__(self) -> None:
         self.drawing = Worker(BEHIND)
         self._pairs: OrderedDict[Path, tuple[Worker, Worker]] = OrderedDict()
+        self._askers: dict[Path, set[object]] = {}
 
-    def of(self, case: Path) -> tuple[Worker, Worker]:
-        """Workers of a case file; those of the valve that was not asked for longest are ended where too many live."""
-        pair = self._pairs.pop(case, None) or (Worker(), Worker(BEHIND))
-        self._pairs[case] = pair
+    def of(self, case: Path, asker: object) -> tuple[Worker, Worker]:
+        """Workers of a case file for one of those who ask, who gives up the valve that he asked before; those of the
+        valve that was not asked for longest are ended where too many live.
+        """
+        for others in self._askers.values():
+            others.discard(asker)
+        free = next((path for path in reversed(self._pairs) if not self._askers[path]), None)
+        key = case if case in self._pairs else free
+        pair = (Worker(), Worker(BEHIND)) if key is None else self._pairs.pop(key)
+        self._pairs[case], self._askers[case] = pair, self._askers.pop(key, set()) | {asker}
         while len(self._pairs) > VALVES:
-            for worker in self._pairs.popitem(last=False)[1]:
+            last, workers = self._pairs.popitem(last=False)
+            del self._askers[last]
+            for worker in workers:
                 worker.end()
         return pair
+
+    def leave(self, asker: object) -> None:
+        """Nobody waits for the valve of one who asked, unless others do."""
+        for others in self._askers.values():
+            others.discard(asker)
 
     def end(self) -> None:
         """End all."""

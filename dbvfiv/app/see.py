@@ -10,11 +10,13 @@ from typing import Any
 
 from nicegui import events, ui
 
-from ..case.parameters import PARAMETERS
+from ..case.parameters import PARAMETERS, Mu
 from ..errors import CaseError
 from ..studies import KINDS
-from .ask import COLOUR_BAR
+from ..studies.case import load_case
+from .ask import COLOUR_BAR, label_of
 from .processes import RECORD, Run
+from .sheet import shown_as
 
 #: Time between two looks at the runs, s; largest record or result, bytes.
 LOOK, LARGEST = 1.0, 15 << 20
@@ -134,12 +136,12 @@ async def show_result(page: Any, run: Run) -> None:
     if run.kind in KINDS and run.page.exists():
         try:
             found = await page.site.workers.drawing.ask("result", path=str(run.page), figures=str(figures))
+            if run.kind == "map" and found["summary"].get("growth_rate"):
+                show_map(page, run, found["summary"])
         except CaseError as error:
             ui.label(str(error)).classes("wrong")
             return
         said = said or "\n".join(found["lines"])  # of a result that was made elsewhere
-        if run.kind == "map" and found["summary"].get("growth_rate"):
-            show_map(page, run, found["summary"])
         with ui.row():
             for name in found["tables"]:
                 ui.link(name, f"/files/{run.name}/figures/{name}").props("download")
@@ -158,7 +160,8 @@ def show_map(page: Any, run: Run, found: dict[str, Any]) -> None:
     """Draw a stability map with neutral curves and the star of the installation; a click goes to a cell."""
     axes, grid = (found["x"], found["y"]), found["growth_rate"]
     names = [axis["parameter"] for axis in axes]
-    rows = [page.asking.shown(name) for name in names]
+    case = load_case(run.case)
+    rows = [shown_as(case, name) for name in names]
     x, y = ([value / row["scale"] for value in axis["values"]] for axis, row in zip(axes, rows))
     limit = max((abs(rate) for row in grid for rate in row if rate is not None), default=1.0)
     bar = COLOUR_BAR | {"title": {"text": "Growth rate, 1/s"}, "y": -0.25}
@@ -167,14 +170,14 @@ def show_map(page: Any, run: Run, found: dict[str, Any]) -> None:
     for curve in found["onset_curves"]:
         points = {name: [point[i] / rows[i]["scale"] for point in curve] for i, name in enumerate("xy")}
         drawn.append({"type": "scatter", "mode": "lines", "line": {"color": "black"}, "showlegend": False} | points)
-    own = [page.asking.values.get(name, row["own"]) for name, row in zip(names, rows)]
-    if None not in own:
-        marker = {"symbol": "star", "size": 16, "color": "gold", "line": {"color": "black", "width": 1}}
-        star = {name: [value / row["scale"]] for name, value, row in zip("xy", own, rows)}
-        drawn.append({"type": "scatter", "mode": "markers", "marker": marker, "name": "this installation"} | star)
+    own = Mu.of(case)
+    marker = {"symbol": "star", "size": 16, "color": "gold", "line": {"color": "black", "width": 1}}
+    star = {axis: [own[name] / row["scale"]] for axis, name, row in zip("xy", names, rows)}
+    drawn.append({"type": "scatter", "mode": "markers", "marker": marker, "name": "this installation"} | star)
     layout = {"height": 480, "margin": {"t": 40, "r": 10}, "showlegend": False}
     for name, axis, row in zip("xy", axes, rows):
-        layout[f"{name}axis"] = {"title": {"text": row["label"]}, "type": "log" if axis.get("log") else "linear"}
+        layout[f"{name}axis"] = {"title": {"text": label_of(row)}, "type": "log" if axis.get("log") else "linear"}
+        layout[f"{name}axis"]["exponentformat"] = "none"
     figure = {"data": drawn, "layout": layout, "config": {"responsive": False, "displaylogo": False}}
 
     def go(event: events.GenericEventArguments) -> None:

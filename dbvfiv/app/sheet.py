@@ -11,6 +11,8 @@ from typing import Any
 
 from ..case.describe import quantity_of
 from ..case.load import make_case, parse_toml, put, toml_value
+from ..case.parameters import PARAMETERS
+from ..case.quantity import GRAVITY
 from ..case.section import Section
 from ..errors import CaseError
 from ..studies.case import Case, contradictions, oddities
@@ -52,6 +54,10 @@ FORM: dict[str, tuple[tuple[str, str], ...]] = {
         ("mesh.along", "Elements along"),
     ),
 }
+
+
+#: Density of a fluid whose pressures are told as heads, kg/m3.
+LIQUID = 300.0
 
 
 @dataclass(frozen=True)
@@ -132,6 +138,15 @@ def usual_value(section: Section, name: str) -> Any:
     """Value of a key of a section as a case file has it, with its unit."""
     value, quantity = getattr(section, name), quantity_of(type(section).model_fields[name])
     return quantity.show(value) if quantity is not None and isinstance(value, (int, float)) else value
+
+
+def shown_as(case: Case, name: str) -> dict[str, Any]:
+    """Title, unit and its SI value of a parameter as a page shows it: pressures of liquids as heads."""
+    row, units = PARAMETERS[name], case.units
+    if name != "pressure" or case.fluid.density <= LIQUID or (units.text and not units.heads):
+        return {"title": row.title, "unit": row.shown_unit, "scale": row.scale}
+    scale = units.factor("pressure") if units.heads else GRAVITY * case.fluid.density
+    return {"title": "Head of the fluid", "unit": units.name("pressure") if units.heads else "m", "scale": scale}
 
 
 def change(data: dict[str, Any], key: str, text: str) -> None:

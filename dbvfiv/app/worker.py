@@ -6,7 +6,10 @@
 from __future__ import annotations
 
 import base64
+import contextlib
 import csv
+import ctypes
+import gc
 import io
 import json
 import math
@@ -21,8 +24,6 @@ from typing import Any
 import numpy as np
 
 from ..api import Valve, load
-from ..case.parameters import PARAMETERS
-from ..case.quantity import GRAVITY
 from ..case.write import case_toml
 from ..drawing.style import draw_figures, style
 from ..drawing.views import ValveSkin, drawers_of
@@ -34,11 +35,10 @@ from ..record.mesh import MeshData
 from ..shell.recovery import layer_fields
 from ..studies.session import load_result
 from ..studies.study import find_study
+from .sheet import shown_as
 
 #: Time without a question after which the reduced operator is enriched, s.
 IDLE = 0.3
-#: Density of a fluid whose pressures are told as heads, kg/m3.
-LIQUID = 300.0
 
 
 class Desk:
@@ -72,21 +72,14 @@ class Desk:
 
     def open(self, case: str) -> dict[str, Any]:
         """Open a case file; the parameters that can be moved, SI, with their rows of the table."""
-        self.explorer = None
+        self.valve = self.explorer = self._last = None  # one valve at a time
         self.valve = load(case)
         self.explorer = found = self.valve.explore()
         found.interrupted = self._interrupted
-        units, liquid = found.case.units, found.case.fluid.density > LIQUID
-        in_pressure = not liquid or (units.text and not units.heads)
-        head = units.factor("pressure") if units.heads else GRAVITY * found.case.fluid.density
         rows = {}
         for name, (low, high) in found.ranges.items():
-            row = PARAMETERS[name]
-            title, unit, scale = row.title, row.shown_unit, row.scale
-            if name == "pressure" and not in_pressure:
-                title, unit, scale = "Head of the fluid", units.name("pressure") if units.heads else "m", head
-            rows[name] = {"low": low, "high": high, "own": found.base[name], "scale": scale, "unit": unit}
-            rows[name] |= {"title": title, "moves": found.moves(name)}
+            rows[name] = shown_as(found.case, name)
+            rows[name] |= {"low": low, "high": high, "own": found.base[name], "moves": found.moves(name)}
         return {"parameters": rows}
 
     def predict(self, values: dict[str, float]) -> dict[str, Any]:
@@ -207,11 +200,20 @@ def main() -> None:
                 idle = desk.explorer is not None and desk.explorer.prepare()
             except Exception:  # nobody asked for it; the question that comes to it is told
                 idle = False
+            if not idle:
+                give_back()
             continue
         if line is None:
             return
         print(json.dumps(answer(desk, json.loads(line))), file=out, flush=True)
         idle = True
+
+
+def give_back() -> None:
+    """Give memory that is free back to the system, where its library can."""
+    gc.collect()
+    with contextlib.suppress(OSError, AttributeError):
+        ctypes.CDLL(None).malloc_trim(0)
 
 
 if __name__ == "__main__":

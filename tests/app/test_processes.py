@@ -5,11 +5,12 @@ from __future__ import annotations
 import asyncio
 import json
 import sys
+from pathlib import Path
 
 import pytest
 
 from dbvfiv.app import processes
-from dbvfiv.app.processes import Run, Runs, Worker
+from dbvfiv.app.processes import Run, Runs, Worker, Workers
 from dbvfiv.errors import CaseError
 
 #: A program that ignores what asks it to end.
@@ -109,3 +110,23 @@ def test_a_worker_says_what_went_wrong_and_answers_on(tmp_path):
         worker.end()
 
     asyncio.run(day())
+
+
+def test_workers_go_on_with_the_next_valve():
+    workers = Workers()
+    a, b, c, d = (Path(name) for name in "abcd")
+    pair = workers.of(a, "one")
+    assert workers.of(b, "one") is pair  # alone: its processes serve the next valve
+    assert workers.of(b, "two") is pair  # both tabs ask one valve
+    other = workers.of(c, "one")
+    assert other is not pair and workers.of(b, "two") is pair
+    workers.leave("two")
+    assert workers.of(d, "three") is pair
+    assert workers.of(c, "one") is other
+
+
+def test_so_many_valves_are_held():
+    workers = Workers()
+    pairs = [workers.of(Path(str(number)), number) for number in range(processes.VALVES + 1)]
+    assert workers.of(Path("0"), 0) is not pairs[0]
+    assert workers.of(Path("2"), 2) is pairs[2]
