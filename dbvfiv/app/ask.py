@@ -72,7 +72,8 @@ class AskPanel:
                         {"name": "frequency", "label": "Frequency, Hz", "field": "frequency"},
                     ],
                     rows=[],
-                ).classes("full")
+                )
+                self._modes.classes("full").props("dense")
                 with ui.row():
                     ui.button("Show the shape", on_click=self._shape).props("flat")
                     ui.button("Animate the leading mode", on_click=self._animate).props("flat")
