@@ -304,8 +304,6 @@ class Valve:
         self,
         pressure: float | str | Iterable[float | str] | None = None,
         *,
-        in_time: bool = False,
-        compare: bool = False,
         output: Output = None,
         observer: Observer | None = None,
     ) -> ClosureResult:
@@ -315,10 +313,6 @@ class Valve:
         ----------
         pressure : number (Pa), text with a unit, or several of them, optional
             Those of the case by default.
-        in_time : bool
-            Also turn the drive from flow to back pressure in time; see `dbvfiv.studies.closure.reversal`.
-        compare : bool
-            Do the same with the other kind of supports; see `ClosureResult.compared`.
         output : path, optional
             Result file, written state by state.
         observer : Observer, optional
@@ -337,7 +331,7 @@ class Valve:
         asked = self.case.closure.pressures if pressure is None else [pressure] if is_single(pressure) else pressure
         pressures = read_pressures(asked, "pressure", self.case.fluid.density)
         session = self._ask({"closure.pressures": list(pressures)}, {})
-        return session.perform("closure", output, observer or bar(), in_time=in_time, compare=compare)
+        return session.perform("closure", output, observer or bar())
 
     def onset(
         self, over: Range | None = None, *, output: Output = None, observer: Observer | None = None, **changes: Any

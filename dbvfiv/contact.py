@@ -53,14 +53,12 @@ def tributary_area(shell: Shell) -> np.ndarray:
 
 @dataclass(frozen=True)
 class ContactLaw:
-    """t = penalty * ramp(multiplier / penalty - gap): the augmented Lagrangian of g >= 0, t >= 0, t g = 0 (Alart &
-    Curnier 1991).
+    """t = penalty * ramp(-gap): the penalty form of g >= 0, t >= 0, t g = 0.
 
     Attributes
     ----------
     penalty : float, Pa/m
-        The contact pressure follows the penetration with this slope; updates of the multipliers remove what penetration
-        is left.
+        The contact pressure follows the penetration with this slope.
     rounding : float, m
         Half width over which the kink of the ramp is rounded by a parabola, so that the tangent is continuous; 0 keeps
         the kink.
@@ -75,13 +73,12 @@ class ContactLaw:
         if not self.rounding >= 0:
             raise ValueError(f"The rounding of the contact law cannot be negative, as {self.rounding:g} m is.")
 
-    def respond(self, gap: np.ndarray, multiplier: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Potential (J/m2), contact pressure (Pa) and stiffness (Pa/m), each (k,), at gaps (k,) and multipliers (k,).
+    def respond(self, gap: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Potential (J/m2), contact pressure (Pa) and stiffness (Pa/m), each (k,), at gaps (k,).
 
         Pressure and stiffness are the first and second derivatives of the potential with respect to the penetration.
         """
-        x = multiplier / self.penalty - gap
-        w = self.rounding
+        x, w = -gap, self.rounding
         if w == 0.0:
             positive = x > 0
             ramp, slope = np.where(positive, x, 0.0), positive.astype(float)
@@ -94,7 +91,7 @@ class ContactLaw:
         return self.penalty * area, self.penalty * ramp, self.penalty * slope
 
     def gap_at(self, pressure: float) -> float:
-        """Gap, m, at which faces without multipliers press on each other with a pressure, Pa, above zero."""
+        """Gap, m, at which faces press on each other with a pressure, Pa, above zero."""
         depth, w = pressure / self.penalty, self.rounding
         return w - 2.0 * np.sqrt(w * depth) if depth < w else -depth
 
@@ -188,39 +185,34 @@ class PlaneContact:
         n = self.nodes
         return self.shell.mesh.nodes[n] + nodal[n, :3] - self.depth[:, None] * directors[n]
 
-    def state(self, nodal: np.ndarray, directors: np.ndarray, multiplier: np.ndarray) -> ContactState:
-        """Gaps, pressures and forces with multipliers (k,), Pa."""
+    def state(self, nodal: np.ndarray, directors: np.ndarray) -> ContactState:
+        """Gaps, pressures and forces of nodal unknowns (nn, c) with directors (nn, 3)."""
         gap = self.gap(nodal, directors)
-        _, pressure, _ = self.law.respond(gap, multiplier)
+        _, pressure, _ = self.law.respond(gap)
         return ContactState(gap, pressure, self.area * pressure)
 
-    def energy(self, nodal, directors, multiplier) -> float:
-        """Potential of the contact, J; with zero multipliers the energy stored by the penalty."""
-        return float(self.area @ self.law.respond(self.gap(nodal, directors), multiplier)[0])
+    def energy(self, nodal, directors) -> float:
+        """Energy stored in the contact, J."""
+        return float(self.area @ self.law.respond(self.gap(nodal, directors))[0])
 
-    def add_force(self, force, nodal, directors, first, multiplier) -> None:
+    def add_force(self, force, nodal, directors, first) -> None:
         """Add the internal force, the derivative of the potential, to force (n,).
 
         `first` (nn, 2, 3) are the derivatives of the directors.
         """
-        _, pressure, _ = self.law.respond(self.gap(nodal, directors), multiplier)
+        _, pressure, _ = self.law.respond(self.gap(nodal, directors))
         self.add_pressure_force(force, pressure, first)
 
     def add_pressure_force(self, force, pressure, first) -> None:
         """Add the internal force of contact pressures (k,), Pa, to force (n,)."""
         _add(force, self._unknowns, -(self.area * pressure)[:, None] * self.slope(first))
 
-    def add_multiplier_derivative(self, force, nodal, directors, first, multiplier, change) -> None:
-        """Add the derivative of the internal force along a change (k,) of the multipliers to force (n,)."""
-        _, _, stiffness = self.law.respond(self.gap(nodal, directors), multiplier)
-        self.add_pressure_force(force, stiffness / self.law.penalty * change, first)
-
-    def add_force_and_tangent(self, force, data, nodal, directors, first, second, multiplier) -> None:
+    def add_force_and_tangent(self, force, data, nodal, directors, first, second) -> None:
         """Add force and symmetric tangent values on the shell's pattern; `second` (nn, 3, 3) as `Shell.directors`
         returns.
         """
-        self.add_force(force, nodal, directors, first, multiplier)
-        self.add_blocks(data, self.tangent_blocks(nodal, directors, first, second, multiplier))
+        self.add_force(force, nodal, directors, first)
+        self.add_blocks(data, self.tangent_blocks(nodal, directors, first, second))
 
     def add_blocks(self, data, block) -> None:
         """Add blocks (k, 3, 3) of each contact node in its displacement across the plane and its rotations to matrix
@@ -230,9 +222,9 @@ class PlaneContact:
         keep = slots >= 0
         data[slots[keep]] += block[keep]
 
-    def tangent_blocks(self, nodal, directors, first, second, multiplier) -> np.ndarray:
+    def tangent_blocks(self, nodal, directors, first, second) -> np.ndarray:
         """Tangent (k, 3, 3) of each contact node in its displacement across the plane and its rotations."""
-        _, pressure, stiffness = self.law.respond(self.gap(nodal, directors), multiplier)
+        _, pressure, stiffness = self.law.respond(self.gap(nodal, directors))
         slope = self.slope(first)
         block = (self.area * stiffness)[:, None, None] * slope[:, :, None] * slope[:, None, :]
         return block + self.bending_blocks(pressure, second)
@@ -275,17 +267,16 @@ def _add(force: np.ndarray, unknowns: np.ndarray, values: np.ndarray) -> None:
     force[unknowns[keep]] += values[keep]  # every unknown belongs to one contact node only
 
 
-def _blocks_together(contact: PlaneContact, nodal, directors, first, multiplier) -> tuple[np.ndarray, list[int]]:
+def _blocks_together(contact: PlaneContact, nodal, directors, first) -> tuple[np.ndarray, list[int]]:
     """Tangent (k, 4, 4) of each contact node and the columns (4) of its nodal unknowns that it belongs to.
 
     Parameters
     ----------
     nodal, directors, first : (nn, c), (nn, 3), (nn, 2, 3) arrays
         Nodal unknowns, directors and their derivatives.
-    multiplier : (k,) array, Pa
     """
     along = [axis for axis in range(3) if axis != contact.axis]
-    force = contact.state(nodal, directors, multiplier).force
+    force = contact.state(nodal, directors).force
     turn = first[contact.nodes][:, :, along].transpose(0, 2, 1)  # director along the plane by the rotations
     block = np.zeros((contact.count, 4, 4))
     block[:, 2:, 2:] = (force * contact.depth)[:, None, None] * (turn.transpose(0, 2, 1) @ turn)
@@ -294,9 +285,7 @@ def _blocks_together(contact: PlaneContact, nodal, directors, first, multiplier)
     return block, [*along, 3, 4]
 
 
-def class_stiffness(
-    contact: PlaneContact, nodal: np.ndarray, multiplier: np.ndarray, shell: Shell, apart: bool
-) -> sp.csr_matrix:
+def class_stiffness(contact: PlaneContact, nodal: np.ndarray, shell: Shell, apart: bool) -> sp.csr_matrix:
     """Tangent (n, n) of a contact in a class of motion.
 
     Parameters
@@ -304,7 +293,6 @@ def class_stiffness(
     contact : PlaneContact
     nodal : (nn, c) array
         Nodal unknowns of the state.
-    multiplier : (k,) array, Pa
     shell : Shell
         With the n unknowns of the class.
     apart : bool
@@ -312,10 +300,10 @@ def class_stiffness(
     """
     directors, first, second = contact.shell.directors(nodal)
     if apart:
-        block = contact.tangent_blocks(nodal, directors, first, second, multiplier)
+        block = contact.tangent_blocks(nodal, directors, first, second)
         columns = [contact.axis, 3, 4]
     else:
-        block, columns = _blocks_together(contact, nodal, directors, first, multiplier)
+        block, columns = _blocks_together(contact, nodal, directors, first)
     unknowns, width = shell.dofs.index[contact.nodes][:, columns], len(columns)
     rows = np.repeat(unknowns[:, :, None], width, axis=2)
     across = np.repeat(unknowns[:, None, :], width, axis=1)
@@ -323,9 +311,7 @@ def class_stiffness(
     return sp.csr_matrix((block[keep], (rows[keep], across[keep])), shape=(shell.size, shell.size))
 
 
-def contact_form(
-    contact: PlaneContact, nodal: np.ndarray, multiplier: np.ndarray, *directions: np.ndarray
-) -> np.ndarray:
+def contact_form(contact: PlaneContact, nodal: np.ndarray, *directions: np.ndarray) -> np.ndarray:
     """Derivative (nn, c) of the contact force at nodal unknowns (nn, c) along any number of directions (nn, c).
 
     The law is made of pieces; at their joints the derivatives are those of one side.
@@ -336,7 +322,6 @@ def contact_form(
         mesh.nodes[n, axis] + contact.lift,
         contact.depth,
         contact.area,
-        multiplier,
         mesh.directors[n],
         mesh.frames[n],
     )
@@ -349,10 +334,9 @@ def contact_form(
 
 def _potential(axis, law, v, data):
     """Potential of one node from its displacement across the plane and its rotations (3,)."""
-    place, depth, area, multiplier, reference, frame = data
+    place, depth, area, reference, frame = data
     penalty, width = law
-    gap = place + v[0] - depth * director(v[1:], reference, frame)[axis]
-    x = multiplier / penalty - gap
+    x = depth * director(v[1:], reference, frame)[axis] - place - v[0]
     if width == 0.0:
         return area * penalty * 0.5 * jnp.where(x > 0, x, 0.0) ** 2
     rounded = (x + width) ** 3 / (12 * width)
@@ -407,13 +391,12 @@ class Rebound:
 
 def mean_pressure(law: ContactLaw, old: np.ndarray, new: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Discrete gradient of the potential between gaps (k,), Pa, and its derivative by the new gaps, Pa/m."""
-    none = np.zeros_like(old)
     change = new - old
     small = np.abs(change) <= _SMALL * (np.abs(old) + law.rounding)
     over = np.where(small, 1.0, change)
-    stored_old, _, _ = law.respond(old, none)
-    stored, pressure, _ = law.respond(new, none)
-    _, middle, stiffness = law.respond(0.5 * (old + new), none)
+    stored_old, _, _ = law.respond(old)
+    stored, pressure, _ = law.respond(new)
+    _, middle, stiffness = law.respond(0.5 * (old + new))
     mean = np.where(small, middle, (stored_old - stored) / over)
     return mean, np.where(small, -0.5 * stiffness, (pressure - mean) / over)
 
@@ -437,7 +420,7 @@ class ContactStep:
         self._energy = self._stored(self._gap)
 
     def _stored(self, gap: np.ndarray) -> float:
-        return float(self.plane.area @ self.plane.law.respond(gap, np.zeros_like(gap))[0])
+        return float(self.plane.area @ self.plane.law.respond(gap)[0])
 
     def _pressure(self, gap: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         mean, slope = mean_pressure(self.plane.law, self._gap, gap)

@@ -30,7 +30,7 @@ def kernel_directory() -> Path:
     """
     package = Path(__file__).parent
     digest = hashlib.sha256()
-    for source in (*sorted((package / "shell").glob("*.py")), package / "motion" / "kernels.py"):
+    for source in sorted((package / "shell").glob("*.py")):
         digest.update(source.read_bytes())
     return cache_directory() / "numba" / digest.hexdigest()[:16]
 

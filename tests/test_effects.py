@@ -7,7 +7,7 @@ from dbvfiv.fit import outside_band
 from dbvfiv.model import ValveModel
 from dbvfiv.model.equilibria import model_warnings
 from dbvfiv.studies.case import load_case, oddities
-from dbvfiv.studies.closure.valve import closure_model
+from dbvfiv.studies.closure.valve import ClosedValve
 from dbvfiv.studies.session import Session
 from tests.small_valves import SMALL
 
@@ -17,7 +17,7 @@ def of_model(case):
 
 
 def of_closed(case):
-    return closure_model(case).start_warnings()
+    return ClosedValve(case).start_warnings()
 
 
 def of_study(kind):

@@ -45,6 +45,11 @@ class RowAreas:
         """Flow areas (rows,) in m2 of the part, from nodal unknowns (nn, c); may be negative when the lips cross."""
         return _polygon(self._rest + nodal[self.rows][:, :, :2]) + self.offset
 
+    def rates(self, nodal: np.ndarray, rate: np.ndarray) -> np.ndarray:
+        """Rates (rows,) of the areas at nodal unknowns and their rates (nn, c)."""
+        slope = _polygon_slope(self._rest + nodal[self.rows][:, :, :2])
+        return np.einsum("rki,rki->r", slope, rate[self.rows][:, :, :2])
+
     def jacobian(self, nodal: np.ndarray) -> sp.csr_matrix:
         """(rows, n) derivative of the areas with respect to the free unknowns."""
         slope = _polygon_slope(self._rest + nodal[self.rows][:, :, :2]).ravel()[self._keep]

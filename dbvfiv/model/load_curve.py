@@ -1,4 +1,4 @@
-"""Equilibria over the load as one curve, followed by pseudo-arclength from rest on.
+"""Equilibria over the load as one curve, followed by pseudo-arclength from rest on, or from a given equilibrium.
 
 A wall that snaps, or whose faces part row by row, has several equilibria at one pressure, and which of them load steps
 end on depends on the steps. The curve from rest on does not: at a pressure that it passes several times the state is
@@ -15,7 +15,7 @@ from weakref import WeakKeyDictionary, proxy
 
 import numpy as np
 
-from continuation import ContinuationOptions, NotConverged, Observer, System
+from continuation import ContinuationOptions, NotConverged, Observer, Reason, System
 from continuation import NewtonOptions as ContinuationNewton
 from continuation.branch import Branch
 from continuation.branches import branch_tracer
@@ -57,7 +57,7 @@ class LoadSystem(System):
         self.factor, self.factored = model.factor(), None
         # One unit of the state is a mean displacement of the gap that faces in contact leave, or a mean rotation by it
         # over the wall: in larger units the curve would turn right back where faces part.
-        surface, gap = model.shell.mesh, 2.0 * model.case.valve.initial_gap
+        surface, gap = model.shell.mesh, model.length_unit
         weights = np.full(model.shell.dofs.free.shape, (np.mean(surface.thickness) / gap) ** 2) / surface.node_count
         weights[:, :3] = 1.0 / (surface.node_count * gap**2)
         self.state_weights = model.shell.dofs.restrict(weights)
@@ -101,6 +101,14 @@ class _Linearisation:
         return system.factor
 
 
+class LimitState(NamedTuple):
+    """A limit point solved for: pressure, Pa, unknowns (n,) and the shape (n,) by which they change there."""
+
+    pressure: float
+    q: np.ndarray
+    shape: np.ndarray
+
+
 class LimitPoint(NamedTuple):
     """A pressure, Pa, at which the curve turns back; `highest` where it falls beyond it, lowest where it rises."""
 
@@ -117,13 +125,20 @@ class LoadCurve:
     model : ValveModel
     newton : NewtonOptions
     observer : Observer
+    origin : (pressure, unknowns), optional
+        Equilibrium that the curve starts from; that at rest without it.
+    stops_at_limit : bool
+        The curve ends where its pressure first turns back.
     """
 
     model: Any
     newton: NewtonOptions
     observer: ProgressObserver
+    origin: tuple[float, np.ndarray] | None = None
+    stops_at_limit: bool = False
 
     def __post_init__(self):
+        self._start = float(self.model.flow.back if self.origin is None else self.origin[0])
         self._branch: Branch | None = None
         self._system: LoadSystem | None = None
         self._angle = _ANGLES[0]
@@ -137,20 +152,25 @@ class LoadCurve:
         SolveError
             If the curve does not come to it.
         """
-        start, before = float(self.model.flow.back), 0 if self._branch is None else len(self._branch)
-        if target == start:
+        before = 0 if self._branch is None else len(self._branch)
+        if target == self._start:
             return NewtonResult(self._rest(), True, 0, 0.0, 0.0, "at rest without a flow"), 0
         found = self._bracket(target)
         if found is None:
-            self._extend(start, target)
+            self.extend(target)
             found = self._bracket(target)
         if found is None:
             last = self.pressures[-1]
             raise SolveError(
                 f"No equilibrium was found at {target:.6g} Pa: the curve of equilibria from rest on ends at "
-                f"{last:.6g} Pa, where it {self._branch.reason}."
+                f"{last:.6g} Pa, where it {self.reason}."
             )
         return self._settle(found, target), len(self._branch) - before
+
+    @property
+    def reason(self) -> str:
+        """Why the curve ended."""
+        return str(self._branch.reason)
 
     @property
     def pressures(self) -> np.ndarray:
@@ -168,10 +188,25 @@ class LoadCurve:
             return []
         return [limit for limit in _without_noise(self._limits(slice(None))) if limit.pressure <= highest]
 
+    def limit_states(self) -> list[LimitState]:
+        """Limit points along the curve, solved for."""
+        points, tracer, found = self._branch.points, self._tracer((-np.inf, np.inf)), []
+        for i in self._turns(self._slopes(slice(None))):
+            at = tracer.root(points[i], points[i + 1], lambda point: point.tangent[-1], 1e-12)
+            at = min(points[i : i + 2], key=lambda point: abs(point.tangent[-1])) if at is None else at
+            found.append(LimitState(float(at.z[-1]), at.z[:-1], at.tangent[:-1]))
+        return found
+
+    def _slopes(self, part: slice) -> np.ndarray:
+        return np.array([point.tangent[-1] for point in self._branch.points[part]])
+
+    @staticmethod
+    def _turns(slope: np.ndarray) -> np.ndarray:
+        return np.flatnonzero(slope[:-1] * slope[1:] < 0)
+
     def _limits(self, part: slice) -> list[LimitPoint]:
-        pressure = self.pressures[part]
-        slope = np.array([point.tangent[-1] for point in self._branch.points[part]])
-        turns = np.flatnonzero(slope[:-1] * slope[1:] < 0)
+        pressure, slope = self.pressures[part], self._slopes(part)
+        turns = self._turns(slope)
         return [LimitPoint(_turn(pressure[i : i + 2], slope[i : i + 2]), bool(slope[i] > 0)) for i in turns]
 
     def passages(self, pressure: float) -> list[np.ndarray]:
@@ -207,6 +242,8 @@ class LoadCurve:
         """Unknowns (n,) of the wall at rest; where it has a weight it hangs."""
         if self._branch is not None:
             return self._branch.points[0].z[:-1]
+        if self.origin is not None:
+            return self.origin[1]
         hanging = LoadSteps(Loading(self.model, self.model.flow.back), LoadStepOptions(self.newton))
         if self.model.weight is not None:
             hanging.reach(1.0)
@@ -251,22 +288,30 @@ class LoadCurve:
             max_points=_MOST,
             limits={LOAD: limits},
             parameter_scales={LOAD: self._unit},
-            folds=False,
+            folds=self.stops_at_limit,
+            locate=False,
+            stop_at=frozenset({"fold"}),
             branch_points=False,
             newton=ContinuationNewton(max(self.newton.tolerance, _POINTS), 7),
             max_angle=self._angle,
         )
         return branch_tracer(self._system, {LOAD: self._start}, LOAD, options, observers=_Told(self.observer))
 
-    def _extend(self, start: float, target: float) -> None:
-        """Follow the curve on to a pressure, anew with other steps where it comes back to its start."""
-        self._start = start
+    def extend(self, target: float) -> None:
+        """Follow the curve on to a pressure, anew with other steps where it comes back to its start.
+
+        Raises
+        ------
+        SolveError
+            If no curve leaves the start.
+        """
+        start, back = self._start, self.model.flow.back
         for angle in dict.fromkeys((self._angle, *_ANGLES)):
             if angle != self._angle:
                 self._angle, self._branch = angle, None
             if self._branch is None:
                 self._unit = max(1e-3 * abs(target - start), self.model.load_unit)
-            tracer = self._tracer((start - self._unit, target))
+            tracer = self._tracer((back - self._unit, target))
             try:
                 if self._branch is None:
                     z = np.append(self._rest(), start)
@@ -279,10 +324,10 @@ class LoadCurve:
                     self._branch = tracer.resume(self._branch)
             except NotConverged as error:
                 raise SolveError(f"No curve of equilibria leaves that at {start:.6g} Pa: {error}") from error
-            if self._branch.reason.kind.name == "INTERRUPTED":
+            if self._branch.reason.kind is Reason.INTERRUPTED:
                 self._branch = None
                 raise KeyboardInterrupt
-            if self.pressures[-1] >= target * (1 - 1e-12):
+            if self.pressures[-1] >= target * (1 - 1e-12) or self._branch.reason.kind is Reason.STOPPED:
                 return
 
 

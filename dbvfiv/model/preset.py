@@ -55,7 +55,7 @@ def stress_free_shape(shell: Shell, loaded: np.ndarray, pressure: float) -> Shel
         If there is none: the wall buckles before, or is too soft.
     """
     mesh = shell.mesh
-    outside = LoadSteps(PressedShell(shell, None, -1.0, loaded), LoadStepOptions(_NEWTON))
+    outside = LoadSteps(PressedShell(shell, -1.0, loaded), LoadStepOptions(_NEWTON))
     refused = (
         f"No shape without stress was found from which closing takes {pressure:.6g} Pa: the wall is too soft for such "
         "a preset; take a lower one, or a thicker or shorter bill."
@@ -69,7 +69,7 @@ def stress_free_shape(shell: Shell, loaded: np.ndarray, pressure: float) -> Shel
     mixing = _Mixing()
     for _ in range(_MOST):
         shape = replace(mesh, nodes=place[:, :3], directors=place[:, 3:])
-        pressed = PressedShell(shell.preset(shape, pressure), None, 1.0, loaded)
+        pressed = PressedShell(shell.preset(shape, pressure), 1.0, loaded)
         q, before = pressed.rest(), off
         off = np.linalg.norm(pressed.residual(q, pressure)) / pressed.force_scale(q, pressure)
         if off <= _BALANCED or _BALANCED * 1e3 >= off > 0.5 * before:  # the latter is rounding
@@ -119,7 +119,7 @@ def pressure_for_overlap(shell: Shell, loaded: np.ndarray, node: int, overlap: f
         shape = stress_free_shape(shell, loaded, pressure)
         return float(shell.mesh.nodes[node, 1] - shape.nodes[node, 1]) / overlap - 1.0
 
-    small = PressedShell(shell, None, -1.0, loaded)
+    small = PressedShell(shell, -1.0, loaded)
     steps = LoadSteps(small, LoadStepOptions(_NEWTON))
     steps.reach(1e-3)
     first = 1e-3 * overlap / abs(float(small.nodal(steps.q)[node, 1]))

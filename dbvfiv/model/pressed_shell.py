@@ -1,6 +1,6 @@
-"""Any shell under a uniform follower pressure, before a plane: the contract of equilibria without a flow.
+"""Any shell under a uniform follower pressure: the contract of equilibria without a flow.
 
-    r(q; P) = f_shell(q) + f_contact(q; multipliers) - sign * P * f(q) = 0
+    r(q; P) = f_shell(q) - sign * P * f(q) = 0
 
 with f the force of unit pressure along the outward normal. It answers what `dbvfiv.model.newton.EquilibriumSolver` and
 load steps ask of a model.
@@ -12,7 +12,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..contact import ContactState, PlaneContact
 from ..shell import Shell
 from ..shell.pressure import pressure_force, pressure_stiffness
 from .linear import DirectFactor
@@ -26,7 +25,7 @@ class PressedTangent:
     ----------
     residual : (n,) array, N and N m
     structure : (nnz,) array
-        Values of the symmetric tangent of shell and contact.
+        Values of the symmetric tangent of the shell.
     stiffness : (nnz,) array
         Values of the whole tangent: structure less the follower stiffness, not symmetric where the loaded surface has a
         free edge.
@@ -38,30 +37,22 @@ class PressedTangent:
 
 
 class PressedShell:
-    """A shell, its contact and a uniform pressure.
+    """A shell and a uniform pressure.
 
     Parameters
     ----------
     shell : Shell
-    contact : PlaneContact or None
     sign : float
         +1 for a pressure on the side of the first layer (inside), -1 for one from outside.
     loaded : (ne,) array, optional
         Share of each element that carries pressure; all by default.
-
-    Attributes
-    ----------
-    multiplier : (k,) array, Pa
-        Contact multipliers; held during an equilibrium iteration and renewed between them, see `renew_multipliers`.
     """
 
-    def __init__(self, shell: Shell, contact: PlaneContact | None = None, sign: float = -1.0, loaded=None):
+    def __init__(self, shell: Shell, sign: float = -1.0, loaded=None):
         self.shell = shell
         self.mesh = shell.mesh
-        self.contact = contact
         self.sign = float(sign)
         self.loaded = np.ones(shell.mesh.element_count) if loaded is None else np.asarray(loaded, float)
-        self.multiplier = np.zeros(0 if contact is None else contact.count)
 
     @property
     def size(self) -> int:
@@ -79,20 +70,15 @@ class PressedShell:
 
     def residual(self, q: np.ndarray, pressure: float) -> np.ndarray:
         """Unbalanced force (n,) at a pressure, Pa."""
-        nodal = self.nodal(q)
-        force = self.shell.force(q)
-        if self.contact is not None:
-            d, d1, _ = self.shell.directors(nodal)
-            self.contact.add_force(force, nodal, d, d1, self.multiplier)
-        return force - self.pressure_force(nodal, pressure)
+        return self.internal_force(q) - self.pressure_force(self.nodal(q), pressure)
+
+    def internal_force(self, q: np.ndarray) -> np.ndarray:
+        """Force (n,) of the shell."""
+        return self.shell.force(q)
 
     def structure(self, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Internal force (n,) of shell and contact and values (nnz,) of their tangent."""
-        force, data = self.shell.force_and_tangent(q)
-        if self.contact is not None:
-            nodal = self.nodal(q)
-            self.contact.add_force_and_tangent(force, data, nodal, *self.shell.directors(nodal), self.multiplier)
-        return force, data
+        """`internal_force` (n,) and values (nnz,) of its tangent."""
+        return self.shell.force_and_tangent(q)
 
     def tangent(self, q: np.ndarray, pressure: float) -> PressedTangent:
         """Residual and linearisation at a pressure, Pa."""
@@ -123,56 +109,8 @@ class PressedShell:
         pressure_force(self.mesh.quads, self.mesh.nodes, nodal, self._uniform(pressure), self.loaded, out)
         return out
 
-    def pressure_force_second(self, a: np.ndarray, b: np.ndarray) -> np.ndarray:
-        """Second directional derivative (n,) of the force of unit pressure along nodal fields a and b (nn, c); it is
-        quadratic in the positions.
-        """
-
-        def of(x):
-            out = np.zeros_like(x)
-            pressure_force(self.mesh.quads, np.zeros_like(self.mesh.nodes), x, self._uniform(1.0), self.loaded, out)
-            return out
-
-        return self.shell.dofs.restrict(of(a + b) - of(a) - of(b))
-
     def _uniform(self, pressure: float) -> np.ndarray:
         return np.full(self.mesh.node_count, self.sign * pressure)
-
-    # -- contact
-    # ----
-
-    def contact_state(self, q: np.ndarray) -> ContactState | None:
-        """Gaps and contact pressures of a state."""
-        if self.contact is None:
-            return None
-        nodal = self.nodal(q)
-        return self.contact.state(nodal, self.shell.directors(nodal)[0], self.multiplier)
-
-    def renew_multipliers(self, q: np.ndarray) -> None:
-        """Take the contact pressures of a state as multipliers (Uzawa's update)."""
-        state = self.contact_state(q)
-        if state is not None:
-            self.multiplier = state.pressure.copy()
-
-    def contact_energy(self, q: np.ndarray) -> float:
-        """Potential of the contact, J."""
-        if self.contact is None:
-            return 0.0
-        nodal = self.nodal(q)
-        return self.contact.energy(nodal, self.shell.directors(nodal)[0], self.multiplier)
-
-    def renewal_force(self, q: np.ndarray) -> np.ndarray:
-        """Derivative (k,) of the contact's potential with respect to the multipliers, m3: the work of renewing them."""
-        return self.contact_state(q).force / self.contact.law.penalty
-
-    def multiplier_derivative(self, q: np.ndarray, change: np.ndarray) -> np.ndarray:
-        """Derivative (n,) of the residual along a change (k,) of the multipliers."""
-        out = np.zeros(self.size)
-        if self.contact is not None and change.any():
-            nodal = self.nodal(q)
-            d, d1, _ = self.shell.directors(nodal)
-            self.contact.add_multiplier_derivative(out, nodal, d, d1, self.multiplier, change)
-        return out
 
     # -- what solvers ask
     # ----
@@ -201,9 +139,8 @@ class PressedShell:
         return -self.pressure_force(self.nodal(q), 1.0)
 
     def force_scale(self, q: np.ndarray, pressure: float) -> float:
-        """Norm of the pressure forces, N: what residuals are measured against; with that of a preset wall's closing."""
-        own = self.shell.closing_pressure if self.contact is not None else 0.0
-        return float(np.linalg.norm(self.pressure_force(self.nodal(q), abs(pressure) + own)))
+        """Norm of the pressure forces, N: what residuals are measured against."""
+        return float(np.linalg.norm(self.pressure_force(self.nodal(q), abs(pressure))))
 
     def mass(self, q: np.ndarray) -> np.ndarray:
         """Values (nnz,) of the mass matrix at a state."""

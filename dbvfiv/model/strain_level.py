@@ -39,7 +39,7 @@ SMALLEST_STEP, HALVINGS = 1 / 256, 4
 #: Load steps to a back pressure at least; as many again in the first of them.
 CLOSED_STEPS = 20
 #: A valve under back pressure, its inner faces in contact. On the 12-inch valve at 28 kPa its strains are within
-#: 0.3 % of those of the closure study, which brings the penetration of this penalty to nothing.
+#: 0.3 % of those of the closure study, whose faces are stiffer.
 CLOSED = {
     "drive.kind": "uniform",
     "drive.side": "outside",
@@ -147,7 +147,7 @@ def settle_levels(
     pressure : float or None, Pa
         As drive.pressure; None for the operating point of valve and pump.
     back_pressure : float, Pa, optional
-        Of a closed valve, outside over inside. Its faces meet by the penalty of `CLOSED`, not by multipliers.
+        Of a closed valve, outside over inside. Its faces meet by the penalty of `CLOSED`.
     observer : Observer, optional
         Is told of progress.
     """

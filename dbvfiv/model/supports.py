@@ -5,8 +5,12 @@ director, so contact forces act on rotations as well. The faces of the duckbill 
 passage at rest has the half gap `valve.initial_gap`, whatever wall and lip radius leave, and the faces meet where
 `fluid.area_floor` of it is left, so that lips that lie on each other leave the passage that a shut valve has, and none
 below zero. Faces of a bill that is moulded shut touch in the shape it is drawn in, and press on each other there with
-the pressure that it was cured for. Elsewhere the gap is that of the geometry. Points that start closer to the plane
-than this gap, or beyond it, as where the wall folds at the side edge, are measured from where they start plus the gap.
+the pressure that it was cured for. Elsewhere, and in a valve that is closed from outside, the gap is that of the
+geometry. Points that start closer to the plane than this gap, or beyond it, as where the wall folds at the side edge,
+are measured from where they start plus the gap.
+
+A closed valve may also have lips that are held (Th. 3.6): they keep y = 0 in the duckbill, and the mid-surface of the
+saddle cannot cross the plane.
 
 The force is no part of the structure's: neither stiffness damping nor loss factors act on it. Equations (T.26) and, of
 contact in a time step, (T.27) of docs/theory.md.
@@ -15,7 +19,6 @@ contact in a time step, (T.27) of docs/theory.md.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 import scipy.sparse as sp
@@ -46,6 +49,11 @@ def free_unknowns(mesh: ValveMesh) -> np.ndarray:
         free[np.ix_(mesh.rows[:, column], [across, 4])] = False
     free[mesh.rows[-1]] = False
     return free
+
+
+def held_rows(case: Case, mesh: ValveMesh) -> np.ndarray:
+    """(rows,) true for rows of the duckbill, which supports of Th. 3.6 hold shut."""
+    return mesh.z <= case.valve.duckbill_length * (1 + 1e-9)
 
 
 @dataclass(frozen=True)
@@ -113,10 +121,6 @@ class FaceContact:
     shell: Shell
     plane: PlaneContact
 
-    @cached_property
-    def _none(self) -> np.ndarray:
-        return np.zeros(self.plane.count)
-
     def nodal(self, q: np.ndarray) -> np.ndarray:
         """Nodal displacements and rotations (nn, c) of unknowns (n,)."""
         return self.shell.dofs.expand(q)
@@ -124,7 +128,7 @@ class FaceContact:
     def state(self, q: np.ndarray) -> ContactState:
         """Gaps, pressures and forces of a state (n,), of the part."""
         nodal = self.nodal(q)
-        return self.plane.state(nodal, self.shell.directors(nodal)[0], self._none)
+        return self.plane.state(nodal, self.shell.directors(nodal)[0])
 
     def touching(self, q: np.ndarray) -> int:
         """Number of nodes whose face is pressed."""
@@ -133,49 +137,55 @@ class FaceContact:
     def energy(self, q: np.ndarray) -> float:
         """Stored in the contact, J of the part."""
         nodal = self.nodal(q)
-        return self.plane.energy(nodal, self.shell.directors(nodal)[0], self._none)
+        return self.plane.energy(nodal, self.shell.directors(nodal)[0])
 
     def force(self, q: np.ndarray) -> np.ndarray:
         """Internal force (n,), the derivative of the energy."""
         force, nodal = np.zeros(self.shell.size), self.nodal(q)
         d, d1, _ = self.shell.directors(nodal)
-        self.plane.add_force(force, nodal, d, d1, self._none)
+        self.plane.add_force(force, nodal, d, d1)
         return force
 
     def add_tangent(self, q: np.ndarray, data: np.ndarray) -> None:
         """Add the symmetric tangent to values (nnz,) on the shell's pattern."""
         nodal = self.nodal(q)
-        self.plane.add_force_and_tangent(
-            np.zeros(self.shell.size), data, nodal, *self.shell.directors(nodal), self._none
-        )
+        self.plane.add_force_and_tangent(np.zeros(self.shell.size), data, nodal, *self.shell.directors(nodal))
 
     def form(self, q: np.ndarray, *directions: np.ndarray) -> np.ndarray:
         """Derivative (n,) of the force along two or three directions (n,); of the law's pieces, not of their joints."""
         fields = [self.nodal(direction) for direction in directions]
-        return self.shell.dofs.restrict(contact_form(self.plane, self.nodal(q), self._none, *fields))
+        return self.shell.dofs.restrict(contact_form(self.plane, self.nodal(q), *fields))
 
     def stiffness_of_class(self, q: np.ndarray, shell: Shell, apart: bool) -> sp.csr_matrix:
         """Tangent (k, k) in a class of motion with its shell: faces that move against each other resist, those that
         move together turn their force (see `together_blocks`).
         """
-        return class_stiffness(self.plane, self.nodal(q), self._none, shell, apart)
+        return class_stiffness(self.plane, self.nodal(q), shell, apart)
 
 
-def face_contact(case: Case, mesh: ValveMesh, shell: Shell) -> FaceContact | None:
-    """Contact of the inner faces of a case; None where it has stops."""
+#: What closes a valve that is pressed from outside: contact of the faces, or the supports of Th. 3.6.
+CONTACT, HELD_LIPS = "contact", "held-lips"
+
+
+def face_contact(case: Case, mesh: ValveMesh, shell: Shell, closed_by: str | None = None) -> FaceContact | None:
+    """Contact of the inner faces of a case, as drawn of a closed valve; None where it has stops."""
+    every, area, gap = np.arange(shell.mesh.node_count), tributary_area(shell), case.valve.initial_gap
+    preset = case.valve.is_preset
+    law = ContactLaw(case.face_stiffness, (PRESET_ROUNDING if preset else ROUNDING) * gap)
+    if closed_by == HELD_LIPS:
+        return FaceContact(shell, PlaneContact(shell, every, 0.0, area, law))
     if not case.faces_touch:
         return None
-    preset = case.valve.is_preset
-    law = ContactLaw(case.face_stiffness, (PRESET_ROUNDING if preset else ROUNDING) * case.valve.initial_gap)
-    gap = np.full(shell.mesh.node_count, (1.0 - case.film_share) * case.valve.initial_gap)
+    depth, gap = 0.5 * nodal_thickness(shell.mesh), np.full(len(every), gap)
     if preset:
         moulded = mesh.nodes[:, 2] <= case.valve.moulded_length * (1 + 1e-9)
         gap = np.where(moulded, law.gap_at(shell.closing_pressure), law.rounding)
-    depth = 0.5 * nodal_thickness(shell.mesh)
-    at_lips = mesh.nodes[:, 2] <= case.valve.duckbill_length * (1 + 1e-9)
-    depth = np.where(at_lips, depth + _inside(case, gap), depth)
-    every = np.arange(shell.mesh.node_count)
-    return FaceContact(shell, PlaneContact(shell, every, depth, tributary_area(shell), law, axis=1, least_gap=gap))
+    elif closed_by is None:
+        gap *= 1.0 - case.film_share
+    if preset or closed_by is None:
+        at_lips = mesh.nodes[:, 2] <= case.valve.duckbill_length * (1 + 1e-9)
+        depth = np.where(at_lips, depth + _inside(case, gap), depth)
+    return FaceContact(shell, PlaneContact(shell, every, depth, area, law, least_gap=gap))
 
 
 def _inside(case: Case, gap: np.ndarray) -> np.ndarray:

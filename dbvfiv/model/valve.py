@@ -32,7 +32,7 @@ from .load_steps import Loading
 from .newton import EquilibriumSolver, NewtonOptions
 from .outside import OutsideFluid
 from .relaxing import WallRelaxation
-from .supports import FaceContact, face_contact, lip_stops
+from .supports import HELD_LIPS, FaceContact, face_contact, free_unknowns, held_rows, lip_stops
 
 #: Faces that meet change the residual from one step to the next: its norm has to fall.
 _AT_REST = NewtonOptions(1e-10, 200, "l2")
@@ -71,6 +71,8 @@ class ValveModel:
     case : Case
     section : Section, optional
         Wall in place of the one the case describes.
+    closed_by : str, optional
+        Of a valve that is pressed from outside, `dbvfiv.model.supports.CONTACT` or `HELD_LIPS`.
 
     Raises
     ------
@@ -78,13 +80,17 @@ class ValveModel:
         If the case's geometry cannot be meshed.
     """
 
-    def __init__(self, case: Case, section: Section | None = None):
+    def __init__(self, case: Case, section: Section | None = None, closed_by: str | None = None):
         self.case = case
         self.mesh, self.shell = build_shell(case, section)
+        if closed_by == HELD_LIPS:
+            free = free_unknowns(self.mesh)
+            free[self.mesh.rows[held_rows(case, self.mesh)].ravel(), 1] = False
+            self.shell = self.shell.with_free(free)
         dofs = self.shell.dofs
         self.rows = RowAreas(self.mesh, dofs.index)
         self.stops = lip_stops(case, self.mesh, dofs.index)
-        self.contact: FaceContact | None = face_contact(case, self.mesh, self.shell)
+        self.contact: FaceContact | None = face_contact(case, self.mesh, self.shell, closed_by)
         self.station_of_node = np.empty(len(self.mesh.nodes), np.int64)
         self.station_of_node[self.mesh.rows] = np.arange(len(self.mesh.rows))[:, None]
         self.loaded = loaded_share(self.mesh, case)
@@ -246,10 +252,14 @@ class ValveModel:
 
     def pressure_force(self, nodal: np.ndarray, p: np.ndarray) -> np.ndarray:
         """Force (n,) of station pressures p (m,), Pa, on the deformed wall."""
+        return self.shell.dofs.restrict(self.nodal_pressure_force(nodal, p))
+
+    def nodal_pressure_force(self, nodal: np.ndarray, p: np.ndarray) -> np.ndarray:
+        """Force (nn, c) of station pressures p (m,), Pa, on all nodes, held or not."""
         out = np.zeros_like(nodal)
         surface = self.shell.mesh
         pressure_force(surface.quads, surface.nodes, nodal, p[self.station_of_node], self.loaded, out)
-        return self.shell.dofs.restrict(out)
+        return out
 
     def follower_stiffness(self, nodal: np.ndarray, p: np.ndarray, structure: np.ndarray) -> np.ndarray:
         """Values (nnz,) of the structure's tangent less the derivative of the pressure force at constant pressures."""
@@ -323,6 +333,11 @@ class ValveModel:
     def load_unit(self) -> float:
         """Pressure, Pa, in which loads are counted: that which closes a preset wall; 1 mm of water without one."""
         return max(self.shell.closing_pressure, 10.0)
+
+    @property
+    def length_unit(self) -> float:
+        """Displacement, m, in which curves of equilibria are measured: the gap of the lips, by which faces part."""
+        return 2.0 * self.case.valve.initial_gap
 
     def rounding(self, q: np.ndarray, tangent: Tangent) -> float:
         """Norm of the residual that rounding of the positions alone can leave, N: machine epsilon times |K| |x|."""

@@ -19,7 +19,6 @@ from ..model import ValveModel
 from ..model.linear import CoupledFactor, DirectFactor
 from ..model.supports import FaceStep
 from ..shell import Memory, StepWall, WallMemory
-from .kernels import row_motion, strain_energy
 from .outside import MovingOutside, OutsideCorrection
 from .trial import Weights
 
@@ -114,9 +113,7 @@ class ValveMotion:
     def _passage(self, nodal: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Areas (m,) and their rates (m,)."""
         rows = self.model.rows
-        area, rate = np.empty(self.stations), np.empty(self.stations)
-        row_motion(rows.rows, self.model.shell.mesh.nodes, nodal, self.model.nodal(v), area, rate)
-        return area + rows.offset, rate
+        return rows.areas(nodal), rows.rates(nodal, self.model.nodal(v))
 
     def length(self, dq: np.ndarray) -> float:
         """Largest displacement in a change (n,) of the unknowns, m; rotations count by the path of the wall's face."""
@@ -282,7 +279,8 @@ class ValveMotion:
         """Kinetic energy, strain energy and that of stops or contact, J of the part; the fluid outside is
         `outside_energy`.
         """
-        return *wall_energies(self.model, q, v), self.model.support_energy(q)
+        shell = self.model.shell
+        return shell.kinetic_energy(q, v), shell.energy(q), self.model.support_energy(q)
 
     def outside_energy(self, q: np.ndarray, v: np.ndarray) -> float:
         """Kinetic energy of the fluid outside, J of the part; zero where there is none."""
@@ -293,19 +291,6 @@ def _blocks(by_rate: np.ndarray, by_inner: np.ndarray) -> tuple[np.ndarray, ...]
     """Derivatives of pressures and equations (m + l, m) and (m + l, l), in the order of `CoupledFactor.refactor`."""
     m = by_rate.shape[1]
     return by_rate[:m], by_inner[:m], by_rate[m:], by_inner[m:]
-
-
-def wall_energies(model: ValveModel, q: np.ndarray, v: np.ndarray) -> tuple[float, float]:
-    """Kinetic energy and strain energy at positions and velocities (n,), J of the part."""
-    shell = model.shell
-    nodal = model.nodal(q)
-    d = shell.directors(nodal)[0]
-    if shell.metric == "first-order":
-        parts = zip(shell.parts, shell.wall)
-        strain = sum(strain_energy(p.quads, shell.mesh.nodes, nodal, d, p.reference, wall) for p, wall in parts)
-    else:
-        strain = shell.energy(q)
-    return shell.kinetic_energy(q, v), float(strain)
 
 
 class MassSolver:

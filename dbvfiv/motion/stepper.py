@@ -48,9 +48,6 @@ class StepOptions:
     largest_turn : float
         Largest change of a rotation in a step, rad. Directors that turn further between two instants can gain energy
         from stiffness damping.
-    backward : bool
-        Meet the fluid's equations at the end of every step, not of those alone in which momentum is lost or fluid is
-        drawn in: for walls that shut in several places.
     """
 
     tolerance: float = 1e-4
@@ -60,7 +57,6 @@ class StepOptions:
     diverged: float = 100.0
     smallest_fraction: float = 1.0 / 16.0
     largest_turn: float = 0.3
-    backward: bool = False
 
 
 @dataclass(frozen=True)
@@ -146,7 +142,7 @@ class Stepper:
         speeds = state.fluid.speed
         outward, momenta = _outward(speeds), self.motion.fluid.momenta(speeds)
         scheme = self.scheme if outward else self._inward
-        for robust in (self.options.backward or not (outward and self._smooth(state, momenta, h)), True):
+        for robust in (not (outward and self._smooth(state, momenta, h)), True):
             trial = Trial(self.motion, scheme, state, h, self.pressure, robust)
             try:
                 self._iterate(trial)

@@ -196,8 +196,19 @@ def read_header(file: h5py.File, case_model: type[Case]) -> Header:
     )
 
 
+#: Keys that earlier versions wrote with every case and that no study asks for now.
+GONE = {
+    "closure": ("contact_depth", "penetration", "balance_tolerance", "start", "open_pressure")
+    + ("reversal_time", "reversal_hold", "reversal_continuity"),
+}
+
+
 def _case(text: str, model: type[Case]) -> Case:
+    data = json.loads(text)
+    for section, names in GONE.items():
+        for name in names:
+            data.get(section, {}).pop(name, None)
     try:
-        return model.from_dict(json.loads(text))
+        return model.from_dict(data)
     except CaseError as error:  # not the user's slip but the file's
         raise ValueError(f"its case cannot be used, {error}") from error

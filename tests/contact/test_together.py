@@ -6,10 +6,9 @@ import numpy as np
 import pytest
 
 from dbvfiv.contact import ContactLaw, PlaneContact, tributary_area
-from dbvfiv.model.pressed_shell import PressedShell
 from dbvfiv.shell import Shell, ShellMesh
-from dbvfiv.studies.closure.buckling import class_matrices
 from tests.shell.structures import grid, isotropic_section
+from tests.systems.pressed import ShellOnPlane, class_matrices
 
 WALL, SIDE, PRESSURE = 0.01, 0.2, 2e3
 
@@ -22,12 +21,12 @@ def pressed():
     assert mesh.directors[:, 1] == pytest.approx(1.0)
     shell = Shell(mesh, isotropic_section(1e6, 0.3, WALL))
     law = ContactLaw(1e12)
-    model = PressedShell(shell, PlaneContact(shell, np.arange(mesh.node_count), 0.5 * WALL, tributary_area(shell), law))
+    model = ShellOnPlane(shell, PlaneContact(shell, np.arange(mesh.node_count), 0.5 * WALL, tributary_area(shell), law))
     sunk = np.zeros((mesh.node_count, 5))
     sunk[:, 1] = -PRESSURE / law.penalty
     q = shell.dofs.restrict(sunk)
     assert np.abs(model.residual(q, PRESSURE)).max() < 1e-9 * PRESSURE * SIDE**2
-    assert model.contact_state(q).total == pytest.approx(PRESSURE * SIDE**2, rel=1e-9)
+    assert model.contact.state(q).total == pytest.approx(PRESSURE * SIDE**2, rel=1e-9)
     free = np.ones((mesh.node_count, 5), bool)
     return mesh, class_matrices(model, free, False, q, PRESSURE)[0]
 

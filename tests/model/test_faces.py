@@ -8,9 +8,9 @@ import pytest
 from dbvfiv.model.classes import linearise_class
 from dbvfiv.model.equilibria import LoadPath, SteadyOptions
 from dbvfiv.model.newton import NewtonOptions
-from dbvfiv.model.pressed_shell import PressedShell
 from dbvfiv.model.symmetry import SYMMETRIES
 from tests.model.conftest import opened
+from tests.systems.pressed import ShellOnPlane
 
 FACES = {"supports__contact": "faces"}
 
@@ -149,7 +149,8 @@ def test_a_valve_under_outside_pressure_is_the_pressed_shell(make_model):
     model = make_model(**FACES, drive__kind="uniform", drive__side="outside")
     path = LoadPath(model, SteadyOptions(NewtonOptions(1e-11), 1e-3))
     path.go_to(2e3)
-    pressed = PressedShell(model.shell, model.contact.plane, -1.0, model.loaded)
+    pressed = ShellOnPlane(model.shell, model.contact.plane)
+    pressed.loaded = model.loaded
     left = np.linalg.norm(pressed.residual(path.q, 2e3)) / pressed.force_scale(path.q, 2e3)
     state = model.contact.state(path.q)
     assert left < 1e-9 and state.touching.sum() > 5

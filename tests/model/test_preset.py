@@ -22,7 +22,6 @@ from dbvfiv.model.classes import linearise_class
 from dbvfiv.model.equilibria import LoadPath, SteadyOptions, first_opening, operating_pressure, sealing_for_cracking
 from dbvfiv.model.newton import EquilibriumSolver, NewtonOptions
 from dbvfiv.model.preset import stress_free_shape
-from dbvfiv.model.pressed_shell import PressedShell
 from dbvfiv.model.symmetry import SYMMETRIES
 from dbvfiv.motion.control import RunOptions
 from dbvfiv.motion.stepper import StepOptions
@@ -31,6 +30,7 @@ from dbvfiv.studies.stability.derivatives import parameters_of
 from dbvfiv.studies.stability.place import redesigned
 from dbvfiv.studies.transient.run import Runner
 from eigen import SearchOptions, leading_modes
+from tests.systems.pressed import ShellOnPlane
 from tests.verification.test_shell_large_displacement import cantilever
 
 #: The 12-inch valve on a mesh that cracks in a second or two.
@@ -71,9 +71,9 @@ def test_strip_against_a_wall_keeps_what_the_fluid_leaves_of_its_pressure(share)
     contact = PlaneContact(
         shell, np.arange(len(area)), sealing / 1e11, area, law, axis=2, least_gap=law.gap_at(sealing)
     )
-    pressed = PressedShell(shell, contact, 1.0)
+    pressed = ShellOnPlane(shell, contact, 1.0)
     found = EquilibriumSolver(pressed, NewtonOptions(1e-11, 50, "l2")).solve(pressed.rest(), share * sealing)
-    state = pressed.contact_state(found.q)
+    state = pressed.contact.state(found.q)
     assert found.converged
     if share > 1:
         assert not state.touching.any() and pressed.nodal(found.q)[-1, 2] > 0

@@ -8,11 +8,8 @@ import numpy as np
 import pytest
 
 import dbvfiv
-from dbvfiv.model.load_steps import LoadStepOptions, LoadSteps
 from dbvfiv.model.symmetry import SYMMETRIES
 from dbvfiv.studies.case import thesis_case
-from dbvfiv.studies.closure.buckling import class_matrices
-from dbvfiv.studies.closure.valve import closure_model
 from dbvfiv.studies.onset.line import common_stretches, joined_stretches, merge_points
 from dbvfiv.studies.stability.dimensions import leading_class
 
@@ -119,20 +116,6 @@ def test_back_pressure_is_watched_in_every_class(closures):
     assert watched["first_buckling"] is None
     lines = "\n".join(closures["all"].lines())
     assert all(f"class {name}" in lines for name in OTHERS)
-
-
-def test_the_symmetric_class_is_the_tangent_of_the_path():
-    """Contact included, at a state in which the walls press on each other."""
-    model = closure_model(make().case)
-    steps = LoadSteps(model.pressed, LoadStepOptions(first_step=50.0))
-    steps.reach(4e3)
-    assert model.pressed.contact_state(steps.q).touching.any()
-    free = SYMMETRIES["SS"].free_unknowns(model.mesh)
-    stiffness, mass = class_matrices(model.pressed, free, True, steps.q, 4e3)
-    matrix = model.shell.dofs.matrix
-    expected = matrix(model.pressed.tangent(steps.q, 4e3).stiffness)
-    assert abs(stiffness - expected).max() < 1e-12 * abs(expected).max()
-    assert abs(mass - matrix(model.pressed.mass(steps.q))).max() == 0.0
 
 
 def test_held_lips_are_not_watched():

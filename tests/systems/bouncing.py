@@ -25,7 +25,7 @@ class Planes:
         return q[self.unknowns] + self.start
 
     def respond(self, q):
-        return self.law.respond(self.gap(q), np.zeros(len(self.unknowns)))
+        return self.law.respond(self.gap(q))
 
     def energies(self, q):
         """Energy of each contact (k,)."""

@@ -24,7 +24,6 @@ from dbvfiv.errors import CaseError
 from dbvfiv.record.record import GrowingRecord, Record
 from dbvfiv.studies import KINDS
 from dbvfiv.studies.case import thesis_case
-from dbvfiv.studies.closure.walk import valid_rows
 from dbvfiv.studies.study import find_study
 
 CASE = {"mesh.around": 4, "mesh.along": 6, "drive.pressure": 2e3, "fluid.density": 10}
@@ -150,11 +149,11 @@ def contents(path: Path) -> dict:
     }
 
 
-def last_rows(record: Record, table: str) -> list[int] | np.ndarray | slice:
+def last_rows(record: Record, table: str) -> np.ndarray | slice:
     """Those of the attempt that went to its end; a restart point that was kept again at the same step once."""
     if table == "restart":
         return np.unique(record.column(table, "steps"), return_index=True)[1]
-    return valid_rows(record, table)
+    return slice(None)
 
 
 def reference(kind: str, path: Path) -> dict:

@@ -10,7 +10,6 @@ import scipy.sparse as sp
 from dbvfiv.flow.stepping import Flow, FluidState
 from dbvfiv.model.linear import CoupledFactor
 from dbvfiv.model.relaxing import WallRelaxation
-from dbvfiv.motion.kernels import strain_energy
 from dbvfiv.shell import Shell, WallMemory
 from dbvfiv.shell.pressure import pressure_force, pressure_stiffness
 
@@ -159,8 +158,4 @@ class ShellMotion(Motion):
     def energy(self, q, v) -> float:
         """Kinetic and strain energy, J."""
         shell = self.shell
-        nodal = shell.dofs.expand(q)
-        d = shell.directors(nodal)[0]
-        return shell.kinetic_energy(q, v) + float(
-            strain_energy(shell.mesh.quads, shell.mesh.nodes, nodal, d, shell.parts[0].reference, shell.wall[0])
-        )
+        return shell.kinetic_energy(q, v) + shell.energy(q)

@@ -9,19 +9,21 @@ import pytest
 from scipy.optimize import brentq
 
 from dbvfiv.errors import SolveError
+from dbvfiv.model.load_curve import LoadCurve
 from dbvfiv.model.load_steps import LoadStepOptions, LoadSteps
 from dbvfiv.model.newton import NewtonOptions
-from dbvfiv.model.pressed_shell import PressedShell
+from dbvfiv.observer import Observer
 from dbvfiv.shell import Shell, ShellMesh
-from dbvfiv.studies.closure.buckling import BucklingWatch, PressedSystem, follow_past_limits, stiffness_spectrum
+from dbvfiv.studies.closure.buckling import BucklingWatch, follow_past_limits, stiffness_spectrum
 from tests.shell.structures import grid, isotropic_section
+from tests.systems.pressed import ShellOnPlane
 
 E, NU, RADIUS, WALL, WIDTH = 5e6, 0.3, 0.1, 1e-3, 0.02
 #: Bending stiffness of a strip that cannot strain along the axis.
 EI = E / (1 - NU**2) * WALL**3 / 12
 
 
-def _ring(elements: int, radius: float = RADIUS) -> PressedShell:
+def _ring(elements: int, radius: float = RADIUS) -> ShellOnPlane:
     """Quarter of a long cylinder, symmetric about two planes, without strain along its axis: it may ovalise."""
     place = lambda u, v: (radius * np.sin(0.5 * np.pi * u), radius * np.cos(0.5 * np.pi * u), -WIDTH * v)  # noqa: E731
     patch = grid(elements, 1, place)
@@ -35,7 +37,7 @@ def _ring(elements: int, radius: float = RADIUS) -> PressedShell:
     free[patch.index[0], 4] = False
     free[patch.index[-1], 1] = False
     free[patch.index[-1], 4] = False
-    return PressedShell(Shell(mesh, isotropic_section(E, NU, WALL), free), None, -1.0)
+    return ShellOnPlane(Shell(mesh, isotropic_section(E, NU, WALL), free))
 
 
 def _options(step=np.inf) -> LoadStepOptions:
@@ -43,7 +45,7 @@ def _options(step=np.inf) -> LoadStepOptions:
 
 
 @cache
-def _critical(elements: int) -> tuple[float, PressedShell, object]:
+def _critical(elements: int) -> tuple[float, ShellOnPlane, object]:
     model = _ring(elements)
     watch = BucklingWatch(model, _options(), lambda q, p: stiffness_spectrum(model, q, p, 3))
     steps = LoadSteps(model, _options(), accepted=watch.see)
@@ -95,7 +97,7 @@ def test_the_same_ring_under_dead_pressure_buckles_at_four():
     assert brentq(lowest, 3.5, 4.5, rtol=1e-6) == pytest.approx(4.0, rel=3e-3)
 
 
-def _arch(elements: int = 24, radius=0.5, angle=0.5, wall=0.01) -> PressedShell:
+def _arch(elements: int = 24, radius=0.5, angle=0.5, wall=0.01) -> ShellOnPlane:
     """Half of a shallow arch clamped at its end, symmetric about its crown."""
     place = lambda u, v: (radius * np.sin(angle * u), radius * np.cos(angle * u), -WIDTH * v)  # noqa: E731
     patch = grid(elements, 1, place)
@@ -106,7 +108,7 @@ def _arch(elements: int = 24, radius=0.5, angle=0.5, wall=0.01) -> PressedShell:
     free[patch.index[0], 0] = False
     free[patch.index[0], 4] = False
     free[patch.index[-1]] = False
-    return PressedShell(Shell(mesh, isotropic_section(E, NU, wall), free), None, -1.0)
+    return ShellOnPlane(Shell(mesh, isotropic_section(E, NU, wall), free))
 
 
 @pytest.mark.slow
@@ -120,7 +122,7 @@ def test_an_arch_snaps_at_a_limit_point_and_is_followed_beyond_it():
     target = 8000.0
     with pytest.raises(SolveError):
         steps.reach(target)
-    path = follow_past_limits(model, steps.q, steps.pressure, target)
+    path = follow_past_limits(LoadCurve(model, NewtonOptions(), Observer(), (steps.pressure, steps.q)), target)
     assert path.reached and path.points[-1][0] == pytest.approx(target)
     assert len(path.limits) % 2 == 0 and len(path.limits) >= 2
     top, bottom = path.limits[0], path.limits[1]
@@ -137,20 +139,3 @@ def test_an_arch_snaps_at_a_limit_point_and_is_followed_beyond_it():
         with pytest.raises(SolveError):
             back.reach(0.5 * bottom.pressure)
         assert back.pressure == pytest.approx(bottom.pressure, rel=1e-3)
-
-
-@pytest.mark.slow
-def test_derivatives_of_the_pressed_system_agree_with_differences():
-    model = _arch(6)
-    system = PressedSystem(model, 1e3)
-    generator = np.random.default_rng(2)
-    u = 1e-3 * generator.standard_normal(system.size)
-    a, b = generator.standard_normal((2, system.size))
-    mu, h = {"pressure": 700.0}, 1e-6
-    change = (system.linear(u + h * b, mu).matvec(a) - system.linear(u - h * b, mu).matvec(a)) / (2 * h)
-    assert system.d2(u, mu, a, b) == pytest.approx(change, rel=1e-5, abs=1e-7 * np.abs(change).max())
-    up, down = {"pressure": 701.0}, {"pressure": 699.0}
-    change = (system.residual(u, up) - system.residual(u, down)) / 2
-    assert system.d_parameter(u, mu, "pressure") == pytest.approx(change, rel=1e-6, abs=1e-8 * np.abs(change).max())
-    change = (system.linear(u, up).matvec(a) - system.linear(u, down).matvec(a)) / 2
-    assert system.d2_parameter(u, mu, "pressure", a) == pytest.approx(change, rel=1e-5, abs=1e-6 * np.abs(change).max())

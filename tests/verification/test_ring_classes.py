@@ -11,7 +11,8 @@ import pytest
 
 from dbvfiv.model.load_steps import LoadSteps
 from dbvfiv.model.symmetry import SYMMETRIES
-from dbvfiv.studies.closure.buckling import BucklingWatch, class_matrices, spectrum_of
+from dbvfiv.studies.closure.buckling import BucklingWatch, spectrum_of
+from tests.systems.pressed import class_matrices
 from tests.verification.test_closure_buckling import EI, RADIUS, _options, _ring
 
 

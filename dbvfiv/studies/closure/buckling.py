@@ -15,30 +15,20 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
-import scipy.sparse as sp
 import scipy.sparse.linalg as spla
 
-from continuation import ContinuationOptions, MatrixLinearisation, Reason, System, continue_branch
-from continuation import NewtonOptions as ContinuationNewton
-
-from ...contact import class_stiffness, contact_form
 from ...errors import SolveError
-from ...model.classes import shell_of_class
 from ...model.linear import DirectFactor
+from ...model.load_curve import LoadCurve
 from ...model.load_steps import LoadStepOptions, LoadSteps
-from ...model.pressed_shell import PressedShell
-from ...observer import Observer
-from ...shell.pressure import pressure_stiffness
 
 #: The eigenvalue at a located buckling state over that at the stable end of its bracket.
 TOLERANCE = 1e-7
 #: How often a state that is not of the path is done without before the search for a nearer one ends.
 _REFUSALS = 6
-#: Parameter of arclength; first and largest step, in wall thicknesses of mean displacement, and most points.
-PARAMETER, STEP, LARGEST_STEP, MOST_POINTS = "pressure", 0.05, 0.25, 400
 
 
 class StiffnessSpectrum(NamedTuple):
@@ -76,14 +66,10 @@ class StiffnessSpectrum(NamedTuple):
         return vector / vector[np.argmax(np.abs(vector))]
 
 
-def stiffness_spectrum(
-    pressed: PressedShell, q: np.ndarray, pressure: float, count: int = 4, tolerance: float = 1e-8
-) -> StiffnessSpectrum:
+def stiffness_spectrum(model: Any, q: np.ndarray, pressure: float, count: int = 4) -> StiffnessSpectrum:
     """Eigenvalues nearest to zero of a state (n,) at a pressure, Pa; see `spectrum_of`."""
-    matrix = pressed.shell.dofs.matrix
-    return spectrum_of(
-        matrix(pressed.tangent(q, pressure).stiffness), matrix(pressed.mass(q)), pressure, count, tolerance
-    )
+    matrix = model.shell.dofs.matrix
+    return spectrum_of(matrix(model.tangent(q, pressure).stiffness), matrix(model.mass(q)), pressure, count)
 
 
 def spectrum_of(stiffness, mass, pressure: float, count: int = 4, tolerance: float = 1e-8) -> StiffnessSpectrum:
@@ -144,31 +130,6 @@ def _inverse(matrix) -> spla.LinearOperator:
     return spla.LinearOperator(matrix.shape, matvec=lambda x: factor.solve(np.asarray(x, float).ravel()), dtype=float)
 
 
-def class_matrices(
-    pressed: PressedShell, free: np.ndarray, apart: bool, q: np.ndarray, pressure: float
-) -> tuple[sp.csr_matrix, sp.csr_matrix]:
-    """Stiffness and mass (k, k) in a class of motion at a state (n,) and a pressure, Pa.
-
-    Parameters
-    ----------
-    pressed : PressedShell
-    free : (nn, 5) bool array
-        Unknowns of the class.
-    apart : bool
-        True where the two walls move against each other, so that contact resists.
-    """
-    nodal = pressed.nodal(q)
-    shell = shell_of_class(pressed.shell, free, nodal)
-    surface, dofs, still = shell.mesh, shell.dofs, np.zeros(shell.size)
-    _, values = shell.force_and_tangent(still)
-    pressures = np.full(surface.node_count, pressed.sign * pressure)
-    pressure_stiffness(surface.quads, surface.nodes, nodal, pressures, pressed.loaded, dofs.slots, -1.0, values)
-    stiffness = dofs.matrix(values)
-    if pressed.contact is not None:
-        stiffness = stiffness + class_stiffness(pressed.contact, nodal, pressed.multiplier, shell, apart)
-    return stiffness.tocsr(), dofs.matrix(shell.mass(still))
-
-
 class Buckling(NamedTuple):
     """A state in which the tangent stiffness is singular.
 
@@ -200,7 +161,7 @@ class BucklingWatch:
 
     Parameters
     ----------
-    pressed : PressedShell
+    model : ClosedValve or alike
     steps : LoadStepOptions
     spectrum : callable
         From unknowns (n,) and pressure, Pa, to the eigenvalues of the class that is watched.
@@ -212,7 +173,7 @@ class BucklingWatch:
         Last equilibrium, of those seen, before the first that was found by this watch.
     """
 
-    pressed: PressedShell
+    model: Any
     steps: LoadStepOptions
     spectrum: Callable[[np.ndarray, float], StiffnessSpectrum]
     found: list[Buckling] = field(default_factory=list)
@@ -263,12 +224,12 @@ class BucklingWatch:
         """The equilibrium at a pressure between two others of a path; None if another path was found."""
         part = (pressure - low.pressure) / (high.pressure - low.pressure)
         guess = low.q + part * (high.q - low.q)
-        steps = LoadSteps(self.pressed, self.steps, pressure, guess)
+        steps = LoadSteps(self.model, self.steps, pressure, guess)
         try:
             steps.settle()
         except SolveError:
             return None
-        off, apart = (np.abs(self.pressed.nodal(way)[:, :3]).max() for way in (steps.q - guess, high.q - low.q))
+        off, apart = (np.abs(self.model.nodal(way)[:, :3]).max() for way in (steps.q - guess, high.q - low.q))
         if off > 0.5 * apart:
             return None
         spectrum = self.spectrum(steps.q, pressure)
@@ -286,58 +247,6 @@ class _Known(NamedTuple):
     def between(self, other: _Known, part: float) -> float:
         """A pressure on the way to another state, Pa."""
         return float(self.pressure + part * (other.pressure - self.pressure))
-
-
-class PressedSystem(System):
-    """M u' = -r(u; P): motion so slow that only resistance counts, with the mass matrix for the resistance.
-
-    Its equilibria are those of the shell, and the stiffness eigenvalues with the sign turned are those of its
-    linearisation, so that a positive one means an unstable equilibrium. The contact
-    multipliers stay as they are.
-
-    Parameters
-    ----------
-    pressed : PressedShell
-    pressure_scale : float, Pa
-        The residual is measured against the force of this pressure.
-    """
-
-    def __init__(self, pressed: PressedShell, pressure_scale: float):
-        self.pressed = pressed
-        self.size = pressed.size
-        self._scale = pressed.force_scale(pressed.rest(), pressure_scale)
-        self._mass = pressed.shell.dofs.matrix(pressed.mass(pressed.rest()))
-        # One unit of the state is a mean displacement of one wall thickness, or a mean rotation of one radian.
-        weights = np.ones(pressed.shell.dofs.free.shape) / pressed.mesh.node_count
-        weights[:, :3] /= np.mean(pressed.mesh.thickness) ** 2
-        self.state_weights = pressed.shell.dofs.restrict(weights)
-
-    def residual_norm(self, residual: np.ndarray) -> float:
-        return float(np.linalg.norm(residual) / self._scale)
-
-    def residual(self, u, mu):
-        return -self.pressed.residual(u, mu[PARAMETER])
-
-    def linear(self, u, mu):
-        tangent = self.pressed.tangent(u, mu[PARAMETER])
-        return MatrixLinearisation(-self.pressed.shell.dofs.matrix(tangent.stiffness), self._mass)
-
-    def d_parameter(self, u, mu, name):
-        return -self.pressed.pressure_derivative(u, mu[PARAMETER])
-
-    def d2(self, u, mu, a, b):
-        pressed = self.pressed
-        a_nodal, b_nodal = pressed.nodal(a), pressed.nodal(b)
-        second = pressed.shell.second(u, a, b)
-        if pressed.contact is not None:
-            form = contact_form(pressed.contact, pressed.nodal(u), pressed.multiplier, a_nodal, b_nodal)
-            second += pressed.shell.dofs.restrict(form)
-        return mu[PARAMETER] * pressed.pressure_force_second(a_nodal, b_nodal) - second
-
-    def d2_parameter(self, u, mu, name, a):
-        tangent = self.pressed.tangent(u, 0.0)
-        loaded = self.pressed.tangent(u, 1.0)
-        return -(self.pressed.shell.dofs.matrix(loaded.stiffness - tangent.stiffness) @ a)
 
 
 class LimitPath(NamedTuple):
@@ -361,50 +270,19 @@ class LimitPath(NamedTuple):
     reason: str
 
 
-def follow_past_limits(
-    pressed: PressedShell,
-    q: np.ndarray,
-    pressure: float,
-    target: float,
-    tolerance: float = 1e-8,
-    observer: Observer | None = None,
-    past_limits: bool = True,
-) -> LimitPath:
-    """Follow equilibria from a state by pseudo-arclength until the pressure is `target`, or falls to zero, or to the
-    first limit point alone.
+def follow_past_limits(curve: LoadCurve, target: float) -> LimitPath:
+    """Follow a curve of equilibria until the pressure is `target`, Pa, or falls to zero, or to where the curve stops.
 
     Raises
     ------
-    NotConverged
-        If the start is no equilibrium.
+    SolveError
+        If no curve leaves its start.
     """
-    observer = Observer() if observer is None else observer
-    system = PressedSystem(pressed, max(target, pressure))
-    options = ContinuationOptions(
-        step=STEP,
-        min_step=1e-6,
-        max_step=LARGEST_STEP,
-        max_points=MOST_POINTS,
-        limits={PARAMETER: (0.0, target)},
-        parameter_scales={PARAMETER: max(target, pressure)},
-        branch_points=False,
-        newton=ContinuationNewton(tolerance=tolerance),
-        max_angle=0.5,
-        stop_at=frozenset() if past_limits else frozenset({"fold"}),
-    )
-
-    def report(branch, *rest):
-        observer.progress(f"arclength point {len(branch)} at {branch.points[-1].z[-1]:.6g} Pa")
-
-    branch = continue_branch(system, q, {PARAMETER: pressure}, PARAMETER, options, observers=report)
-    if branch.reason.kind is Reason.INTERRUPTED:  # no end of the path: whoever goes on follows it anew
-        raise KeyboardInterrupt
+    curve.extend(target)
     limits = []
-    for special in branch.of_kind("fold"):
-        at = float(special.mu[PARAMETER])
-        shape = special.vectors["right"]
-        values = stiffness_spectrum(pressed, special.u, at, 2).values
+    for pressure, q, shape in curve.limit_states():
+        values = stiffness_spectrum(curve.model, q, pressure, 2).values
         nearest = float(values[np.argmin(np.abs(values))].real)
-        limits.append(Buckling("limit point", at, special.u, shape / shape[np.argmax(np.abs(shape))], nearest))
-    points = [(float(point.z[-1]), point.z[:-1]) for point in branch.points]
-    return LimitPath(points, limits, abs(points[-1][0] - target) <= 1e-9 * target, branch.reason)
+        limits.append(Buckling("limit point", pressure, q, shape / shape[np.argmax(np.abs(shape))], nearest))
+    points = list(zip(map(float, curve.pressures), curve.states))
+    return LimitPath(points, limits, abs(points[-1][0] - target) <= 1e-9 * target, curve.reason)

@@ -11,7 +11,7 @@ from pydantic import StrictBool, StrictInt, ValidationInfo, field_validator, mod
 from ...case.measured import AREA, MEASURED_FILES, SHAPE, find_measured
 from ...case.parameters import PARAMETERS
 from ...case.physics import LoadPressure
-from ...case.quantity import Length, Number, Pressure, Time, number_or_text
+from ...case.quantity import Number, Pressure, number_or_text
 from ...case.section import Section, key
 from ..request import ClassesOption, Request, with_unit
 
@@ -42,21 +42,7 @@ class Keys(Section):
         "mid-surface of the "
         "saddle kept from crossing the plane.",
     )
-    start: Literal["rest", "open"] = key(
-        "rest", "From the valve at rest, or from the steady flow at open_pressure turned back."
-    )
-    open_pressure: LoadPressure = key(10e3, "Static inlet pressure of the open start.")
     max_step: LoadPressure = key(1e3, "Largest load step; the stiffness is watched for buckling at each.")
-    contact_depth: Length = key(
-        3e-6,
-        (
-            "Depth to which the largest back pressure alone would press the faces into each other, before "
-            "multipliers push them apart."
-        ),
-        gt=0,
-        le=1e-3,
-    )
-    penetration: Length = key(1e-6, "Largest penetration that is left.", gt=0, le=1e-3)
     shut_fraction: Number = key(
         0.2, "A section counts as shut when less than this fraction of the lip's opening at rest is left.", ge=0, lt=1
     )
@@ -65,14 +51,6 @@ class Keys(Section):
         "SS",
         "Symmetry classes watched for buckling: SS is that of the model, all adds those in which the lips sway in y "
         "(SA), the valve sways sideways in x (AS) and twists (AA).",
-    )
-    balance_tolerance: Number = key(
-        0.0,
-        "Largest error of the energy balance over the work; load steps that miss it are halved as often as "
-        "it takes, for the balance alone. 0 reports the "
-        "balance of the load steps as they are.",
-        ge=0,
-        le=1,
     )
     arclength: StrictBool = key(
         True,
@@ -83,16 +61,6 @@ class Keys(Section):
         (),
         "Measured points as in steady.measured: a back pressure with the area of the narrowest passage left (pressure "
         "[kPa], area [mm2]), or with points of sections of the wall.",
-    )
-    reversal_time: Time = key(
-        0.2, "Time in which the drive turns from open_pressure to as much back pressure.", gt=0, le=1e3
-    )
-    reversal_hold: Time = key(0.2, "Time for which the back pressure is then held.", ge=0, le=1e3)
-    reversal_continuity: Literal["storage", "quasi-steady"] = key(
-        "storage",
-        "Flow model while the drive turns. Lips that meet push the fluid between them away with "
-        "storage; quasi-steady they stop it at once, and the "
-        "pressure of the incompressible fluid knows no bounds.",
     )
 
     @model_validator(mode="after")
@@ -123,28 +91,18 @@ def command(
             help="Back pressure, '7 kPa' or '3 m'; may be repeated.",
         ),
     ] = None,
-    compare: Annotated[
-        bool,
-        typer.Option("--compare", help="Do the same with the other kind of supports, and draw both in one figure."),
-    ] = False,
-    in_time: Annotated[
-        bool,
-        typer.Option(
-            "--in-time", help="Also turn the drive from closure.open_pressure to as much back pressure in time."
-        ),
-    ] = False,
     symmetry: ClassesOption = None,
 ) -> Request:
     """Back pressure: does the valve shut, where and how firmly, what stays open, how far is the wall from buckling?
 
     The pressures are those of --pressure, else closure.pressures of the case; each state is found from the one before,
     and the last one before a limit is listed too. The safety factor refers to closure.rated_pressure, or to the largest
-    of the pressures. closure.supports chooses contact of the inner faces or the simplified supports of the thesis,
-    closure.start = "open" turns a flow back first, slowly; --in-time does so with the inertia of wall and fluid and
-    tells the closing time. --symmetry all also watches for buckling into motions that the model's symmetry leaves out.
+    of the pressures. closure.supports chooses contact of the inner faces or the simplified supports of the thesis.
+    --symmetry all also watches for buckling into motions that the model's symmetry leaves out. How a valve closes in
+    time is a run of transient with supports.contact = "faces".
 
     dbvfiv closure cases/closure.toml -o closure.h5 --plots figures
     """
     changes = {"closure.pressures": [number_or_text(text) for text in pressures] if pressures else None}
     changes["closure.symmetry"] = symmetry
-    return Request(changes, {"in_time": in_time or None, "compare": compare or None})
+    return Request(changes)

@@ -1,4 +1,4 @@
-"""Figures of the valve under back pressure: curves over the pressure, the wall in space, two kinds of supports."""
+"""Figures of the valve under back pressure: curves over the pressure, and the wall in space."""
 
 from __future__ import annotations
 
@@ -46,10 +46,6 @@ def draw(result: StudyResult) -> Iterator[tuple[str, Callable[[], Figure]]]:
     yield "passage", lambda: passage(result)
     if result.measured.area is not None:
         yield "measured-passage", lambda: measured_passage(result)
-    if result.opened:
-        yield "reversal", lambda: reversal(result)
-    if result.closing is not None:
-        yield "reversal-in-time", lambda: in_time(result)
 
 
 def side_views(result: StudyResult) -> Figure:
@@ -266,100 +262,6 @@ def measured_passage(result: StudyResult) -> Figure:
     axes.set_ylim(bottom=0)
     axes.set_title(f"Passage left, {supports_of(result)}", loc="left", fontweight="bold")
     axes.legend()
-    return figure
-
-
-def reversal(result: StudyResult) -> Figure:
-    """From flow to back pressure as the drive turns round slowly: the flow area of the open valve, and the narrowest
-    passage between the faces of the shut one, which are two measures and stand on two axes.
-    """
-    figure = new_figure(9.0, 4.6)
-    left, right = figure.subplots(1, 2)
-    opened = sorted(result.opened, key=lambda s: -s.pressure)
-    left.plot([s.pressure / 1e3 for s in opened], [s.outlet_area * 1e4 for s in opened], "o-", color=COMPUTED, ms=4)
-    left.set(ylabel="Flow area at the lip, whole valve, cm²", xlabel="Static inlet pressure, kPa")
-    left.set_ylim(bottom=0)
-    left.set_xlim(max([s.pressure / 1e3 for s in opened], default=1.0) * 1.03, 0)
-    left.set_title("Fluid flowing", loc="left")
-    p = np.array([0.0] + [point.pressure for point in result.walk]) / 1e3
-    area = np.array([result.reference_opening] + [point.least_opening for point in result.walk]) * 1e6
-    shut = area <= _SHUT
-    right.semilogy(p, np.where(shut, np.nan, area), "o-", color=ACCENT, ms=4)
-    right.plot(p[shut], np.full(shut.sum(), _SHUT), "v", color=ACCENT, ms=4.5, label=f"{_SHUT:g} mm² or less: shut")
-    log_axis(right.yaxis, _SHUT, max(area.max(), 10 * _SHUT))
-    right.set(ylabel="Narrowest passage between the inner faces, mm²", xlabel="Back pressure, kPa")
-    right.set_xlim(left=0)
-    right.set_title("Pressed from outside, no flow", loc="left")
-    if shut.any():
-        right.legend(loc="upper right")
-    headline(figure, f"From open to shut, quasi-static, {supports_of(result)}")
-    return figure
-
-
-def in_time(result: StudyResult) -> Figure:
-    """Drive, lip, narrowest passage, flow and contact force while the drive turns round."""
-    closing = result.closing
-    figure = new_figure(8.4, 8.0)
-    panels = figure.subplots(5, 1, sharex=True)
-
-    def values(name, factor):
-        return factor * np.array([getattr(sample, name) for sample in closing.samples])
-
-    t = values("time", 1.0)
-    curves = (
-        ("inlet_pressure", 1e-3, "Static inlet\npressure, kPa"),
-        ("lip_opening", 1e3, "Clear lip\nopening, mm"),
-        ("least_opening", 1e6, "Passage, mm²"),
-        ("mass_flow", 1.0, "Flow, kg/s"),
-        ("contact_force", 1.0, "Contact, N"),
-    )
-    for axes, (name, factor, label) in zip(panels, curves):
-        axes.plot(t, values(name, factor), color=COMPUTED, lw=1.4)
-        axes.set_ylabel(label)
-        axes.axvline(closing.turn.zero, color=REST, lw=0.9, ls=":")
-        if closing.closing_time is not None:
-            axes.axvline(closing.turn.start + closing.closing_time, color=PUBLISHED, lw=1.0, ls="--")
-    passage_left = values("least_opening", 1e6)
-    log_axis(panels[2].yaxis, 0.1, max(float(passage_left.max()), 1.0))
-    panels[2].set_ylim(bottom=0.1)
-    panels[2].axhline(closing.shut_below * 1e6, color=ACCENT, lw=1.0, ls=":")
-    panels[-1].set_xlabel("Time, s (dotted: the drive changes sign; dashed: shut for good)")
-    headline(figure, "The drive turns round")
-    figure.align_ylabels(panels)
-    return figure
-
-
-def supports_compared(first: StudyResult, second: StudyResult) -> Figure:
-    """Front of contact, displacement, stiffness and inner face at x = 0 with two kinds of supports."""
-    figure = new_figure(9.6, 7.0)
-    panels = figure.subplots(2, 2).ravel()
-    front, moved, stiffness, line = panels
-    for result, colour, dash in ((first, COMPUTED, "-"), (second, PUBLISHED, "--")):
-        p = np.array([point.pressure for point in result.walk]) / 1e3
-        name = supports_of(result)
-        front.plot(p, [point.contact_front * 1e3 for point in result.walk], dash, color=colour, label=name)
-        moved.plot(p, [point.max_displacement * 1e3 for point in result.walk], dash, color=colour)
-        stiffness.plot(p, [point.lowest_eigenvalue / 1e3 for point in result.walk], dash, color=colour)
-        centre = result.mesh.centre_line
-        for state, shade in zip(result.states, np.linspace(0.35, 1.0, len(result.states))):
-            at = faces(result.mesh, state.nodal)[0][centre] * 1e3
-            line.plot(at[:, 2], at[:, 1], dash, color=colour, alpha=shade, lw=1.2)
-    rest = faces(first.mesh)[0][first.mesh.centre_line] * 1e3
-    line.plot(rest[:, 2], rest[:, 1], color=REST, lw=1.0, label="at rest")
-    line.axhline(0.0, color=ACCENT, lw=1.0, label="inner faces meet")
-    line.set_xlim(0.25 * rest[-1, 2], 0.9 * rest[-1, 2])
-    line.set_ylim(-5, 0.75 * rest[:, 1].max())
-    line.set(xlabel="Distance from the lip z, mm", ylabel="Inner face at x = 0, y, mm")
-    for axes, label in (
-        (front, "Contact front at x = 0, mm"),
-        (moved, "Largest displacement, mm"),
-        (stiffness, "Lowest stiffness eigenvalue, 10³ 1/s²"),
-    ):
-        axes.set(xlabel="Back pressure, kPa", ylabel=label)
-    front.axvline(21.0, color=REST, lw=0.9, ls=":", label="saddle touches, Th. 3.6")
-    figure.legend(loc="outside lower center", ncols=3)
-    pressures = ", ".join(f"{s.pressure / 1e3:g}" for s in first.states)
-    headline(figure, f"Contact of the inner faces and the supports of Th. 3.6 (inner faces at {pressures} kPa)")
     return figure
 
 

@@ -7,10 +7,10 @@ from typing import Any
 
 import numpy as np
 
+from ...model.supports import HELD_LIPS
 from ...model.symmetry import EQUILIBRIA, symmetry_named
 from ...record.record import Record
 from ..result import StudyResult
-from .valve import HELD_LIPS
 from .walk import BUCKLED_CLASS, CROSSED, LOWEST
 
 BUCKLING, SEAL, CROSSING, END = "buckling", "loss of seal", "faces crossing", "end of the path"
@@ -91,7 +91,7 @@ def find_safety(result: StudyResult) -> SafetyFactor | None:
     if not held:
         limits += [(at, SEAL) for at in _last_before(rising, _lost_seal(rising))]
     else:
-        crossed = np.array([point.overlap > CROSSED * closure.penetration for point in rising])
+        crossed = np.array([point.overlap > CROSSED * result.case.valve.initial_gap for point in rising])
         limits += [(at, CROSSING) for at in _last_before(rising, crossed)]
     if result.walk_failure is not None and not result.buckling:
         limits.append((followed, END))
@@ -230,14 +230,13 @@ class ClassBuckling:
         )
 
 
-def read_classes(record: Record, table: str) -> tuple[ClassBuckling, ...]:
-    """Classes of the walk whose points are kept in a table; none where they were not asked for."""
-    seen = {note["pressure"]: note["lowest"] for note in record.notes(LOWEST) if note["table"] == table}
+def read_classes(record: Record) -> tuple[ClassBuckling, ...]:
+    """Classes of a walk; none where they were not asked for."""
+    seen = {note["pressure"]: note["lowest"] for note in record.notes(LOWEST)}
     keys = ("kind", "pressure", "eigenvalue")
     buckled = {
         (note["symmetry"], round(note["pressure"], 3)): {key: note[key] for key in keys}
         for note in record.notes(BUCKLED_CLASS)
-        if note["table"] == table
     }
     found = []
     for name in next(iter(seen.values()), ()):
@@ -261,7 +260,7 @@ def first_buckling(
 
 
 def sentences(result: StudyResult) -> list[str]:
-    """Sentences on the balances, on buckling, on the safety against it and on the turn of the drive."""
+    """Sentences on the balances, on buckling and on the safety against it."""
     safety = result.safety
     return [
         *_balances(result),
@@ -269,7 +268,6 @@ def sentences(result: StudyResult) -> list[str]:
         *(part.sentence for part in result.classes),
         *([] if safety is None else [safety.sentence]),
         *([answer] if (answer := rated_sentence(result)) else []),
-        *([] if result.closing is None else [result.closing.sentence]),
         *result.measured.sentences(),
     ]
 

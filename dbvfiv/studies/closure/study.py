@@ -13,11 +13,9 @@ from matplotlib.figure import Figure
 
 from ...case.measured import AREA, SHAPE
 from ...drawing import views
-from ...errors import SolveError
 from ...model.symmetry import equilibria_of
-from ...record.header import Header
 from ...record.mesh import MeshData, WholeValve
-from ...record.record import GrowingRecord, Record, plain
+from ...record.record import GrowingRecord, plain
 from ...record.states import (
     CONVERGED,
     ENDED,
@@ -26,27 +24,23 @@ from ...record.states import (
     LIP,
     NODAL,
     OPENING,
-    PATH_RESTART,
     RESIDUAL,
     WHERE,
     by_node,
     by_row,
     read_layers,
     show_place,
-    state_table,
 )
 from ...record.table import TEXT, Column, Shown, TableSpec, document_of, printed_head, printed_row
 from ...record.vtkhdf import Step
 from ...shell.recovery import LayerFields
-from ..case import Case
 from ..comparing import Compared, Comparison, draw_shapes
 from ..measured import PASSAGE, Measured, keep_measured
 from ..result import StudyResult
 from ..session import Session
-from ..state import State, pressure_steps, states_of
+from ..state import pressure_steps
 from ..study import Study, print_rows
 from . import figures
-from .reversal import OPENED, REVERSAL, SAMPLE, Closing, Turn, closing_valve, run_closing, turn_back
 from .safety import (
     ClassBuckling,
     SafetyFactor,
@@ -56,8 +50,8 @@ from .safety import (
     read_classes,
     sentences,
 )
-from .valve import CONTACT, HELD_LIPS, ClosureModel, Passage, closure_model, film_leak, layer_maxima
-from .walk import BUCKLING, COMPARED, MOST_EIGENVALUES, PATH, STATES, ClosureWalk, valid_rows, void_rows
+from .valve import ClosedValve, Passage, film_leak, layer_maxima
+from .walk import BUCKLING, MOST_EIGENVALUES, PATH, STATES, ClosureWalk, rows_to_keep
 
 
 def _by_node(mesh: MeshData) -> tuple[int, ...]:
@@ -131,7 +125,6 @@ SUMMARY = (
     CONVERGED,
     Column("iterations", "", "Newton iterations that led here from the state before", "i8"),
     Column("load_steps", "", "Load steps that led here from the state before", "i8"),
-    Column("multiplier_updates", "", "Renewals of the contact multipliers", "i8"),
     RESIDUAL,
     *ENDED,
     Column("before_limit", "", "Not asked for: the last state before a limit", "bool", _LAST),
@@ -146,14 +139,13 @@ FIELDS = (
     Column("gap", "m", "Height of the inner face above the closing plane at each node", shape=_by_node),
     Column("stiffness_eigenvalues", "1/s^2", _EIGENVALUES, shape=(MOST_EIGENVALUES,)),
 )
-_WORK = "Work, work of renewing multipliers, contact potential, strain energy, defect; number of equilibria in between"
+_WORK = "Work of the pressure, energy gained by wall and contact, and what is missing"
 _SLOPE = "Derivative of the displacements and rotations of each node by the pressure"
 #: What it takes to go on from a state.
 RESTART = (
     Column("way/step", "Pa", "Load step to try next"),
     Column("way/slope", "m/Pa, rad/Pa", _SLOPE, shape=by_node),
-    Column("way/multiplier", "Pa", "Contact multiplier of each node; 0 where there is none", shape=_by_node),
-    Column("way/energy", "J", _WORK, shape=(6,)),
+    Column("way/energy", "J", _WORK, shape=(3,)),
     Column("way/path", "", "Rows of the path up to the state", "i8"),
     Column("way/buckling", "", "Rows of buckling states up to it", "i8"),
 )
@@ -174,55 +166,17 @@ BUCKLED = (
 def tables_of(mesh: MeshData) -> tuple[TableSpec, ...]:
     """Tables of a back-pressure result on a mesh."""
     walks = {STATES: (*SUMMARY, *FIELDS, *LAYERS, *RESTART), PATH: POINT, BUCKLING: BUCKLED}
-    return (
-        *(TableSpec.on(mesh, prefix + name, columns) for prefix in ("", COMPARED) for name, columns in walks.items()),
-        state_table(OPENED, mesh, PATH_RESTART),
-        TableSpec(REVERSAL, SAMPLE, chunk=256),
-    )
+    return tuple(TableSpec.on(mesh, name, columns) for name, columns in walks.items())
 
 
-def run(session: Session, record: GrowingRecord, in_time: bool = False, compare: bool = False) -> None:
-    """Equilibria at `closure.pressures` of the case; with `in_time` the turn of its drive, with `compare` the same
-    equilibria with the other supports.
-    """
-    if record.notes("asked"):
-        asked = record.notes("asked")[0]
-        in_time, compare = asked["in_time"], asked["compare"]
-    else:
-        record.note("asked", in_time=in_time, compare=compare)
+def run(session: Session, record: GrowingRecord) -> None:
+    """Equilibria at `closure.pressures` of the case."""
     case, closure = session.case, session.case.closure
     keep_measured(record, "closure.measured", closure.measured, MEASURED, case.fluid.density)
-    record.begin("closure", len(closure.pressures) * (2 if compare else 1))
+    record.begin("closure", len(closure.pressures))
     if case.gravity.is_there:
         record.warn("Gravity has no part in back pressure: wall and fluid weigh nothing in these states.")
-    if compare:
-        record.item(f"Supports: {closure.supports}")
-    if closure.start == "open":
-        turn_back(case, record)
-    ClosureWalk(closure_model(case), record).go(closure.pressures)
-    if in_time:
-        _turn_in_time(case, record)
-    if compare:
-        other = HELD_LIPS if closure.supports == CONTACT else CONTACT
-        record.item(f"Supports: {other}")
-        ClosureWalk(closure_model(case, other), record, COMPARED).go(closure.pressures)
-
-
-def _turn_in_time(case: Case, record: GrowingRecord) -> None:
-    """Follow the turn of the drive; one that was cut short begins anew."""
-    if not record.notes("turned"):
-        void_rows(record, REVERSAL, 0)
-        model = closing_valve(case)
-        record.note("turning", shut_below=model.shut_below)
-        halvings, failure = 0, ""
-        try:
-            halvings, failure = run_closing(model, lambda sample: record.append(REVERSAL, sample), record)
-        except SolveError as error:
-            failure = str(error)
-        record.note("turned", halvings=halvings, failure=failure)
-    failure = record.notes("turned")[-1]["failure"]
-    if failure:
-        record.fail(f"The turn of the drive in time was not followed to its end: {failure}")
+    ClosureWalk(ClosedValve(case), record).go(closure.pressures)
 
 
 class PressedState(SimpleNamespace):
@@ -244,7 +198,7 @@ class PressedState(SimpleNamespace):
     @cached_property
     def layers(self) -> LayerFields:
         """Strains and stresses of the layers."""
-        return read_layers(self.results.record, self.results.named(STATES), self.index)
+        return read_layers(self.results.record, STATES, self.index)
 
     @property
     def passage(self) -> Passage:
@@ -285,8 +239,6 @@ class ClosureResult(StudyResult):
     ----------
     record : Record
     session : Session, optional
-    prefix : str
-        Of the tables of the walk: those with the other supports have one.
 
     Attributes
     ----------
@@ -295,49 +247,24 @@ class ClosureResult(StudyResult):
     before_limit : PressedState or None
         Last state before the first limit.
     walk, buckling : tuples of objects with the columns `POINT` and `BUCKLED`
-    opened : tuple of State
-        Of an open start, steady states of the flow as its pressure falls.
-    closing : Closing or None
-        History of the valve while its drive turned round, where that was asked for.
-    compared : ClosureResult or None
-        The same with the other supports, where that was asked for.
     """
 
     kind = "closure"
 
-    def __init__(self, record: Record, session: Session | None = None, prefix: str = ""):
-        super().__init__(record, session)
-        self._prefix = prefix
-
-    def named(self, name: str) -> str:
-        """Name of a table of the walk in the record."""
-        return self._prefix + name
-
-    @property
-    def header(self) -> Header:
-        header = self.record.header
-        if not self._prefix or not self._setting:
-            return header
-        return replace(header, case=header.case.replace({"closure.supports": self.supports}))
-
     @cached_property
-    def model(self) -> ClosureModel:
+    def model(self) -> ClosedValve:
         """The model under back pressure; rebuilt on first use."""
-        return closure_model(self.header.rebuildable_case())
-
-    @cached_property
-    def _setting(self) -> dict[str, Any]:
-        return next(iter(self.record.notes(self.named(STATES))), {})
+        return ClosedValve(self.header.rebuildable_case())
 
     @property
     def supports(self) -> str:
         """Either "contact" or "held-lips"."""
-        return self._setting.get("supports", self.record.header.case.closure.supports)
+        return self.case.closure.supports
 
     @property
     def reference_opening(self) -> float:
         """Passage between the inner faces of the lip at rest, whole valve, m2."""
-        return float(self._setting.get("reference_opening", np.nan))
+        return float(next(iter(self.record.notes(STATES)), {}).get("reference_opening", np.nan))
 
     @cached_property
     def _all_states(self) -> tuple[PressedState, ...]:
@@ -367,38 +294,18 @@ class ClosureResult(StudyResult):
     @cached_property
     def classes(self) -> tuple[ClassBuckling, ...]:
         """Classes of motion other than that of the path, where they were watched."""
-        return read_classes(self.record, self.named(PATH))
-
-    @cached_property
-    def opened(self) -> tuple[State, ...]:
-        return states_of(self, OPENED)
-
-    @cached_property
-    def closing(self) -> Closing | None:
-        turning = self.record.notes("turning")
-        if self._prefix or not turning:
-            return None
-        over = {"halvings": 0, "failure": ""} | next(iter(self.record.notes("turned")), {})
-        samples = tuple(SimpleNamespace(**row) for _, row in self._rows(REVERSAL, SAMPLE))
-        return Closing(samples, Turn.of(self.case), turning[0]["shut_below"], over["halvings"], over["failure"])
-
-    @cached_property
-    def compared(self) -> ClosureResult | None:
-        if self._prefix or not self.record.notes(COMPARED + STATES):
-            return None
-        return ClosureResult(self.record, None, COMPARED)
+        return read_classes(self.record)
 
     def _rows(self, table: str, columns: Sequence[Column]) -> Iterator[tuple[int, dict[str, Any]]]:
-        """Rows of a table of the walk that hold, with their numbers."""
-        name = self.named(table)
-        data = {c.name: self.record.column(name, c.name) for c in columns}
-        for i in valid_rows(self.record, name):
+        """Rows of a table of the walk, with their numbers."""
+        data = {c.name: self.record.column(table, c.name) for c in columns}
+        for i in range(self.record.rows(table)):
             yield i, {key: plain(values[i]) for key, values in data.items()}
 
     @property
     def walk_failure(self) -> str | None:
         """Why the list of pressures was not gone to its end."""
-        found = [note for note in self.record.notes("walked") if note["table"] == self.named(STATES)]
+        found = self.record.notes("walked")
         return found[-1]["failure"] if found else None
 
     def nearest(self, pressure: float) -> PressedState:
@@ -445,7 +352,7 @@ class ClosureResult(StudyResult):
     def summary(self) -> dict[str, Any]:
         own = equilibria_of(self.case.part).name
         softest = self.softest
-        document = {
+        return {
             "supports": self.supports,
             "points": [state.summary() for state in self.states],
             "before_limit": self.before_limit and self.before_limit.summary(),
@@ -462,13 +369,10 @@ class ClosureResult(StudyResult):
             "softest": softest
             and {"pressure": softest.pressure, "lowest_stiffness_eigenvalue": softest.lowest_eigenvalue},
             "path": {c.name: [getattr(point, c.name) for point in self.walk] for c in POINT},
-            "opened": [state.summary() for state in self.opened],
-            "reversal": self.closing and self.closing.summary(),
             "reference_opening": self.reference_opening,
             **self.measured.summary(),
             **self.ending(),
         }
-        return document if self.compared is None else document | {"compared": self.compared.summary()}
 
     @property
     def softest(self) -> SimpleNamespace | None:
@@ -481,25 +385,18 @@ class ClosureResult(StudyResult):
 
     def lines(self) -> list[str]:
         columns = self.case.units.columns(SUMMARY)
-        lines = [*printed_head(columns), *(printed_row(columns, state) for state in self._all_states), *sentences(self)]
-        if self.compared is None:
-            return lines
-        return [f"Supports: {self.supports}", *lines, f"Supports: {self.compared.supports}", *self.compared.lines()]
+        return [*printed_head(columns), *(printed_row(columns, state) for state in self._all_states), *sentences(self)]
 
     def remarks(self) -> list[str]:
-        if self.compared is None:
-            return sentences(self)
-        parts = (self, self.compared)
-        return [line for part in parts for line in (f"Supports: {part.supports}", *sentences(part))]
+        return sentences(self)
 
     def shortfall(self) -> str | None:
         if not self.failures:
             return None
         asked = len(self.case.closure.pressures)
-        parts = [part for part in (self, self.compared) if part is not None]
-        short = [f"{len(p.states)} of {asked} back pressures were reached" for p in parts if len(p.states) < asked]
+        few = f"{len(self.states)} of {asked} back pressures were reached" if len(self.states) < asked else ""
         kept = f"; what was found is kept in {self.path}" if self.path else ""
-        return f"{', '.join(short) or 'Not everything was reached'}{kept}"
+        return f"{few or 'Not everything was reached'}{kept}"
 
     # -- in space
     # ----
@@ -511,10 +408,6 @@ class ClosureResult(StudyResult):
         yield from figures.draw(self)
         yield from draw_shapes(self.measured.shapes)
         yield from views.draw_layers(self, pressure)
-        if self.compared is not None and self.compared.states:
-            for name, draw in self.compared.drawers(pressure):
-                yield f"{name}-{self.compared.supports}", draw
-            yield "supports-compared", lambda: figures.supports_compared(self, self.compared)
 
     def steps(self, valve: WholeValve) -> Sequence[Step]:
         """States in the order of their pressures, as ParaView wants its times."""
@@ -524,7 +417,7 @@ class ClosureResult(StudyResult):
 #: Keys that do not change what a run finds.
 _QUIET = tuple(
     f"closure.{key}"
-    for key in ("pressures", "measured", "rated_pressure", "max_step", "eigenvalues", "arclength", "symmetry", "start")
+    for key in ("pressures", "measured", "rated_pressure", "max_step", "eigenvalues", "arclength", "symmetry")
 )
 #: Columns of the path in which runs are compared.
 _COMPARED = tuple(
@@ -561,6 +454,7 @@ STUDY = Study(
     tables_of,
     run,
     ClosureResult,
+    rows_to_keep=rows_to_keep,
     live=lambda case: print_rows(case.units.columns(SUMMARY)),
     compare=compare,
 )

@@ -1,19 +1,21 @@
-"""The valve under back pressure: shell, supports and contact of a case, and the passage left between its walls."""
+"""The valve under back pressure: the one model of the valve, pressed from outside, and the passage left between its
+walls.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from scipy.integrate import trapezoid
 
-from ...contact import ContactLaw, PlaneContact, tributary_area
+from ...contact import PlaneContact
 from ...geometry import ValveMesh
-from ...model.build import build_shell, loaded_share
-from ...model.pressed_shell import PressedShell
+from ...model import ValveModel
 from ...model.state import LipCentre
-from ...model.supports import free_unknowns
+from ...model.supports import CONTACT, HELD_LIPS, face_contact, held_rows
 from ...model.symmetry import EQUILIBRIA
 from ...shell import Shell
 from ...shell.mesh import nodal_thickness
@@ -21,10 +23,14 @@ from ...shell.recovery import LayerFields, layer_fields
 from ...texts import shortly
 from ..case import Case
 
-#: Contacting inner faces, or the supports of Th. 3.6.
-CONTACT, HELD_LIPS = "contact", "held-lips"
-#: Half width of the rounded kink of the contact law over the depth that the reference pressure would press in.
-ROUNDING = 0.3
+#: Keys of a case that is pressed from outside.
+CLOSED = {
+    "drive.kind": "uniform",
+    "drive.side": "outside",
+    "supports.contact": "faces",
+    "gravity.direction": "none",
+    "outside.fluid": "none",
+}
 
 
 @dataclass(frozen=True)
@@ -90,16 +96,21 @@ class InnerFace:
     shell : Shell
     plane : PlaneContact
         Contact of this face, for its gaps.
+    initial_gap : float, m
+        Least gap at the lip at rest of what a passage is measured against.
     shut_fraction : float
     """
 
     mesh: ValveMesh
     shell: Shell
     plane: PlaneContact
+    initial_gap: float
     shut_fraction: float
 
     def gaps(self, nodal: np.ndarray) -> np.ndarray:
-        """Gaps (nn,), m, of all nodes for nodal unknowns (nn, c), measured as the contact measures them."""
+        """Gaps (nn,), m, of all nodes for nodal unknowns (nn, c), measured as the contact measures them: faces that
+        touch leave none.
+        """
         return self._points(nodal)[0]
 
     def passage(self, nodal: np.ndarray, held: np.ndarray | None = None) -> Passage:
@@ -110,20 +121,20 @@ class InnerFace:
         area = _area(gap[rows], x[rows])
         if held is not None:
             area[held] = 0.0
-        reference = float(_area(at_rest[rows[:1]], x_rest[rows[:1]])[0])
+        reference = float(_area(np.maximum(at_rest[rows[:1]], self.initial_gap), x_rest[rows[:1]])[0])
         return Passage(self.mesh.z, area, reference, self.shut_fraction)
 
     def _points(self, nodal: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Gap (nn,) and x position (nn,) of the inner face at all nodes; the clamped flange is no contact node but has
         a face all the same.
         """
-        shell = self.shell
-        depth = 0.5 * nodal_thickness(shell.mesh)
+        shell, plane = self.shell, self.plane
+        depth, lift = 0.5 * nodal_thickness(shell.mesh), np.zeros(shell.mesh.node_count)
+        depth[plane.nodes], lift[plane.nodes] = plane.depth, plane.lift
         directors = shell.directors(nodal)[0] if nodal.any() else shell.mesh.directors
         point = shell.mesh.nodes + nodal[:, :3] - depth[:, None] * directors
-        lift = np.zeros(len(depth))
-        lift[self.plane.nodes] = self.plane.lift
-        return point[:, 1] + lift, point[:, 0]
+        gap = point[:, 1] + lift
+        return np.where(gap < plane.law.rounding, np.minimum(gap, 0.0), gap), point[:, 0]
 
 
 def _area(gap: np.ndarray, x: np.ndarray) -> np.ndarray:
@@ -162,52 +173,29 @@ def film_leak(
     return float(2.0 * pressure / (film + np.sqrt(film**2 + 4.0 * jet * pressure)))
 
 
-def face_plane(case: Case, shell: Shell, law: ContactLaw) -> PlaneContact:
-    """Contact of the inner face with the closing plane."""
-    depth = 0.5 * nodal_thickness(shell.mesh)
-    every = np.arange(shell.mesh.node_count)
-    return PlaneContact(shell, every, depth, tributary_area(shell), law, least_gap=case.valve.initial_gap)
+class ClosedValve(ValveModel):
+    """The valve of a case, pressed from outside; nothing flows, and wall and fluid weigh nothing.
 
-
-def contact_law(case: Case, pressure: float) -> ContactLaw:
-    """Law by which a pressure, Pa, alone would press the faces in to the contact depth of a case."""
-    depth = case.closure.contact_depth
-    return ContactLaw(pressure / depth, ROUNDING * depth)
-
-
-@shortly
-@dataclass(frozen=True)
-class ClosureModel:
-    """The computed part of a valve, pressed from outside.
+    Parameters
+    ----------
+    case : Case
+        Its ``closure.supports`` are "contact": the inner faces touch the closing plane; or "held-lips": the duckbill
+        cannot move across the plane and the mid-surface of the saddle cannot cross it (Th. 3.6).
 
     Attributes
     ----------
-    case : Case
-    supports : str
-        "contact": the inner faces touch the closing plane; "held-lips": the duckbill cannot move across the plane and
-        one-sided stops keep the mid-surface of the saddle from crossing it (Th. 3.6).
-    mesh : ValveMesh
-    pressed : PressedShell
     face : InnerFace
-        For measuring gaps with either supports; with contact its plane is the contact itself.
+        For measuring gaps with either supports.
     held : (rows,) bool array
         Rows that are shut by the supports.
     """
 
-    case: Case
-    supports: str
-    mesh: ValveMesh
-    pressed: PressedShell
-    face: InnerFace
-    held: np.ndarray
-
-    @property
-    def size(self) -> int:
-        return self.pressed.size
-
-    @property
-    def shell(self) -> Shell:
-        return self.pressed.shell
+    def __init__(self, case: Case):
+        self.supports = case.closure.supports
+        super().__init__(case.replace(CLOSED), closed_by=self.supports)
+        self.held = held_rows(case, self.mesh) & (self.supports == HELD_LIPS)
+        faces = face_contact(self.case, self.mesh, self.shell, CONTACT).plane
+        self.face = InnerFace(self.mesh, self.shell, faces, case.valve.initial_gap, case.closure.shut_fraction)
 
     @property
     def nodes_beyond(self) -> np.ndarray:
@@ -216,12 +204,12 @@ class ClosureModel:
 
     def passage(self, q: np.ndarray) -> Passage:
         """Passage of a state (n,)."""
-        return self.face.passage(self.pressed.nodal(q), self.held)
+        return self.face.passage(self.nodal(q), self.held)
 
     @property
     def reference_opening(self) -> float:
         """Passage between the inner faces of the lip at rest, whole valve, m2."""
-        return self.mesh.part.copies * self.passage(self.pressed.rest()).reference
+        return self.mesh.part.copies * self.passage(np.zeros(self.size)).reference
 
     def start_warnings(self) -> Iterator[str]:
         """Warnings about where the inner face starts, and about supports that hold it."""
@@ -256,10 +244,10 @@ class Pressed:
     touch : ContactState
     """
 
-    def __init__(self, model: ClosureModel, q: np.ndarray, pressure: float):
-        pressed, part = model.pressed, model.mesh.part
-        self.model, self.q, self.pressure, self.nodal = model, q, float(pressure), pressed.nodal(q)
-        self.touch, self.passage = pressed.contact_state(q), model.passage(q)
+    def __init__(self, model: ClosedValve, q: np.ndarray, pressure: float):
+        part = model.mesh.part
+        self.model, self.q, self.pressure, self.nodal = model, q, float(pressure), model.nodal(q)
+        self.touch, self.passage = model.contact.state(q), model.passage(q)
         size, area = np.linalg.norm(self.nodal[:, :3], axis=1), self.passage.area
         self.max_displacement = float(size.max())
         self.max_displacement_position = model.mesh.nodes[np.argmax(size)]
@@ -271,12 +259,12 @@ class Pressed:
 
     def describe(self) -> None:
         """Add the columns that only states have."""
-        model, pressed, touch = self.model, self.model.pressed, self.touch
-        self.sealed_area = float(model.mesh.part.walls * pressed.contact.area[touch.touching].sum())
+        model, plane, touch = self.model, self.model.contact.plane, self.touch
+        self.sealed_area = float(model.mesh.part.walls * plane.area[touch.touching].sum())
         self.largest_contact_pressure = float(touch.pressure.max(initial=0.0))
         self.contact_nodes = int(np.count_nonzero(touch.touching))
         self.contact_pressure, self.gap = np.zeros(len(self.nodal)), np.zeros(len(self.nodal))
-        self.contact_pressure[pressed.contact.nodes] = touch.pressure
+        self.contact_pressure[plane.nodes] = touch.pressure
         self.gap[model.mesh.rows] = model.face.gaps(self.nodal)[model.mesh.rows]
         centre = LipCentre(model.mesh, model.shell)
         self.lip_opening, self.lip_displacement = centre.opening(self.q), centre.displacement(self.q)
@@ -284,7 +272,8 @@ class Pressed:
         for name, values in zip(("largest_strain", "largest_stress"), layer_maxima(self.layers)):
             setattr(self, name, float(values.max()))
             setattr(self, f"{name}_layer", self.layers.names[int(np.argmax(values))])
-        self.force_balance = force_imbalance(pressed, self.q, self.pressure)
+        pressure = model.flow.steady_pressure(np.zeros(model.stations), self.pressure)
+        self.force_balance = force_imbalance(model, self.q, model.nodal_pressure_force(self.nodal, pressure))
 
     @property
     def overlap(self) -> float:
@@ -314,43 +303,22 @@ class Pressed:
         return float(z[last] + (z[last + 1] - z[last]) * a / (a - b))
 
 
-def closure_model(case: Case, supports: str | None = None) -> ClosureModel:
-    """Model of a case under back pressure, with the supports "contact" or "held-lips"; as the case says by default."""
-    supports = case.closure.supports if supports is None else supports
-    law = contact_law(case, max(case.closure.pressures))
-    mesh, shell = build_shell(case)
-    duckbill = mesh.z <= case.valve.duckbill_length * (1 + 1e-9)
-    held = np.zeros(len(mesh.z), bool)
-    if supports == HELD_LIPS:
-        held = duckbill
-        free = free_unknowns(mesh)
-        free[mesh.rows[duckbill].ravel(), 1] = False
-        shell = shell.with_free(free)
-    contact = plane = face_plane(case, shell, law)
-    if supports == HELD_LIPS:
-        contact = PlaneContact(shell, np.arange(shell.mesh.node_count), 0.0, tributary_area(shell), law)
-    face = InnerFace(mesh, shell, plane, case.closure.shut_fraction)
-    return ClosureModel(case, supports, mesh, PressedShell(shell, contact, -1.0, loaded_share(mesh, case)), face, held)
-
-
 def layer_maxima(layers: LayerFields) -> tuple[np.ndarray, np.ndarray]:
     """Largest elongation or shortening and largest von Mises stress, Pa, of each layer, (layers,) each."""
     strain = np.maximum(layers.stretch[:, :, 1] - 1, 1 - layers.stretch[:, :, 0])
     return strain.max(axis=0), layers.von_mises.max(axis=0)
 
 
-def force_imbalance(pressed: PressedShell, q: np.ndarray, pressure: float) -> float:
-    """Norm of the sum of pressure, contact and support forces over the sum of their norms.
+def force_imbalance(model: Any, q: np.ndarray, load: np.ndarray) -> float:
+    """Norm of the sum of a load (nn, c), N, contact and support forces over the sum of their norms.
 
     The supports give what the internal forces at held displacements ask for, so the check knows nothing of how the
     state was found.
     """
-    dofs, nodal = pressed.shell.dofs, pressed.nodal(q)
-    internal = pressed.shell.with_free().force(nodal.ravel()).reshape(nodal.shape)
-    load, contact = pressed.nodal_pressure_force(nodal, pressure), np.zeros_like(nodal)
-    if pressed.contact is not None:
-        contact[pressed.contact.nodes, pressed.contact.axis] = pressed.contact_state(q).force
-    held = np.where(dofs.free, 0.0, internal - load - contact)
+    nodal, plane = model.nodal(q), model.contact.plane
+    internal, contact = model.shell.with_free().force(nodal.ravel()).reshape(nodal.shape), np.zeros_like(nodal)
+    contact[plane.nodes, plane.axis] = model.contact.state(q).force
+    held = np.where(model.shell.dofs.free, 0.0, internal - load - contact)
     parts = [force[:, :3].sum(axis=0) for force in (load, contact, held)]
     total = sum(float(np.linalg.norm(part)) for part in parts)
     return float(np.linalg.norm(sum(parts))) / total if total > 0 else 0.0

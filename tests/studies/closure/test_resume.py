@@ -24,7 +24,6 @@ COARSE = {
     "mesh.around": 6,
     "mesh.along": 10,
     "closure.max_step": "3 kPa",
-    "closure.start": "open",
     "closure.eigenvalues": 2,
 }
 PRESSURES = [4e3, 1.2e4, 2e4]
@@ -54,7 +53,7 @@ def agree(result, whole):
     for a, b in zip(result.states, whole.states):
         assert np.array_equal(a.nodal, b.nodal)
         assert a.energy_balance == b.energy_balance
-        assert (a.load_steps, a.iterations, a.multiplier_updates) == (b.load_steps, b.iterations, b.multiplier_updates)
+        assert (a.load_steps, a.iterations) == (b.load_steps, b.iterations)
     assert [vars(p) for p in result.walk] == [vars(p) for p in whole.walk]
     assert json.dumps(result.summary()) == json.dumps(whole.summary())
     assert result.warnings == whole.warnings and not result.failures
@@ -77,42 +76,17 @@ class StopAt(Observer):
 
 
 def test_a_run_goes_on_wherever_it_was_interrupted(whole, tmp_path):
-    """While a flow is turned back, before the first state, on the way from the second to the third, and at its end."""
+    """Before the first state, on the way from the second to the third, and at its end."""
     path = tmp_path / "run.h5"
-    load(thesis_case(), COARSE).closure(PRESSURES, output=path, observer=StopAt("steady state at", 4))
-    assert len(load_result(path).opened) == 3
-    first = resume(path, observer=StopAt("equilibrium at 1050 Pa", 1))
-    assert len(first.opened) == 10 and not first.states and first.walk
+    stop = StopAt("equilibrium at 1050 Pa", 1)
+    first = load(thesis_case(), COARSE).closure(PRESSURES, output=path, observer=stop)
+    assert not first.states and first.walk
     second = resume(path, observer=StopAfter(2))
     assert not second.complete and len(second.states) == 2
     assert len(load_result(path).walk) > len([p for p in whole.walk if p.pressure <= PRESSURES[1]])
     agree(resume(path), whole)
     with pytest.raises(CaseError, match="nothing to resume"):
         resume(path)
-
-
-@pytest.mark.slow
-def test_supports_to_compare_with_and_the_turn_in_time_are_taken_up_too(tmp_path):
-    path = tmp_path / "run.h5"
-    changes = COARSE | {
-        "closure.start": "rest",
-        "closure.max_step": "5 kPa",
-        "closure.reversal_time": "0.02 s",
-        "closure.reversal_hold": 0.0,
-    }
-
-    def ask(**further):
-        return load(thesis_case(), changes).closure([4e3, 14e3], in_time=True, compare=True, **further)
-
-    complete = ask()
-    first = ask(output=path, observer=StopAt("0.00", 3))
-    assert len(first.states) == 2 and 0 < len(first.closing.samples) < len(complete.closing.samples)
-    assert first.compared is None
-    second = resume(path, observer=StopAt("equilibrium", 1, after=1))
-    assert second.closing.samples == complete.closing.samples
-    assert not second.complete and len(second.compared.states) == 1
-    last = resume(path)
-    assert last.complete and json.dumps(last.summary()) == json.dumps(complete.summary())
 
 
 @pytest.mark.slow

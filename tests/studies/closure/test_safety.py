@@ -109,7 +109,7 @@ def test_a_wall_that_snaps_shows_its_last_state_before_and_the_factor(tmp_path):
     limit, last = found.buckling[0], found.before_limit
     assert limit.kind == "limit point" and 3e3 < last.pressure < limit.pressure
     assert limit.pressure - last.pressure < 0.001 * limit.pressure
-    assert last.stable and not last.beyond_limit and last.penetration <= found.case.closure.penetration
+    assert last.stable and not last.beyond_limit
     assert found.states[1].beyond_limit
     # its softest stiffness has all but gone
     assert last.lowest_stiffness_eigenvalue < 0.2 * found.states[0].lowest_stiffness_eigenvalue

@@ -7,11 +7,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from dbvfiv.model.load_steps import LoadStepOptions, LoadSteps
 from dbvfiv.studies.case import Case, thesis_case
-from dbvfiv.studies.closure import walk
-from dbvfiv.studies.closure.energy import EnergyLedger
-from dbvfiv.studies.closure.valve import Passage, closure_model
+from dbvfiv.studies.closure.valve import ClosedValve, Passage
 from dbvfiv.studies.session import Session
 from tests.observers import Stop
 from tests.small_valves import EVEN
@@ -35,11 +32,9 @@ def closure(case, pressures=None, observer=None):
     return Session(case).perform("closure", observer=observer)
 
 
-def reach(case, pressure, **options):
-    """State at one back pressure, with the penalty for the largest pressure of the case."""
-    depth = options.pop("contact_depth", case.closure.contact_depth) * pressure / max(case.closure.pressures)
-    keys = {f"closure.{key}": value for key, value in (options | {"contact_depth": depth}).items()}
-    return closure(case.replace(keys), [pressure]).states[0]
+def reach(case, pressure, **keys):
+    """State at one back pressure."""
+    return closure(case.replace({name.replace("__", "."): value for name, value in keys.items()}), [pressure]).states[0]
 
 
 @pytest.fixture(scope="module")
@@ -56,22 +51,20 @@ def held(case):
 
 def test_states_are_equilibria_without_penetration(pressed):
     assert not pressed.failures and len(pressed.states) == 2
-    model = pressed.model.pressed
+    plane = pressed.model.contact.plane
     for state in pressed.states:
         assert state.converged and state.residual <= 1e-8
-        assert state.penetration <= pressed.model.case.closure.penetration
+        assert state.penetration < 2 * state.largest_contact_pressure / plane.law.penalty
         assert state.force_balance < 1e-8
         assert state.stable and not state.beyond_limit
         assert state.contact_pressure.min() >= 0.0
-        assert state.contact_force == pytest.approx(
-            2 * np.sum(model.contact.area * state.contact_pressure[model.contact.nodes])
-        )
+        assert state.contact_force == pytest.approx(2 * np.sum(plane.area * state.contact_pressure[plane.nodes]))
 
 
 def test_another_element_stays_whatever_is_held(case):
     """Held lips and the balance of forces took the default element."""
     plain = case.replace({"mesh.element": "MITC4"})
-    models = [closure_model(plain, supports) for supports in ("contact", "held-lips")]
+    models = [ClosedValve(plain, supports) for supports in ("contact", "held-lips")]
     assert [model.shell.element for model in models] == ["MITC4", "MITC4"]
     state = closure(plain, [1e3]).states[0]
     assert state.residual <= 1e-8 and state.force_balance < 1e-8
@@ -94,7 +87,7 @@ def test_the_valve_shuts_more_firmly_under_more_pressure(pressed):
     # the displacement, until now called opening: half of the 0.38 mm between the faces at rest
     assert low.lip_displacement == pytest.approx(-(0.00619 - 0.006), abs=2e-6)
     assert 0.0 <= low.lip_opening < 4e-6
-    assert high.least_opening < 0.2 * 4 * pressed.model.passage(pressed.model.pressed.rest()).reference
+    assert high.least_opening < 0.2 * 4 * pressed.model.passage(pressed.model.rest()).reference
 
 
 def test_the_thesis_supports_hold_the_lips_and_say_so(held):
@@ -120,21 +113,21 @@ def test_nodes_that_start_beyond_the_plane_are_counted_and_told(pressed):
 
 def test_nothing_is_said_of_faces_that_do_not_start_beyond_the_plane(case):
     """A wall of half the thickness clears the plane everywhere."""
-    thin = closure_model(case.replace({"valve.thickness_factor": 0.5}))
+    thin = ClosedValve(case.replace({"valve.thickness_factor": 0.5}))
     assert len(thin.nodes_beyond) == 0
     assert list(thin.start_warnings()) == []
 
 
 def test_the_answer_does_not_depend_on_the_penalty(case, pressed):
-    """Three times softer: the multipliers bring the same forces, but for the wider rounding of the law's kink."""
-    state, reference = reach(case, 7e3, contact_depth=1e-5), pressed.states[0]
-    assert state.multiplier_updates > 0
+    """Three times softer faces carry the same forces."""
+    state, reference = reach(case, 7e3, supports__contact_stiffness=3e9), pressed.states[0]
+    assert state.penetration > 2 * reference.penetration
     assert state.contact_force == pytest.approx(reference.contact_force, rel=1e-3)
     assert state.max_displacement == pytest.approx(reference.max_displacement, rel=1e-3)
 
 
 def test_the_answer_does_not_depend_on_the_steps(case, pressed):
-    one = reach(case, 28e3, max_step=1.5e3)
+    one = reach(case, 28e3, closure__max_step=1.5e3)
     assert one.contact_force == pytest.approx(pressed.states[-1].contact_force, rel=1e-4)
     assert one.max_displacement == pytest.approx(pressed.states[-1].max_displacement, rel=1e-4)
 
@@ -171,12 +164,6 @@ def test_an_interrupt_keeps_what_was_found(case):
     assert [state.pressure for state in result.states] == [1e3]
 
 
-def test_a_penetration_out_of_reach_is_a_failure(case, monkeypatch):
-    monkeypatch.setattr(walk, "MOST_UPDATES", 0)
-    found = closure(case.replace({"closure.contact_depth": 1e-4}), [14e3])
-    assert not found.states and "penetration" in found.failures[0]
-
-
 def test_shut_intervals_are_cut_between_rows_where_roots_of_areas_are_linear():
     z = np.array([0.0, 1.0, 2.0, 3.0, 4.0])
     passage = Passage(z, np.array([0.0, 0.0, 2.0, 0.0, 2.0]), 1.0, 0.5)
@@ -188,8 +175,8 @@ def test_shut_intervals_are_cut_between_rows_where_roots_of_areas_are_linear():
 
 def test_the_opening_at_rest_is_the_gap_over_the_lips_width():
     case = thesis_case({"mesh.around": 56, "mesh.along": 16})
-    model = closure_model(case)
-    passage = model.passage(model.pressed.rest())
+    model = ClosedValve(case)
+    passage = model.passage(model.rest())
     assert passage.reference == pytest.approx(0.00019 * 0.125, rel=0.05)
     # the flange is a circle of the inner radius
     inner = case.valve.flange_radius - 0.008
@@ -197,36 +184,8 @@ def test_the_opening_at_rest_is_the_gap_over_the_lips_width():
 
 
 @pytest.mark.slow
-def test_energy_balances_to_1e_8_on_request_from_the_first_touch_on(case):
-    """Work of the pressure, work of renewing multipliers, strain energy and contact potential, with load steps as they
-    are.
-    """
+def test_work_and_energies_balance_the_better_the_smaller_the_steps(case):
+    """Work of the pressure against strain energy and energy of the contact, from the first touch on."""
     case = case.replace({"mesh.around": 6, "mesh.along": 10})
-    rough = reach(case, 7e3)
-    fine = reach(case, 7e3, balance_tolerance=1e-8)
-    assert fine.multiplier_updates > 0
-    assert fine.energy_balance < 1e-8 < 1e-5 < rough.energy_balance < 1e-2
-    # for the balance alone: the state is the same
-    assert fine.load_steps == rough.load_steps and np.array_equal(fine.nodal, rough.nodal)
-
-
-@pytest.mark.parametrize("share", [1.0, 1.01])
-def test_no_refinement_hides_a_force_that_is_no_derivative_of_the_energy(case, monkeypatch, share):
-    model = closure_model(case)
-    steps = LoadSteps(model.pressed, LoadStepOptions(first_step=50.0))
-    steps.reach(2e3)
-    for _ in range(3):
-        model.pressed.renew_multipliers(steps.q)
-        steps.settle()
-    energy = model.pressed.contact.energy
-    monkeypatch.setattr(model.pressed.contact, "energy", lambda *state: share * energy(*state))
-    ledger = EnergyLedger(model.pressed, 1e-7)
-    ledger.begin(steps.q, 2e3)
-    model.pressed.renew_multipliers(steps.q)
-    steps.settle()
-    ledger.add(steps.q, 2e3)
-    steps.reach(2.05e3)
-    ledger.add(steps.q, steps.pressure)
-    ledger.settle()
-    assert ledger.renewal > 0.0
-    assert ledger.error < 1e-7 if share == 1.0 else ledger.error > 1e-6
+    errors = [reach(case, 7e3, closure__max_step=step).energy_balance for step in (2e3, 250.0, 30.0)]
+    assert errors[1] < errors[0] < 1e-2 and errors[2] < 1e-5, errors

@@ -1,0 +1,55 @@
+"""Shells of any shape under a uniform pressure before a plane, for contact and buckling with known answers."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+
+import numpy as np
+
+from dbvfiv.contact import PlaneContact, class_stiffness
+from dbvfiv.model.classes import shell_of_class
+from dbvfiv.model.pressed_shell import PressedShell
+from dbvfiv.model.supports import FaceContact
+from dbvfiv.shell.pressure import pressure_stiffness
+
+
+class ShellOnPlane(PressedShell):
+    """A pressed shell with contact, and what curves of equilibria ask of a model."""
+
+    flow, weight, load_unit = SimpleNamespace(back=0.0), None, 10.0
+
+    def __init__(self, shell, plane: PlaneContact | None = None, sign: float = -1.0):
+        super().__init__(shell, sign)
+        self.contact = None if plane is None else FaceContact(shell, plane)
+        self.length_unit = float(np.mean(shell.mesh.thickness))
+
+    def internal_force(self, q):
+        force = super().internal_force(q)
+        return force if self.contact is None else force + self.contact.force(q)
+
+    def structure(self, q):
+        force, data = super().structure(q)
+        if self.contact is not None:
+            force += self.contact.force(q)
+            self.contact.add_tangent(q, data)
+        return force, data
+
+    def support_energy(self, q):
+        return 0.0 if self.contact is None else self.contact.energy(q)
+
+    def apply_transposed(self, tangent, direction):
+        return self.shell.dofs.matrix(tangent.stiffness).T @ direction
+
+
+def class_matrices(model: ShellOnPlane, free, apart: bool, q, pressure: float):
+    """Stiffness and mass (k, k) in a class of motion with free unknowns (nn, 5)."""
+    nodal = model.nodal(q)
+    shell = shell_of_class(model.shell, free, nodal)
+    surface, dofs, still = shell.mesh, shell.dofs, np.zeros(shell.size)
+    values = shell.force_and_tangent(still)[1]
+    uniform = np.full(surface.node_count, model.sign * pressure)
+    pressure_stiffness(surface.quads, surface.nodes, nodal, uniform, model.loaded, dofs.slots, -1.0, values)
+    stiffness = dofs.matrix(values)
+    if model.contact is not None:
+        stiffness = stiffness + class_stiffness(model.contact.plane, nodal, shell, apart)
+    return stiffness.tocsr(), dofs.matrix(shell.mass(still))
