@@ -3,12 +3,7 @@ worker killed half way.
 """
 
 import os
-import shutil
 import signal
-import subprocess
-import sys
-import time
-from pathlib import Path
 
 import pytest
 
@@ -16,9 +11,7 @@ from dbvfiv.errors import CaseError
 from dbvfiv.runtime import mpi_size
 from dbvfiv.studies import workers as module
 from dbvfiv.studies.workers import Lost, Work, Workers, read_workers
-from tests.studies.work import TASKS, dies, expected, root_of, start
-
-ROOT = Path(__file__).parents[2]
+from tests.studies.work import TASKS, dies, expected, root_of, run_under_mpi, start
 
 
 def shared(count, function=root_of, tasks=TASKS, said=None, on_result=lambda task: None):
@@ -59,38 +52,6 @@ def test_what_is_known_is_not_asked_of_workers():
         assert dict(team.share((1, 2), lambda task: -task)) == {1: -1, 2: -2}
 
 
-@pytest.fixture
-def cluster(tmp_path):
-    """Scheduler of Dask with two workers, each a process of its own, and their pids."""
-    pytest.importorskip("distributed")
-    environment = os.environ | {"PYTHONPATH": str(ROOT), "OMP_NUM_THREADS": "1"}
-    address = tmp_path / "scheduler.json"
-    command = [sys.executable, "-m", "distributed.cli.dask_scheduler"]
-    options = {"env": environment, "stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL, "cwd": tmp_path}
-    quiet = ["--no-dashboard", "--host", "127.0.0.1", "--port", "0", "--scheduler-file", str(address)]
-    started = [subprocess.Popen([*command, *quiet], **options)]
-    worker = [sys.executable, "-m", "distributed.cli.dask_worker", "--scheduler-file", str(address)]
-    single = ["--nthreads", "1", "--no-nanny", "--no-dashboard", "--local-directory", str(tmp_path)]
-    started += [subprocess.Popen([*worker, *single], **options) for _ in range(2)]
-    try:
-        for _ in range(600):
-            if address.exists():
-                break
-            time.sleep(0.05)
-        import json
-
-        from distributed import Client
-
-        where = json.loads(address.read_text())["address"]
-        with Client(where, set_as_default=False) as client:
-            client.wait_for_workers(2, timeout=60)
-        yield where, started[1:]
-    finally:
-        for process in started[::-1]:
-            process.kill()
-            process.wait()
-
-
 def test_a_cluster_gives_what_one_process_gives(cluster):
     address, processes = cluster
 
@@ -114,25 +75,7 @@ def test_workers_that_are_none_are_refused(given):
 
 
 def test_processes_of_mpiexec_give_what_one_gives():
-    pytest.importorskip("mpi4py")
-    if shutil.which("mpiexec") is None:
-        pytest.skip("mpiexec is not installed.")
-    command = [
-        "mpiexec",
-        "--oversubscribe",
-        "-n",
-        "3",
-        sys.executable,
-        "-m",
-        "mpi4py.futures",
-        "-m",
-        "tests.studies.work",
-    ]
-    allowed = {"OMPI_ALLOW_RUN_AS_ROOT": "1", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1", "OMPI_MCA_plm": "isolated"}
-    # an MPI that this process or its parent has started leaves its names, and mpiexec starts no other below it
-    own = {name: value for name, value in os.environ.items() if not name.startswith(("OMPI_", "PMIX_", "PMI_"))}
-    environment = own | allowed | {"PYTHONPATH": str(ROOT)}
-    done = subprocess.run(command, cwd=ROOT, env=environment, capture_output=True, text=True, timeout=120)
+    done = run_under_mpi(3, "tests.studies.work")
     assert done.returncode == 0, done.stderr
     assert done.stdout.strip() == repr(sorted(expected().items()))
 

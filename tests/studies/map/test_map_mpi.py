@@ -1,16 +1,12 @@
 """Columns of a map shared by MPI processes."""
 
-import os
-import shutil
-import subprocess
-import sys
-
 import numpy as np
 import pytest
 
 from dbvfiv.studies.case import THESIS
 from dbvfiv.studies.session import load_result
 from tests.studies.map.axes import run_map
+from tests.studies.work import run_under_mpi
 
 SETTINGS = {
     "map.x": "pressure=3 kPa:8 kPa:4",
@@ -24,33 +20,12 @@ MESH = {"mesh.around": 8, "mesh.along": 16, "damping.alpha": 0.0, "damping.beta"
 
 @pytest.mark.slow
 def test_two_mpi_processes_find_the_same_map(coarse_case, tmp_path):
-    pytest.importorskip("mpi4py.futures", reason="mpi4py is not installed (pip install mpi4py)")
-    if shutil.which("mpiexec") is None:
-        pytest.skip("There is no mpiexec on this machine.")
     path = tmp_path / "map.h5"
     changes = [
         f"--set={key}={str(value).lower() if isinstance(value, bool) else value}"
         for key, value in (THESIS | SETTINGS | MESH).items()
     ]
-    command = [
-        "mpiexec",
-        "-n",
-        "2",
-        "--oversubscribe",
-        sys.executable,
-        "-m",
-        "mpi4py.futures",
-        "-m",
-        "dbvfiv",
-        "map",
-        *changes,
-        "-o",
-        str(path),
-    ]
-    # this process may itself count as started by mpiexec, which its children must not inherit
-    clean = {key: value for key, value in os.environ.items() if not key.startswith(("OMPI_", "PMIX_", "PRTE_"))}
-    clean |= {"OMPI_ALLOW_RUN_AS_ROOT": "1", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1"}
-    done = subprocess.run(command, env=clean, capture_output=True, text=True, timeout=600)
+    done = run_under_mpi(2, "dbvfiv", "map", *changes, "-o", str(path))
     assert done.returncode == 0, done.stderr
     shared, alone = load_result(path), run_map(coarse_case.replace(SETTINGS | MESH))
     assert shared.complete and len(shared.columns) == 4

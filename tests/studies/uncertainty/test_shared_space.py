@@ -2,13 +2,17 @@
 within the errors that are allowed for; whoever works and however often the run is interrupted.
 """
 
+import multiprocessing
+
 import numpy as np
 import pytest
 
 import dbvfiv
 from dbvfiv.observer import Observer
+from dbvfiv.studies.session import load_result
 from dbvfiv.studies.stability.verdict import OUTCOMES
 from dbvfiv.studies.uncertainty.study import PAYS
+from tests.studies.work import run_under_mpi
 
 MESH = {"mesh.around": 6, "mesh.along": 8}
 LINE = "cases/dbv12-in-line.toml"
@@ -37,12 +41,46 @@ def test_outcomes_are_those_of_the_full_matrices(valve):
     assert np.median(apart / np.abs(known["growth_rate"])) < 0.01
 
 
-def test_workers_and_interruptions_change_no_digit(valve, tmp_path):
-    class Interrupt(Observer):
-        def item(self, result):
-            if result == 9:
-                raise KeyboardInterrupt
+class OnSample(Observer):
+    """Does something once, when a sample half way is there."""
+
+    def __init__(self, act):
+        self.act = act
+
+    def item(self, result):
+        if result == PAYS // 2:
+            self.act()
+
+
+@pytest.fixture(scope="module")
+def whole(valve):
+    return valve.uncertainty(samples=PAYS).summary()
+
+
+def test_interruptions_change_no_digit(valve, whole, tmp_path):
+    def interrupt():
+        raise KeyboardInterrupt
 
     path = tmp_path / "samples.h5"
-    assert valve.uncertainty(samples=PAYS, output=path, observer=Interrupt()).interrupted
-    assert dbvfiv.resume(path, workers=2).summary() == valve.uncertainty(samples=PAYS).summary()
+    assert valve.uncertainty(samples=PAYS, output=path, observer=OnSample(interrupt)).interrupted
+    assert dbvfiv.resume(path, workers=2).summary() == whole
+
+
+def test_a_process_killed_half_way_changes_no_digit(valve, whole):
+    kill = OnSample(lambda: multiprocessing.active_children()[0].kill())
+    assert valve.uncertainty(samples=PAYS, workers=2, observer=kill).summary() == whole
+
+
+def test_a_cluster_with_a_worker_killed_half_way_changes_no_digit(valve, whole, cluster):
+    address, processes = cluster
+    found = valve.uncertainty(samples=PAYS, workers=address, observer=OnSample(processes[0].kill))
+    assert processes[0].wait(10) != 0 and found.summary() == whole
+
+
+def test_processes_of_mpiexec_change_no_digit(valve, whole, tmp_path):
+    path, law = tmp_path / "samples.h5", valve.case.fluid.continuity
+    keys = [f"--set={key}={value}" for key, value in MESH.items()]
+    asked = ["-p", "2 m", "--law", law, "-n", str(PAYS), "-o", str(path)]
+    done = run_under_mpi(2, "dbvfiv", "uncertainty", LINE, *keys, *asked)
+    assert done.returncode == 0, done.stderr
+    assert load_result(path).summary() == whole
