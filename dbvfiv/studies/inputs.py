@@ -26,6 +26,8 @@ HARDNESS = 1.2 ** (1 / 1.96)
 #: ISO 3302-1:2014, class M3, dimensions across the mould's closure: up to, mm, and tolerance, mm; beyond, a share.
 CLOSURE = ((4.0, 0.40), (6.3, 0.40), (10.0, 0.50), (16.0, 0.60), (25.0, 0.80), (40.0, 1.0), (63.0, 1.3), (100.0, 1.6))
 CLOSURE_BEYOND = 0.013
+#: Confidence of intervals.
+CONFIDENCE = 0.95
 
 
 @dataclass(frozen=True)
@@ -71,8 +73,8 @@ class Input:
         return f"{self.name} = {self.distribution.words(self.quantity)}: {self.source}"
 
 
-def inputs_of(case: Case) -> list[Input]:
-    """Uncertain inputs of a case.
+def inputs_of(case: Case, over: Sequence[str] = ()) -> list[Input]:
+    """Uncertain inputs of a case, without those over which their effect is asked, which none may be that it names.
 
     Raises
     ------
@@ -81,15 +83,16 @@ def inputs_of(case: Case) -> list[Input]:
         `ALLOWED` lies where the number cannot be.
     """
     asked = case.uncertainty
-    axis = asked.axis
+    axis, by = asked.axis, "the map" if over else "uncertainty.over"
+    names = over or ([axis.parameter] if axis is not None else [])
     if asked.inputs:
         found = [_input(case, name, text, "given") for name, text in asked.inputs.items()]
     else:
         found = [_input(case, name, text, source) for name, text, source in _shipped(case)]
-    moved = [one for one in found if axis is not None and one.name == axis.parameter]
+    moved = [one for one in found if one.name in names]
     if moved and asked.inputs:
         raise CaseError(
-            f"uncertainty.inputs holds {moved[0].name!r}, which uncertainty.over moves; one of them has to go.",
+            f"uncertainty.inputs holds {moved[0].name!r}, which {by} moves; one of them has to go.",
             key="uncertainty.inputs",
         )
     found = [one for one in found if one not in moved]
@@ -144,19 +147,53 @@ def quasi_random(count: int, dimension: int, seed: int) -> np.ndarray:
 
 
 @dataclass(frozen=True)
+class Probability:
+    """Probability of an outcome with its interval.
+
+    Attributes
+    ----------
+    value : float
+        Among the decided samples.
+    low, high : float
+        Interval of `CONFIDENCE`; undecided samples count as not being of the outcome for the lower end, as being of it
+        for the upper one.
+    """
+
+    value: float
+    low: float
+    high: float
+
+
+def counted(hits: int, undecided: int, count: int) -> Probability:
+    """Probability of an outcome that some of `count` samples have, by Clopper and Pearson (Biometrika 26, 1934,
+    404-413), which holds for independent samples and is too wide for quasi-random ones.
+    """
+    from scipy.stats import beta
+
+    tail, most = 0.5 * (1 - CONFIDENCE), hits + undecided
+    low = float(beta.ppf(tail, hits, count - hits + 1)) if hits else 0.0
+    high = float(beta.ppf(1 - tail, most + 1, count - most)) if most < count else 1.0
+    decided = count - undecided
+    return Probability(hits / decided if decided else float("nan"), low, high)
+
+
+@dataclass(frozen=True)
 class Plan:
     """Inputs and places of a case whose probability is asked.
 
     Attributes
     ----------
     case : Case
+    moved : tuple of str
+        Parameters over which the probability is asked; that of `uncertainty.over` where none is named.
     """
 
     case: Case
+    moved: tuple[str, ...] = ()
 
     @cached_property
     def inputs(self) -> list[Input]:
-        return inputs_of(self.case)
+        return inputs_of(self.case, self.moved)
 
     @cached_property
     def _turn(self) -> np.ndarray:
@@ -173,6 +210,11 @@ class Plan:
         """Values of the range, SI."""
         axis = self.case.uncertainty.axis
         return (self.case.drive.pressure,) if axis is None else axis.values
+
+    @property
+    def law(self) -> float:
+        """Blend of the flow models of the case."""
+        return Mu.of(self.case).storage
 
     @property
     def is_surrounding(self) -> bool:

@@ -234,6 +234,17 @@ class Workers:
 _LOSSES = ("KilledWorker", "CancelledError", "FutureCancelledError")
 
 
+def require_answer(count: int | str) -> None:
+    """Refuse the address of a scheduler that does not answer, before anything is computed for it.
+
+    Raises
+    ------
+    CaseError
+    """
+    if isinstance(count, str):
+        _connected(count).close()
+
+
 def _connected(address: str) -> Any:
     """Client of a Dask scheduler.
 
@@ -251,7 +262,7 @@ def _connected(address: str) -> Any:
         ) from None
     try:
         return Client(address, timeout=PATIENCE, set_as_default=False)
-    except (OSError, ValueError, TimeoutError) as error:
+    except Exception as error:  # of whatever else answers there: lengths of a web server's words are no memory's
         raise CaseError(
             f"Workers are given as {address!r}, where no Dask scheduler answers within {PATIENCE} s "
             f"({type(error).__name__}); start one by `dask scheduler`, or give a number of processes."

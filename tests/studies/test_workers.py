@@ -4,13 +4,15 @@ worker killed half way.
 
 import os
 import signal
+import threading
+from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 
 import pytest
 
 from dbvfiv.errors import CaseError
 from dbvfiv.runtime import mpi_size
 from dbvfiv.studies import workers as module
-from dbvfiv.studies.workers import Lost, Work, Workers, read_workers
+from dbvfiv.studies.workers import Lost, Work, Workers, read_workers, require_answer
 from tests.studies.work import TASKS, dies, expected, root_of, run_under_mpi, start
 
 
@@ -66,6 +68,18 @@ def test_a_scheduler_that_does_not_answer_is_said(monkeypatch):
     monkeypatch.setattr(module, "PATIENCE", 1)
     with pytest.raises(CaseError, match="no Dask scheduler answers within 1 s"):
         shared("tcp://127.0.0.1:9")
+
+
+def test_a_server_that_is_no_scheduler_is_said(monkeypatch):
+    pytest.importorskip("distributed")
+    monkeypatch.setattr(module, "PATIENCE", 1)
+    server = ThreadingHTTPServer(("127.0.0.1", 0), BaseHTTPRequestHandler)
+    threading.Thread(target=server.serve_forever, daemon=True).start()
+    try:
+        with pytest.raises(CaseError, match="no Dask scheduler answers"):
+            require_answer(f"tcp://127.0.0.1:{server.server_port}")
+    finally:
+        server.shutdown()
 
 
 @pytest.mark.parametrize("given", ["few", "http://host:1", 0, 5000, True, 1.5])

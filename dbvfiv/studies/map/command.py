@@ -38,6 +38,12 @@ class Keys(Section):
     contours: tuple[StrictStr, ...] = key(
         (), 'Curves of constant damping of the leading mode: growth rates, "-2" (1/s), or damping ratios, "5 %".'
     )
+    samples: StrictInt = key(
+        0,
+        "Samples of the inputs of uncertainty in each column, for bands of the probability of flutter; 0 for none.",
+        ge=0,
+        le=1_000_000,
+    )
     workers: WorkersKey = key(1, WORKERS_HELP)
     cycles: StrictBool = key(
         False,
@@ -112,6 +118,10 @@ def command(
         str | None,
         typer.Option("--contours", metavar="LEVELS", help='Curves of constant damping: "-2,-5" (1/s) or "2 %,5 %".'),
     ] = None,
+    samples: Annotated[
+        int | None,
+        typer.Option("--samples", "-n", metavar="N", help="Samples of uncertain inputs for bands of probability."),
+    ] = None,
     cycles: Annotated[
         bool, typer.Option("--cycles", help="Amplitude of the limit cycle in each cell that has one.")
     ] = False,
@@ -130,6 +140,9 @@ def command(
 
     With --contours=-2,-5 curves are drawn on which the leading mode has these growth rates, or damping ratios ("2 %"),
     found and corrected like the onset curves.
+
+    With --samples=64 the inputs of the section uncertainty vary, and curves are drawn on which 5, 50 and 95 % of the
+    valves flutter.
 
     With --cycles branches of limit cycles are followed from the onsets of each column, as the section cycle of the case
     says; that takes seconds a cell. With --amplitude the amplitude equation of the mode (invariant manifold, to seventh
@@ -152,6 +165,7 @@ def command(
         "map.workers": workers,
         "map.symmetry": symmetry,
         "map.contours": contours,
+        "map.samples": samples,
         "map.cycles": cycles or None,
         "map.amplitude": amplitude or None,
     }

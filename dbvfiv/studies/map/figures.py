@@ -26,6 +26,7 @@ from ...drawing.style import (
 from ..result import StudyResult
 from ..stability.place import describe_fixed
 from ..stability.verdict import NOT_VALID, OUTCOMES
+from .chances import BANDS
 
 #: Places across a picture at which its regions are looked at.
 _FINE = 120
@@ -55,11 +56,22 @@ def stability_map(result: StudyResult) -> Figure:
         _sealed(axes, result, law)
         _curves(axes, result, law)
         label_regions(axes, result, law)
+        if result.case.map.samples and result.plan.laws[law] == result.plan.base.storage:
+            _bands(axes, result)
     bar = colour_bar(figure, mesh, panels, _BAR, pad=0.015, ticks=levels, extend="both", spacing="uniform")
     bar.ax.set_yticklabels([f"{level:g}".replace("-", "\N{MINUS SIGN}") for level in levels])
     bar.ax.minorticks_off()
     _headline(figure, result)
     return figure
+
+
+def _bands(axes, result: StudyResult) -> None:
+    """Curves of the probability of flutter under the flow model of the case."""
+    value = result.probability[0]
+    if np.isfinite(value).any():
+        x, y = (np.asarray(_shown(axis, np.asarray(axis.values))) for axis in (result.plan.x, result.plan.y))
+        lines = axes.contour(x, y, value, BANDS, colors="black", linewidths=1.2, linestyles=(":", "-", "--"))
+        axes.clabel(lines, fmt={level: f"P = {100 * level:g} %" for level in BANDS}, fontsize=8)
 
 
 def leading_frequency(result: StudyResult) -> Figure:

@@ -28,7 +28,7 @@ from ..stability.samples import SAMPLE_TABLE, SAMPLES, Sample, keep_samples, rea
 from ..stability.verdict import DIVERGES, FLUTTERS, NOT_VALID, OUTCOMES, STABLE, Verdict
 from ..stability.walk import StabilityWalk
 from ..study import Study
-from . import cycles, figures
+from . import chances, cycles, figures
 from .column import ColumnTask, MapColumn, MapPlan, grid_of
 from .curves import OnsetCurve, Web, doubts, linked
 from .pool import ColumnPool
@@ -288,6 +288,8 @@ def run(session: Session, record: GrowingRecord, workers: int | None = None) -> 
     """
     case, plan = session.case, MapPlan(session.case)
     check_scan(case, plan.x.parameter, plan.y.parameter)
+    if case.map.samples:
+        chances.Chances(case).check()
     walk = StabilityWalk(case, record, session.model)
     if session.start is not None:
         walk.give(plan.base, session.start)
@@ -308,6 +310,8 @@ def run(session: Session, record: GrowingRecord, workers: int | None = None) -> 
     record.note(_CURVES, curves=[asdict(curve) for curve in curves])
     for sentence in (*(doubts(plan, curves) if case.map.curve else ()), *_doubts(plan, columns, checks)):
         record.warn(sentence)
+    if case.map.samples:
+        chances.find_chances(case, record, processes)
     cycles.follow_cycles(case, record, plan, list(columns), walk)
 
 
@@ -353,6 +357,14 @@ class MapResult(StudyResult):
     def grid(self, name: str) -> np.ndarray:
         """A quantity of the cells on the grid (laws, y, x); see `Sample.number`."""
         return grid_of(self.plan, self.columns, name, range(len(self.plan.laws)))
+
+    @property
+    def probability(self) -> np.ndarray:
+        """Probability of flutter with the ends of its 95 % interval on the grid (3, y, x); NaN where there is none."""
+        return chances.chance_grid(self.record, self.plan)
+
+    def _has_chances(self, law: int) -> bool:
+        return bool(self.case.map.samples) and self.plan.laws[law] == self.plan.base.storage
 
     def cycle_grid(self, name: str) -> np.ndarray:
         """A quantity of `dbvfiv.studies.map.cycles.CELLS` of the limit cycles on the grid (laws, y, x)."""
@@ -416,6 +428,7 @@ class MapResult(StudyResult):
                 "onset_curves_exact": [bool(curve.exact) for curve in mine],
             }
             | ({"contours": contours} if self.case.map.levels else {})
+            | (chances.summary_of(self.record, self.plan) if self._has_chances(law) else {})
             | sealed
             | leading
             | followed
@@ -442,6 +455,8 @@ class MapResult(StudyResult):
         for i in range(len(self.plan.laws)):
             lines.append(self._cells_line(i))
             lines += [self._curve_line(curve) for curve in self.curves if curve.law == i]
+            if self._has_chances(i):
+                lines += chances.sentences(self.record, self.plan)
             if self.has_cycles:
                 lines += cycles.sentences(self.record, self.plan, i)
         lines += [self._class_line(note) for note in self.classes]

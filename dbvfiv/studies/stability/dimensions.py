@@ -87,12 +87,24 @@ def variants(case: Case, study: str) -> list[Variant]:
     CaseError
         If two flow models are asked for where none is at work.
     """
-    keys, law = getattr(case, study), case.fluid.continuity
-    found = [Variant(law, symmetry.name) for symmetry in chosen_symmetries(keys.symmetry, case.part)]
-    if getattr(keys, "continuity", "case") != "both":
-        return found
+    own, *other = flow_models(case, study)
+    found = [Variant(own, motion.name) for motion in chosen_symmetries(getattr(case, study).symmetry, case.part)]
+    return [*found, *(Variant(law, equilibria_of(case.part).name) for law in other)]
+
+
+def flow_models(case: Case, study: str) -> list[str]:
+    """Flow models that a study is asked for by its key `continuity`, that of the case first.
+
+    Raises
+    ------
+    CaseError
+        If two are asked for where none is at work.
+    """
+    law = case.fluid.continuity
+    if getattr(getattr(case, study), "continuity", "case") != "both":
+        return [law]
     _require_two_laws(case, study)
-    return [*found, Variant(QUASI_STEADY if law == STORAGE else STORAGE, equilibria_of(case.part).name)]
+    return [law, QUASI_STEADY if law == STORAGE else STORAGE]
 
 
 def _require_two_laws(case: Case, study: str) -> None:
@@ -120,10 +132,11 @@ def _require_two_laws(case: Case, study: str) -> None:
             f"class {own} alone, since no other motion changes areas; modes.symmetry must be {own!r} then.",
             key="modes.continuity",
         )
-    if study == "onset" and keys.axis.parameter == "storage":
+    if getattr(getattr(keys, "axis", None), "parameter", "") == "storage":
         raise CaseError(
-            "onset.continuity is given as 'both', but onset.over moves the flow model itself; it must be 'case' then.",
-            key="onset.continuity",
+            f"{study}.continuity is given as 'both', but {study}.over moves the flow model itself; it must be 'case' "
+            "then.",
+            key=f"{study}.continuity",
         )
 
 

@@ -9,7 +9,7 @@ factors of the first one (`eigen.columns.cell_beside`). Growth rates decide wher
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 
@@ -29,6 +29,9 @@ from .walk import StabilityWalk, ValveFamily
 
 #: From numbers (d,) to the walk and the parameter point of their valve.
 At = Callable[[np.ndarray], tuple[StabilityWalk, Mu]]
+#: Valves that a space is made of, and that its error is measured on, with the seed of their inputs, which no samples
+#: have.
+TAKEN, CHECKS, NEAR_SEED = 6, 4, 2**31 + 1
 #: Step of differences over the scale of a number.
 STEP = 0.01
 #: Leading modes of each valve whose vectors the space has.
@@ -164,7 +167,7 @@ def _errors(at: At, near: Neighbours, checks: np.ndarray) -> Iterator[float]:
         if walk.refusal(place):
             yield 0.0
             continue
-        exact, found = walk.cell(place).leading, beside.cell(walk, place, row)[0].leading
+        exact, found = walk.cell(place).leading, next(beside.cells(walk, [place], row)[1]).leading
         exact = exact[exact.imag > 0][:WATCHED]
         apart = np.abs(exact[:, None] - found).min(axis=1) / np.abs(exact)
         yield float(apart.max(initial=0.0)) / near.square(row)
@@ -191,19 +194,22 @@ class Beside:
         linear = linearise(built.model, walk.equilibrium(place), place.pressure, added=self.near.added_mass(row))
         return ValveFamily(linear, modes.max_frequency, modes.count)
 
-    def cell(self, walk: StabilityWalk, place: Mu, row: np.ndarray) -> tuple[Cell, ValveFamily]:
-        """Cell of a neighbour whose state its walk has, and its family."""
-        family, near = self.family(walk, place, row), self.near
-        reduction = self._first.beside(family, near.space, self._place)
-        return cell_beside(reduction, place, near.error * near.square(row), SAFETY), family
+    def cells(self, walk: StabilityWalk, places: Sequence[Mu], row: np.ndarray) -> tuple[ValveFamily, Iterator[Cell]]:
+        """Family of a neighbour whose state its walk has, and its cells at places that share the state."""
+        family, near = self.family(walk, places[0], row), self.near
+        reduction, error = self._first.beside(family, near.space, self._place), near.error * near.square(row)
+        return family, (cell_beside(reduction, place, error, SAFETY) for place in places)
 
-    def verdict(self, walk: StabilityWalk, place: Mu, row: np.ndarray) -> Verdict | None:
-        """Verdict on a neighbour whose state its walk has; None where growth rates are not clear of errors."""
-        if refusal := walk.refusal(place):
-            return Verdict.not_valid(refusal)
+    def verdicts(self, walk: StabilityWalk, places: Sequence[Mu], row: np.ndarray) -> list[Verdict | None]:
+        """Verdicts on a neighbour at places that share the state its walk has; None where growth rates are not clear of
+        errors.
+        """
+        found: list[Verdict | None] = [Verdict.not_valid(why) if (why := walk.refusal(p)) else None for p in places]
+        sound = [i for i, verdict in enumerate(found) if verdict is None]
         with suppress(ArithmeticError, ValueError):
-            cell, family = self.cell(walk, place, row)
-            sealed = family.linear.seal is not None
-            found = Sample.of(np.nan, cell, family.leading(place).claimed, sealed).verdict
-            return found if found.certain else None
-        return None
+            family, cells = self.cells(walk, [places[i] for i in sound], row) if sound else (None, ())
+            for i, cell in zip(sound, cells):
+                claimed, sealed = family.leading(places[i]).claimed, family.linear.seal is not None
+                verdict = Sample.of(np.nan, cell, claimed, sealed).verdict
+                found[i] = verdict if verdict.certain else None
+        return found

@@ -293,7 +293,7 @@ class StabilityWalk:
 
     def settle(self, place: Mu, q: np.ndarray | None) -> None:
         """Find the steady state of a place from displacements q (n,) next to it; by load steps where these are not
-        known or Newton's method does not lead from them.
+        known, or Newton's method does not lead from them or leads to lips that touch where they did not.
 
         Raises
         ------
@@ -303,12 +303,13 @@ class StabilityWalk:
         before = path.pressure, path.q, path.slope
         if q is not None and place.pressure not in built.known:
             path.pressure, path.q, path.slope = place.pressure, q, None
-            try:
+            with suppress(SolveError):
                 path.settle()
-                self.give(place, path.go_to(place.pressure))
-                return
-            except SolveError:
-                path.pressure, path.q, path.slope = before
+                state = path.go_to(place.pressure)
+                # a valve that opens may have a shut state besides, into which Newton's method falls from far away
+                if state.stops <= built.model.touching(q):
+                    return self.give(place, state)
+            path.pressure, path.q, path.slope = before
         self.equilibrium(place)
 
     def lift(self, place: Mu) -> float:

@@ -13,7 +13,7 @@ from ...case.model import Case
 from ...case.parameters import listed
 from ...case.quantity import Number, number_or_text
 from ...case.section import Described, Section, flattened, key
-from ..request import DensityOption, LawOption, PressureOption, Request, WorkersOption, refuse_moved
+from ..request import DensityOption, LawOption, PressureOption, Request, WorkersOption, law_changes, refuse_moved
 from ..workers import WORKERS_HELP, WorkersKey
 
 ORDER = 31
@@ -38,6 +38,9 @@ class Keys(Section):
         "plain",
         "Samples of the inputs as they are, or, at one state, (rare) about the inputs of a rare flutter, with weights, "
         "or (subset) in levels towards it, which take ten times as many and assume nothing of where it lies.",
+    )
+    continuity: Literal["case", "both"] = key(
+        "case", "The flow model of the case, or both models with the same samples."
     )
     inputs: Annotated[dict[StrictStr, StrictStr], BeforeValidator(flattened)] = key(
         {},
@@ -100,6 +103,6 @@ def command(
         "uncertainty.samples": samples,
         "uncertainty.method": "rare" if rare else None,
         "uncertainty.workers": workers,
-        "fluid.continuity": law,
+        **law_changes(law, "uncertainty"),
     }
     return Request(changes)

@@ -156,7 +156,7 @@ class Sampler:
                 place = walk.meet_pump(self.plan.point(walk.case, row, **{self.plan.parameter: value}), lift, q)
                 walk.settle(place, q)
                 state = walk.state(place)
-                verdict = self._beside(i).verdict(walk, place, row) if near else None
+                verdict = self._beside(i).verdicts(walk, [place], row)[0] if near else None
                 apart = apart and verdict is None
                 verdict = verdict or walk.verdict(place)
             except (SolveError, CaseError, ValueError) as error:

@@ -7,10 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..inputs import quasi_random
+from ..inputs import CONFIDENCE, Probability, quasi_random
 
-#: Confidence of intervals.
-CONFIDENCE = 0.95
 #: Coefficient of variation of the weights that a step towards a rare event is chosen by (Papaioannou, Geyer and Straub,
 #: Struct. Saf. 76, 2019, 10-20).
 SPREAD = 1.5
@@ -26,37 +24,6 @@ RUNS, SHARE, LEVELS, USUAL = 4, 0.1, 12, 4
 #: Share of accepted steps that those of its chains are made for, and the first step (Papaioannou, Betz, Zwirglmaier and
 #: Straub, Probab. Eng. Mech. 41, 2015, 89-103).
 ACCEPTED, FIRST_STEP = 0.44, 0.6
-
-
-@dataclass(frozen=True)
-class Probability:
-    """Probability of an outcome with its interval.
-
-    Attributes
-    ----------
-    value : float
-        Among the decided samples.
-    low, high : float
-        Interval of `CONFIDENCE`; undecided samples count as not being of the outcome for the lower end, as being of it
-        for the upper one.
-    """
-
-    value: float
-    low: float
-    high: float
-
-
-def counted(hits: int, undecided: int, count: int) -> Probability:
-    """Probability of an outcome that some of `count` samples have, by Clopper and Pearson (Biometrika 26, 1934,
-    404-413), which holds for independent samples and is too wide for quasi-random ones.
-    """
-    from scipy.stats import beta
-
-    tail, most = 0.5 * (1 - CONFIDENCE), hits + undecided
-    low = float(beta.ppf(tail, hits, count - hits + 1)) if hits else 0.0
-    high = float(beta.ppf(1 - tail, most + 1, count - most)) if most < count else 1.0
-    decided = count - undecided
-    return Probability(hits / decided if decided else float("nan"), low, high)
 
 
 def weighted(weights: np.ndarray, hits: np.ndarray, undecided: np.ndarray) -> Probability:

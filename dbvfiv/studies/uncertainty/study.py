@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 from functools import cached_property
 from typing import Any
@@ -18,24 +18,27 @@ from ...record.mesh import MeshData
 from ...record.record import GrowingRecord, Record
 from ...record.table import Column, TableSpec
 from ..case import Case
-from ..inputs import Plan, quasi_random
+from ..inputs import CONFIDENCE, Plan, Probability, counted, quasi_random
 from ..result import StudyResult
 from ..session import Session
-from ..stability.neighbours import Neighbours, find_neighbours
+from ..stability.dimensions import flow_models
+from ..stability.neighbours import CHECKS, NEAR_SEED, TAKEN, Neighbours, find_neighbours
 from ..stability.place import check_scan, describe_fixed, fixed_conditions
 from ..stability.verdict import DIVERGES, FLUTTERS, NOT_VALID, OUTCOMES, STABLE, UNDECIDED
 from ..stability.walk import StabilityWalk
 from ..study import Study
-from ..workers import Lost, Work, Workers
+from ..workers import Lost, Work, Workers, require_answer
 from . import figures
 from .sampler import Found, Sampler, Start, walks_at
-from .sampling import CONFIDENCE, Probability, Shifted, approach, counted, shares, subset, weighted
+from .sampling import Shifted, approach, shares, subset, weighted
 
 SAMPLES, NUMBERS = "samples", "numbers"
 #: Notes: reason of an undecided sample; error of the space that samples share at a value of the range; a sample found
 #: with its full matrices although there is such a space.
 _WHY, _SPACE, _APART = "undecided sample", "shared space", "sample apart"
+_LAW = Column("continuity", "", "Blend of the flow models, 0 quasi-steady, 1 storage")
 _SAMPLES = (
+    _LAW,
     Column("sample", "", "Number of the sample", "i8"),
     Column("value", "SI", "Of the range"),
     Column("outcome", "", f"Verdict: {', '.join(f'{i} {name}' for i, name in enumerate(OUTCOMES))}", "i8"),
@@ -46,6 +49,7 @@ _SAMPLES = (
     Column("flow", "m^3/s", "Volume flow; 0 of a bill that is moulded shut and sealed"),
 )
 _NUMBERS = (
+    _LAW,
     Column("sample", "", "Number of the sample", "i8"),
     Column("input", "", "Number of the input", "i8"),
     Column("value", "SI", "Of the input"),
@@ -58,9 +62,8 @@ _TABLES = TableSpec(SAMPLES, _SAMPLES, chunk=512), TableSpec(NUMBERS, _NUMBERS, 
 SHARED, OWN = 64, 4
 #: What a bill that is moulded shut may be besides the outcome of its verdict.
 NOT_SEALED = "not sealed"
-#: Samples from which a space that they share pays; valves that it is made of, and that its error is measured on, with
-#: the seed of their inputs, which no samples have.
-PAYS, TAKEN, CHECKS, NEAR_SEED = 48, 6, 4, 2**31 + 1
+#: Samples from which a space that they share pays.
+PAYS = 48
 #: Samples of the final density of a rare event over all that may be used; the others lead there.
 FINAL = 0.4
 #: Quantities whose percentiles are told, and their units in lines.
@@ -93,7 +96,7 @@ def run(session: Session, record: GrowingRecord, workers: int | str | None = Non
     SolveError
         If the valve of the case has no steady state at any value.
     """
-    case, plan = session.case, Plan(session.case)
+    case, plan, laws = session.case, Plan(session.case), flow_models(session.case, "uncertainty")
     check_scan(case, plan.parameter)
     if case.has_pump and any(one.name == "pressure" for one in plan.inputs):
         raise CaseError(
@@ -107,13 +110,27 @@ def run(session: Session, record: GrowingRecord, workers: int | str | None = Non
             "and samples are drawn towards the flutter of one state; leave uncertainty.over out, or method.",
             key="uncertainty.method",
         )
+    count = case.uncertainty.workers if workers is None else workers
+    require_answer(count)
     plan.scores_of(np.zeros((1, len(plan.inputs))))  # correlations are checked before anything is solved
     for one in plan.inputs:
         record.progress(one.words())
-    walk = StabilityWalk(case, record, session.model)
-    states = _states_of_case(plan, walk, record)
-    count = case.uncertainty.workers if workers is None else workers
-    record.begin("uncertainty", case.uncertainty.samples)
+    record.begin("uncertainty", len(laws) * case.uncertainty.samples)
+    _sample(plan, StabilityWalk(case, record, session.model), record, count)
+    for law in laws[1:]:
+        record.progress(f"the same under {law}")
+        other = Plan(_under(case, law))
+        _sample(other, StabilityWalk(other.case, record), record, count)
+
+
+def _under(case: Case, law: str) -> Case:
+    """The case under another flow model."""
+    return case.replace({"fluid.continuity": law, "uncertainty.continuity": "case"})
+
+
+def _sample(plan: Plan, walk: StabilityWalk, record: GrowingRecord, count: int | str) -> None:
+    """Samples of a plan under the flow model of its case; `walk` is of that."""
+    case, states = plan.case, _states_of_case(plan, walk, record)
     neighbours = _neighbours(plan, states, record)
     with Workers(count, _start, (case.to_dict(), states, neighbours), record.warn) as team:
         sampling = _Sampling(plan, record, team, Sampler(plan, states, neighbours, walk))
@@ -160,7 +177,7 @@ def _neighbours(plan: Plan, states: list[Start | None], record: GrowingRecord) -
         with suppress(SolveError, CaseError, ArithmeticError, ValueError):  # each sample is then found by itself
             at = walks_at(plan, value, state, ColumnSolver())
             found[i] = find_neighbours(at, origin, ahead, state.q, near[:TAKEN], near[TAKEN:])
-            record.note(_SPACE, value=value, error=found[i].error)
+            record.note(_SPACE, law=plan.law, value=value, error=found[i].error)
     return found
 
 
@@ -191,12 +208,12 @@ class _Sampling:
     def __init__(self, plan: Plan, record: GrowingRecord, team: Workers, sampler: Sampler):
         self.plan, self.record, self.team, self.sampler = plan, record, team, sampler
         self.asked = 0
-        known, values = record.table_rows(_TABLES[0]), len(plan.values)
+        known = [row for row in record.table_rows(_TABLES[0]) if row["continuity"] == plan.law]
         counts = np.bincount([row["sample"] for row in known], minlength=1) if known else np.zeros(1, int)
         self.known = {
             row["sample"]: _performance(row["outcome"], row["damping_ratio"])
             for row in known
-            if counts[row["sample"]] == values
+            if counts[row["sample"]] == len(plan.values)
         }
 
     def verdicts(self, independent: np.ndarray, log_weight: np.ndarray, stage: int) -> np.ndarray:
@@ -234,17 +251,18 @@ class _Sampling:
         fresh = [row for row in rows if row.sample not in self.known]
         new = sorted({row.sample for row in fresh})
         inputs = [
-            (sample, i, numbers[sample - first, i], scores[sample - first, i], log_weight[sample - first], stage)
-            for sample in new
+            (self.plan.law, sample, i, numbers[k, i], scores[k, i], log_weight[k], stage)
+            for sample, k in ((sample, sample - first) for sample in new)
             for i in range(numbers.shape[1])
         ]
         self.record.extend(NUMBERS, dict(zip((c.name for c in _NUMBERS), map(list, zip(*inputs)))))
         for row in fresh:
             if row.why:
-                self.record.note(_WHY, sample=row.sample, value=row.value, reason=row.why)
+                self.record.note(_WHY, law=self.plan.law, sample=row.sample, value=row.value, reason=row.why)
             if row.apart:
-                self.record.note(_APART, sample=row.sample, value=row.value)
-        self.record.extend(SAMPLES, {c.name: [getattr(row, c.name) for row in fresh] for c in _SAMPLES})
+                self.record.note(_APART, law=self.plan.law, sample=row.sample, value=row.value)
+        found = {column.name: [getattr(row, column.name) for row in fresh] for column in _SAMPLES[1:]}
+        self.record.extend(SAMPLES, {_LAW.name: [self.plan.law] * len(fresh)} | found)
         for row in fresh:
             self.known[row.sample] = _performance(row.outcome, row.damping_ratio)
         for sample in new:
@@ -295,6 +313,22 @@ class UncertaintyResult(StudyResult):
     """
 
     kind = "uncertainty"
+    #: Flow model in place of that of the case.
+    _law: str | None = None
+
+    @cached_property
+    def case(self) -> Case:
+        return self.header.case if self._law is None else _under(self.header.case, self._law)
+
+    @cached_property
+    def other_law(self) -> tuple[str, UncertaintyResult] | None:
+        """The other flow model with its samples, where both were asked for."""
+        laws = flow_models(self.case, self.kind)
+        if len(laws) == 1:
+            return None
+        other = type(self)(self.record)
+        other._law = laws[1]
+        return laws[1], other
 
     @cached_property
     def plan(self) -> Plan:
@@ -304,14 +338,18 @@ class UncertaintyResult(StudyResult):
     def parameter(self) -> str:
         return self.plan.parameter
 
+    def _columns(self, table: str, columns: Sequence[Column]) -> dict[str, np.ndarray]:
+        mine = self.record.column(table, _LAW.name) == self.plan.law
+        return {column.name: self.record.column(table, column.name)[mine] for column in columns}
+
     @cached_property
     def _rows(self) -> dict[str, np.ndarray]:
-        return {column.name: self.record.column(SAMPLES, column.name) for column in _SAMPLES}
+        return self._columns(SAMPLES, _SAMPLES)
 
     @cached_property
     def _inputs(self) -> dict[str, np.ndarray]:
         """Values and scores (samples, d), weights and stages (samples,), by the number of the sample."""
-        kept = {column.name: self.record.column(NUMBERS, column.name) for column in _NUMBERS}
+        kept = self._columns(NUMBERS, _NUMBERS)
         count, width = int(kept["sample"].max(initial=-1)) + 1, len(self.plan.inputs)
         values, scores = np.full((count, width), np.nan), np.full((count, width), np.nan)
         values[kept["sample"], kept["input"]], scores[kept["sample"], kept["input"]] = kept["value"], kept["score"]
@@ -375,9 +413,10 @@ class UncertaintyResult(StudyResult):
         }
 
     def _shared(self, value: float, samples: np.ndarray) -> int:
-        if not any(note["value"] == value for note in self.record.notes(_SPACE)):
+        here = self.plan.law, value
+        if not any((note["law"], note["value"]) == here for note in self.record.notes(_SPACE)):
             return 0
-        apart = {note["sample"] for note in self.record.notes(_APART) if note["value"] == value}
+        apart = {note["sample"] for note in self.record.notes(_APART) if (note["law"], note["value"]) == here}
         return len(set(samples.tolist()) - apart)
 
     def decides(self, value: float) -> list[dict[str, Any]]:
@@ -425,7 +464,11 @@ class UncertaintyResult(StudyResult):
         return max(known, key=lambda p: p["probability"] * (1 - p["probability"]), default=None)
 
     def summary(self) -> dict[str, Any]:
-        deciding = self.deciding
+        deciding, both = self.deciding, {}
+        if self.other_law:
+            law, other = self.other_law
+            both = {"other_law": {"continuity": law, "points": other.points}}
+            both |= {"comparison": self.comparison} if self.case.uncertainty.method == "plain" else {}
         return {
             "parameter": self.parameter,
             "points": self.points,
@@ -434,7 +477,16 @@ class UncertaintyResult(StudyResult):
             "method": self.case.uncertainty.method,
             "confidence": CONFIDENCE,
             "fixed": fixed_conditions(self.case, self.parameter, *(one.name for one in self.plan.inputs)),
-        } | self.ending()
+        } | (both | self.ending())
+
+    @property
+    def comparison(self) -> str:
+        """Sentence on how many of the same samples have the same outcome under both flow models."""
+        law, other = self.other_law
+        pairs = [(self.at(value)["outcome"], other.at(value)["outcome"]) for value in self.plan.values]
+        same = sum(int((a[: len(b)] == b[: len(a)]).sum()) for a, b in pairs)
+        count = sum(min(len(a), len(b)) for a, b in pairs)
+        return f"Under {law} {same} of {count} samples have the outcome of {self.case.fluid.continuity}."
 
     def drawers(self) -> Iterator[tuple[str, Callable[[], Figure]]]:
         yield from figures.draw(self)
@@ -445,7 +497,12 @@ class UncertaintyResult(StudyResult):
         place = f"{self.parameter}, {row.shown_unit}".rstrip(", ")
         head = f"{place:>16}{'flutters':>10}  {'95 % interval':<17}{'not valid':>10}{'undecided':>10}{'samples':>9}"
         lines = [f"At {fixed}:", *(f"  {one.words()}" for one in self.plan.inputs), f"{head}  least damping ratio, %"]
-        return [*lines, *map(self._line, self.points), *self._shared_lines(), *self.deciding_lines()]
+        lines += [*map(self._line, self.points), *self._shared_lines(), *self.deciding_lines()]
+        if self.other_law:
+            law, other = self.other_law
+            rows = [*map(other._line, other.points), *other._shared_lines()]
+            lines += [f"Under {law}:", *rows, *([self.comparison] if self.case.uncertainty.method == "plain" else [])]
+        return lines
 
     def _shared_lines(self) -> list[str]:
         shared, count = (sum(point[name] for point in self.points) for name in ("shared", "samples"))

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from scipy.stats import norm
 
-from dbvfiv.studies.inputs import quasi_random
-from dbvfiv.studies.uncertainty.sampling import approach, counted, shares, subset, weighted
+from dbvfiv.studies.inputs import counted, quasi_random
+from dbvfiv.studies.uncertainty.sampling import approach, shares, subset, weighted
 
 #: Stiffnesses 1 + 0.1 z1 and 1.5 + 0.1 z2 of two modes that a circulatory force couples.
 SPREAD, APART = 0.1, 0.5

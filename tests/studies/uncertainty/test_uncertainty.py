@@ -12,6 +12,7 @@ from dbvfiv.errors import CaseError
 from dbvfiv.observer import Observer
 from dbvfiv.report.gather import Gathered
 from dbvfiv.report.parts import chance_part
+from dbvfiv.studies import workers
 from dbvfiv.studies.inputs import inputs_of
 from dbvfiv.studies.session import load_result
 from dbvfiv.studies.stability.verdict import OUTCOMES
@@ -91,6 +92,18 @@ def test_surroundings_are_asked_side_by_side(valve):
         alone = valve.modes(value, beta=beta, density=density)
         assert alone.verdict.outcome == OUTCOMES[samples["outcome"][3]]
         assert alone.verdict.growth_rate == pytest.approx(samples["growth_rate"][3], rel=1e-5, abs=1e-5)
+
+
+@pytest.mark.slow
+def test_both_flow_models_have_the_same_samples(valve, found, tmp_path):
+    path = tmp_path / "both.h5"
+    both = valve.replace({"uncertainty.continuity": "both"}).uncertainty(inputs=OWN, output=path)
+    law, other = both.other_law
+    alone = valve.replace({"fluid.continuity": law}).uncertainty(inputs=OWN)
+    assert both.points == found.points and other.points == alone.points
+    read = load_result(path)
+    assert read.summary() == both.summary() and read.summary()["other_law"]["continuity"] == law
+    assert any(line == f"Under {law}:" for line in read.lines())
 
 
 @pytest.mark.slow
@@ -186,6 +199,20 @@ def test_a_sealing_pressure_may_be_uncertain():
 def test_what_cannot_be_used_is_answered_by_a_sentence(changes, clause):
     with pytest.raises(CaseError, match=clause):
         load(**changes).uncertainty()
+
+
+def test_a_dead_scheduler_is_said_before_anything_is_computed(monkeypatch):
+    pytest.importorskip("distributed")
+    monkeypatch.setattr(workers, "PATIENCE", 1)
+    seen = []
+
+    class Watch(Observer):
+        def progress(self, text):
+            seen.append(text)
+
+    with pytest.raises(CaseError, match="no Dask scheduler answers within 1 s"):
+        load().uncertainty(workers="tcp://127.0.0.1:9", observer=Watch())
+    assert not seen
 
 
 def test_a_report_and_a_tornado_say_what_the_samples_say(found):

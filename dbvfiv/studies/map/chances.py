@@ -1,0 +1,169 @@
+"""Probability of flutter over a map: columns of sampled valves, whose bands are drawn beside the neutral curves.
+
+The cells of a column share the steady state of each sampled valve, and all valves a space of their leading motions (see
+`dbvfiv.studies.stability.neighbours`), made along the whole column. A cell counts as undecided where the growth rates
+of a valve are not clear of the errors of that space.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+
+from eigen import ColumnSolver
+
+from ...case.parameters import PARAMETERS, Mu
+from ...errors import CaseError, SolveError
+from ...observer import Observer
+from ...record.record import GrowingRecord, Record
+from ..case import Case
+from ..inputs import Plan, counted, quasi_random
+from ..stability.neighbours import CHECKS, NEAR_SEED, TAKEN, Beside, find_neighbours
+from ..stability.place import is_surrounding
+from ..stability.verdict import FLUTTERS
+from ..stability.walk import StabilityWalk
+from ..workers import Lost, Work, Workers
+from .column import MapPlan
+
+#: Probabilities whose curves are drawn.
+BANDS = (0.05, 0.5, 0.95)
+_CHANCE = "probability"
+
+
+class Chances:
+    """Samples of valves over the cells of columns.
+
+    Parameters
+    ----------
+    case : Case
+    """
+
+    def __init__(self, case: Case):
+        self.plan = MapPlan(case)
+        self.inputs = Plan(case, (self.plan.x.parameter, self.plan.y.parameter))
+
+    def check(self) -> None:
+        """Refuse a map whose columns are not those of one steady state, or inputs that cannot be used.
+
+        Raises
+        ------
+        CaseError
+        """
+        name, case = self.plan.along.parameter, self.plan.case
+        if not is_surrounding(case, name) or case.has_pump:
+            raise CaseError(
+                f"map.samples is given as {case.map.samples}, and each cell of a map over {self.plan.x.parameter} and "
+                f"{self.plan.y.parameter}{' behind a pump' if case.has_pump else ''} has a steady state of its own; it "
+                "needs an axis that leaves steady states alone, such as loss_factor or density, or 0.",
+                key="map.samples",
+            )
+        self.inputs.scores_of(np.zeros((1, len(self.inputs.inputs))))
+
+    def column(self, value: float) -> dict[str, Any]:
+        """Numbers of samples that flutter and that are undecided in each cell of a column.
+
+        Raises
+        ------
+        SolveError
+            If the valve of the case has no steady state there, or the space could not be made.
+        """
+        plan, inputs, count = self.plan, self.inputs, self.plan.case.map.samples
+        along, across, law, solver = plan.along, plan.across.parameter, plan.base.storage, ColumnSolver()
+        ends = np.array([0.0, 1.0])
+
+        def point(case: Case, row: np.ndarray, place: float) -> Mu:
+            return inputs.point(case, row, **({"storage": law} | {across: value, along.parameter: place}))
+
+        def at(row: np.ndarray) -> tuple[StabilityWalk, Mu]:
+            walk = StabilityWalk(inputs.redescribed(row[:-1]), Observer(), solver=solver)
+            return walk, point(walk.case, row[:-1], row[-1])
+
+        def rows(independent: np.ndarray, places: np.ndarray) -> np.ndarray:
+            cells = [plan.value(along, coordinate) for coordinate in places]
+            return np.column_stack([inputs.numbers(independent), cells])
+
+        d = len(inputs.inputs)
+        origin = rows(np.zeros((1, d)), np.array([0.5]))[0]
+        scales = np.array([*(one.distribution.scale for one in inputs.inputs), np.ptp(along.values)])
+        near = quasi_random(TAKEN + CHECKS, d, NEAR_SEED)
+        taken = rows(near[:TAKEN], np.linspace(*ends, TAKEN))
+        checks = rows(near[TAKEN:], np.linspace(*ends, CHECKS + 2)[1:-1])
+        own = StabilityWalk(plan.case)
+        start = own.equilibrium(plan.place(value, along.values[0], law))
+        shared = find_neighbours(at, origin, scales, start, taken, checks)
+        beside, (flutters, undecided) = Beside(at, shared), np.zeros((2, len(along.values)), int)
+        for row in rows(quasi_random(count, d, plan.case.uncertainty.seed), np.full(count, 0.5)):
+            try:
+                walk, place = at(row)
+                walk.settle(place, shared.state(row))
+                found = beside.verdicts(walk, [point(walk.case, row[:-1], cell) for cell in along.values], row)
+            except (SolveError, CaseError, ValueError):
+                undecided += 1
+                continue
+            flutters += [one is not None and one.outcome == FLUTTERS for one in found]
+            undecided += [one is None or one.stable is None and one.holds for one in found]
+        return {"flutters": flutters.tolist(), "undecided": undecided.tolist()}
+
+
+def _column(chances: Chances, value: float) -> dict[str, Any]:
+    try:
+        return chances.column(value)
+    except (SolveError, ArithmeticError, ValueError) as error:
+        return {"failure": str(error)}
+
+
+def _start(case: dict) -> Chances:
+    return Chances(Case.from_dict(case))
+
+
+def find_chances(case: Case, record: GrowingRecord, workers: int | str) -> None:
+    """Keep the columns of a map of probability that an earlier run has not kept."""
+    known = {note["value"] for note in record.notes(_CHANCE)}
+    chances, wanted = Chances(case), [v for v in MapPlan(case).across.values if v not in known]
+    row = PARAMETERS[chances.plan.across.parameter]
+
+    def keep(value: float, found: dict[str, Any]) -> None:
+        record.note(_CHANCE, value=value, **found)
+        record.progress(f"probability at {value / row.scale:.4g} {row.shown_unit}".rstrip())
+        if "failure" in found:
+            record.warn(f"No probability at {value / row.scale:.4g} {row.shown_unit}: {found['failure']}")
+
+    with Workers(workers, _start, (case.to_dict(),), record.warn) as team:
+        if team.is_here:
+            for value in wanted:
+                keep(value, _column(chances, value))
+            return
+        for value, found in team.share(wanted, lambda value: Work(_column, (value,))):
+            keep(value, {"failure": Lost.sentence} if found is Lost else found)
+
+
+def chance_grid(record: Record, plan: MapPlan) -> np.ndarray:
+    """Probability of flutter with the ends of its 95 % interval (3, y, x); NaN where there is none."""
+    count, cells = plan.case.map.samples, np.full((3, len(plan.across.values), len(plan.along.values)), np.nan)
+    for note in record.notes(_CHANCE):
+        if "failure" not in note:
+            column = plan.across.values.index(note["value"])
+            pairs = zip(note["flutters"], note["undecided"])
+            cells[:, column] = np.transpose([list(vars(counted(*pair, count)).values()) for pair in pairs])
+    return cells if plan.transposed else cells.transpose(0, 2, 1)
+
+
+def summary_of(record: Record, plan: MapPlan) -> dict[str, Any]:
+    """Probability of flutter over the cells (y, x) for JSON, None where there is none, with what is uncertain."""
+    value, low, high = (np.where(np.isnan(table), None, table).tolist() for table in chance_grid(record, plan))
+    inputs = Plan(plan.case, (plan.x.parameter, plan.y.parameter)).inputs
+    named = {"samples": plan.case.map.samples, "inputs": [one.summary() for one in inputs]}
+    return {"probability": {"value": value, "low": low, "high": high} | named}
+
+
+def sentences(record: Record, plan: MapPlan) -> Iterator[str]:
+    """Lines on the cells between the bands."""
+    value = chance_grid(record, plan)[0]
+    known = value[np.isfinite(value)]
+    counts = [int((known <= BANDS[0]).sum()), int(((known > BANDS[0]) & (known < BANDS[-1])).sum())]
+    yield (
+        f"Probability of flutter from {plan.case.map.samples} samples a column: up to {100 * BANDS[0]:g} % in "
+        f"{counts[0]} cells, more than {100 * BANDS[-1]:g} % in {len(known) - sum(counts)}, between in {counts[1]}."
+    )

@@ -1,0 +1,48 @@
+"""Bands of probability on maps: cells are those of samples found one by one with their full matrices."""
+
+import pytest
+
+import dbvfiv
+from dbvfiv.errors import CaseError
+from dbvfiv.observer import Observer
+from dbvfiv.studies.map.figures import stability_map
+from tests.small_valves import load_small
+
+INPUTS = {"thickness": "normal(8 %)", "materials.CR.stiffness_factor": "lognormal(1.4)"}
+KEYS = {"damping.alpha": 0.0, "fluid.density": 20.0, "uncertainty.inputs": INPUTS, "map.curve": False, "map.refine": 0}
+AXES = {"map.x": "pressure=3 kPa:5 kPa:2", "map.y": "beta=0.004:0.012:4:log", "map.checks": 0}
+
+
+@pytest.mark.slow
+def test_cells_have_the_probability_of_samples_found_one_by_one(tmp_path):
+    class Interrupt(Observer):
+        def progress(self, text):
+            if text.startswith("probability at 3 kPa"):
+                raise KeyboardInterrupt
+
+    valve, path = load_small(KEYS, AXES, {"map.samples": 24}), tmp_path / "map.h5"
+    assert valve.map(output=path, observer=Interrupt()).interrupted
+    found = dbvfiv.resume(path, workers=2)
+    value, low, high = found.probability
+    assert value.shape == (4, 2) and (low <= value).all() and (value <= high).all()
+    assert ((value > 0.1) & (value < 0.9)).any()
+    for column, pressure in enumerate(found.plan.x.values):
+        for row in (1, 2):
+            singly = valve.uncertainty(samples=24, pressure=pressure, beta=found.plan.y.values[row]).points[0]
+            # undecided samples, which full matrices decide, widen an interval
+            assert low[row, column] <= singly["interval"][0] and singly["interval"][1] <= high[row, column]
+    assert found.summary()["probability"]["value"] == value.tolist()
+    assert any("Probability of flutter from 24 samples" in line for line in found.lines())
+    assert stability_map(found).axes[0].collections
+
+
+@pytest.mark.parametrize(
+    ("changes", "clause"),
+    [
+        ({"map.y": "thickness=0.9:1.1:3"}, "a steady state of its own"),
+        ({"uncertainty.inputs": {"beta": "lognormal(1.3)"}}, "which the map moves"),
+    ],
+)
+def test_what_has_no_bands_is_answered_by_a_sentence(changes, clause):
+    with pytest.raises(CaseError, match=clause):
+        load_small(KEYS, AXES, {"map.samples": 24}, changes).map()
