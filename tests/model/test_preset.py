@@ -271,7 +271,7 @@ def test_cases_of_the_trade_seal_at_rest_and_crack_in_its_range(size):
 
 @pytest.mark.slow
 @pytest.mark.random
-@pytest.mark.parametrize("seed", range(50))
+@pytest.mark.parametrize("seed", range(300))
 def test_random_presets_open_without_a_jump_in_flow_that_no_limit_point_explains(seed):
     """Random bills and heads: states that are found are sealed or open, the flow rises with the head, and a sealed
     bill is stable; what is not found is said in a sentence.
@@ -308,6 +308,14 @@ def test_back_pressure_starts_from_the_faces_that_press_on_each_other():
     """The work of the back pressure is what the wall and its contact store."""
     valve = load(thesis_case(COARSE | {"valve.sealing_pressure": PRESSURE, "closure.rated_pressure": "2 kPa"}))
     (state,) = valve.closure(pressure=2e3).states
+    assert state.closed and state.energy_balance < 1e-3
+
+
+@pytest.mark.parametrize("size", [6, 18])
+def test_faces_of_few_elements_press_on_each_other_before_the_back_pressure(size):
+    """Contact as hard as the back pressure asks for is not met from the drawn shape on most such meshes."""
+    keys = {"mesh.around": 5, "mesh.along": 10, "closure.pressures": [28e3], "closure.arclength": False}
+    (state,) = load(load_case(CASES / f"dbv{size}-moulded.toml").replace(keys)).closure().states
     assert state.closed and state.energy_balance < 1e-3
 
 
