@@ -148,6 +148,8 @@ class AskPanel:
             if worker is confirmer and await self._is_moved_before(self._confirming):
                 return
             question = {} if step == "margin" else {"values": values}
+            if step == "confirm":
+                question["near"] = await predictor.about(file, "displacements", values=values)
             asked = asyncio.create_task(worker.about(file, step, **question))
             asked.add_done_callback(lambda task: task.cancelled() or task.exception())  # told below, or of no use
             self._confirming = asked if worker is confirmer else self._confirming

@@ -90,8 +90,13 @@ class Desk:
         """Prediction of the reduced operator with its bound."""
         return self._explorer.bounded(**values).summary()
 
-    def confirm(self, values: dict[str, float]) -> dict[str, Any]:
-        """Answer of the full operator."""
+    def displacements(self, values: dict[str, float]) -> np.ndarray:
+        """Displacements of the steady state of a point, from which another process finds it at once."""
+        return self._explorer.state(self._explorer.place(values)).q
+
+    def confirm(self, values: dict[str, float], near: list[float]) -> dict[str, Any]:
+        """Answer of the full operator, whose steady state is found from displacements near it."""
+        self._explorer.walk.settle(self._explorer.place(values), np.array(near))
         self._last = self._explorer.confirm(**values)
         return self._last.summary()
 
