@@ -54,6 +54,7 @@ def prepare() -> None:
         "OMPI_ALLOW_RUN_AS_ROOT": "1",
         "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1",
         "OMPI_MCA_plm": "isolated",
+        "OMPI_MCA_ess_singleton_isolated": "1",  # no daemon beside, which takes half a second to start
         "OMPI_MCA_btl_base_warn_component_unused": "0",
         "OMPI_MCA_btl_vader_single_copy_mechanism": "none",
         "PRTE_MCA_plm_ssh_agent": "false",

@@ -14,8 +14,8 @@ from ..errors import CaseError
 
 #: Colour bar below a figure, so that a narrow page keeps its width.
 COLOUR_BAR = {"orientation": "h", "y": -0.05, "yanchor": "top", "thickness": 12}
-#: Steps of a slider.
-STEPS = 400
+#: Steps of a slider; time for which it rests before more than the prediction is computed, s.
+STEPS, REST = 400, 0.25
 #: Numbers that an answer shows: title, entry of the state, factor and unit.
 NUMBERS = (
     ("Opening", "lip_opening", 1e3, "mm"),
@@ -144,6 +144,8 @@ class AskPanel:
         self.answers += 1
         self._status.text = f"answered in {seconds:.2f} s"
         self._status.props(f"data-answers={self.answers} data-seconds={seconds:.4f}")
+        if await self._is_moved_before(asyncio.create_task(asyncio.sleep(REST))):
+            return  # a slider that is being drawn is answered at once: what follows cannot be stopped at any moment
         for step, worker in (("bounded", predictor), ("confirm", confirmer), ("margin", confirmer)):
             if worker is confirmer and await self._is_moved_before(self._confirming):
                 return
