@@ -18,8 +18,7 @@ from typing import Any
 import numpy as np
 
 from eigen import FamilyReduction, ReducedFamily
-from eigen.columns import TOLERANCE
-from eigen.reduction import HELD
+from eigen.reduction import OPTIONS
 
 from .case.parameters import PARAMETERS, Mu
 from .errors import CaseError, SolveError
@@ -267,10 +266,10 @@ class Explorer:
             if self.interrupted():
                 return np.nan
             if enriched:
-                space = reduction.deeper(space, [place], HELD)
+                space = reduction.deeper(space, [place], OPTIONS.held)
                 self._space = reduction, space, corners
             bound = np.nan if self.interrupted() else reduction.error(space, [place])
-            if not bound > TOLERANCE:
+            if not bound > OPTIONS.tolerance:
                 break
         return bound
 

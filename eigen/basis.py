@@ -14,10 +14,8 @@ import scipy.sparse.linalg as spla
 from .factor import SingularShiftError, Workspace
 from .operator import CoupledPencil
 
-#: Squares of lengths that rounding leaves, relative to one.
-ROUNDING = 1e-15
-#: Negative squares of lengths, relative to one, beyond what rounding leaves.
-ALIKE = 1e-8
+#: Squares of lengths that rounding leaves, relative to one; negative ones beyond its root are more than that.
+ROUNDING = 4 * np.finfo(float).eps
 
 
 class NotPositiveError(ArithmeticError):
@@ -60,7 +58,7 @@ def outside(V: np.ndarray, mass, X: np.ndarray, least: float) -> np.ndarray:
         MX = mass @ X
         gram = X.T @ MX
         weight, turn = np.linalg.eigh(0.5 * (gram + gram.T))
-        if weight.min(initial=0.0) < -ALIKE:
+        if weight.min(initial=0.0) < -(ROUNDING**0.5):
             raise NotPositiveError
         keep = weight > threshold
         turn = turn[:, keep][:, ::-1] / np.sqrt(weight[keep][::-1])
@@ -210,8 +208,7 @@ class TransferBasis:
         self.V = np.zeros((pencil.n, 0))
         self._extend(pencil.M, vectors, ROUNDING**0.5)
         if pencil.m and self.V.shape[1] < pencil.n:
-            lowest = np.sqrt(max(np.abs(values).min(), 1e-12 * np.abs(values).max()))
-            factor = Workspace().factored_near(typical.replace(C=0.0 * pencil.M), (0.0, 0.1 * lowest, lowest))
+            factor = Workspace().factor_stiffness(typical.replace(C=0.0 * pencil.M))
             parts = [factor.solve(pencil.G.toarray()).real, factor.solve_transposed(pencil.J.toarray().T).real]
             self._extend(pencil.M, np.hstack([p / (np.linalg.norm(p) or 1.0) for p in parts]), compression)
 

@@ -14,18 +14,12 @@ from .count import Count
 from .factor import SingularShiftError, Workspace
 from .family import PencilFamily, ReducedFamily
 from .operator import CoupledPencil
-from .reduction import FamilyReduction
+from .reduction import OPTIONS, FamilyReduction
 from .search import leading_modes
 from .spectrum import Spectrum
 
-#: Estimated relative error of an eigenvalue above which a cell is treated directly.
-TOLERANCE = 1e-6
 #: How a cell was found.
 REDUCED, DIRECT, MISSING = 0, 1, 2
-#: Leading eigenvalues kept of a cell.
-KEPT = 8
-#: Leading modes searched for where the full operator is.
-SEARCHED = 6
 
 
 @dataclass(frozen=True)
@@ -52,7 +46,9 @@ class Cell:
         number = found.number if isinstance(found, Count) else found.counted
         certain = bool(certain and found.certain and len(listed))
         unstable = _unstable(values, found.line, found.band)
-        return cls(listed[:KEPT], Certificate(unstable, number, certain, float(found.line), float(found.band)), how)
+        return cls(
+            listed[: OPTIONS.kept], Certificate(unstable, number, certain, float(found.line), float(found.band)), how
+        )
 
 
 @dataclass(frozen=True)
@@ -77,7 +73,7 @@ class ReducedColumn:
 
     def eigenvalues(self, mu: Hashable) -> np.ndarray:
         """Leading eigenvalues at a parameter point, sorted by growth rate."""
-        return self.fine.leading(mu)[:KEPT]
+        return self.fine.leading(mu)[: OPTIONS.kept]
 
     def nearest(self, mu: Hashable, place: complex) -> complex:
         """Eigenvalue next to a place."""
@@ -139,16 +135,6 @@ class Column:
         return np.array([cell.how for cell in self.cells])
 
 
-#: Directions weaker than these are left out where two spaces are put together: at first, and where counts disagree.
-JOINT, CLOSE = 3e-3, 1e-5
-#: Points at least at which they are taken where the relaxations differ.
-LOSSES = 4
-#: Leading vectors taken at each point: where damping orders the modes, and for a band.
-MOST, MOST_IN_BAND = 4, 12
-#: Share of a band up to which eigenvalues are counted, clear of those at its end.
-INSIDE = 0.999
-
-
 class ColumnSolver:
     """Solves families of one pattern after another."""
 
@@ -208,19 +194,19 @@ class ColumnSolver:
         def count(counter, chosen, within_band=False):
             for i in chosen:
                 found = _counted(counter, points[i], leading[i], within_band)
-                cell = Cell.of(leading[i], values[i], found, model.error <= TOLERANCE, REDUCED)
+                cell = Cell.of(leading[i], values[i], found, model.error <= OPTIONS.tolerance, REDUCED)
                 if not within_band or cell.certificate.agrees:
                     counts[i], cells[i] = found, cell
             return [i for i in chosen if not cells[i].certificate.agrees]
 
         counted = _beside_changes(leading) if edges else range(len(points))
-        joint = model.error <= TOLERANCE and any(family.relaxation(points[i]) is not None for i in counted)
+        joint = model.error <= OPTIONS.tolerance and any(family.relaxation(points[i]) is not None for i in counted)
         doubtful = count(self._joint(first, fine) if joint else first, counted)
         if doubtful and joint and self._counter[1] is not fine:
             doubtful = count(self._joint(first, fine, anew=True), doubtful)
         if doubtful and joint:
             # a mode that is all but neutral has to be met to a fraction of its growth rate
-            doubtful = count(ReducedFamily(family, fine.V, CLOSE, base=first), doubtful, within_band=True)
+            doubtful = count(ReducedFamily(family, fine.V, OPTIONS.close, base=first), doubtful, within_band=True)
         for i in doubtful:
             try:
                 spectrum = self.direct(family, points[i])
@@ -235,10 +221,10 @@ class ColumnSolver:
         list rests on, of this column or of the one before at the same state, they are enough.
         """
         if anew or self._counter is None or self._counter[0] is not first:
-            self._counter = first, fine, ReducedFamily(first.family, fine.V, JOINT, base=first)
+            self._counter = first, fine, ReducedFamily(first.family, fine.V, OPTIONS.joint, base=first)
         return self._counter[2]
 
-    def direct(self, family: PencilFamily, mu: Hashable, count: int = SEARCHED) -> Spectrum:
+    def direct(self, family: PencilFamily, mu: Hashable, count: int = OPTIONS.searched) -> Spectrum:
         """Leading modes of the full operator.
 
         Raises
@@ -262,9 +248,11 @@ class ColumnSolver:
         for mu in points:
             key = family.structure(mu)
             if key not in known:
-                known[key] = certified_spectrum(family.at(mu), SEARCHED, family.search(mu), workspace=self._workspace)
+                known[key] = certified_spectrum(
+                    family.at(mu), OPTIONS.searched, family.search(mu), workspace=self._workspace
+                )
             listed, own = _modes_of(family, mu, known[key].spectrum).eigenvalues, known[key].certificate
-            cells.append(Cell(listed[:KEPT], replace(own, certain=own.certain and len(listed) > 0), DIRECT))
+            cells.append(Cell(listed[: OPTIONS.kept], replace(own, certain=own.certain and len(listed) > 0), DIRECT))
         return cells
 
     def _recounted(self, cells: list[Cell], family, points, chosen) -> list[Cell]:
@@ -276,16 +264,14 @@ class ColumnSolver:
                 continue
             mu = points[i]
             try:
-                found = certified_spectrum(family.at(mu), SEARCHED, family.search(mu), workspace=self._workspace)
+                found = certified_spectrum(
+                    family.at(mu), OPTIONS.searched, family.search(mu), workspace=self._workspace
+                )
             except (SingularShiftError, np.linalg.LinAlgError):
                 continue
             if len(found.spectrum):
-                cells[i] = Cell(found.spectrum.eigenvalues[:KEPT], found.certificate, DIRECT)
+                cells[i] = Cell(found.spectrum.eigenvalues[: OPTIONS.kept], found.certificate, DIRECT)
         return cells
-
-
-#: Leading modes that are found and corrected beside another operator.
-BESIDE = 6
 
 
 def cell_beside(reduction: FamilyReduction, mu: Hashable, error: float, safety: float) -> Cell:
@@ -303,7 +289,7 @@ def cell_beside(reduction: FamilyReduction, mu: Hashable, error: float, safety: 
     """
     family, model = reduction.family, reduction.coarse
     values = model.eigenvalues(mu)
-    places = family.reach(mu).leading(values)[:BESIDE]
+    places = family.reach(mu).leading(values)[: OPTIONS.beside]
     change = reduction.correction(model.near(mu, places), mu)
     leading = places + change
     doubt = np.maximum(np.abs(change), error * np.abs(leading)) / np.abs(leading.real)
@@ -327,22 +313,22 @@ def _accurate(reduction: FamilyReduction, points, snapshots: int, count: int):
     family = reduction.family
     losses = [0.0 if own is None else own.strengths.sum() for own in map(family.relaxation, points)]
     mixed = len(set(losses)) > 1
-    least = max(snapshots, LOSSES) if mixed else snapshots
+    least = max(snapshots, OPTIONS.losses) if mixed else snapshots
     for number in (least, 2 * least + 1, 4 * least + 3):
         places = spread(points, number)
         taken = [points[i] for i in places]
         first = reduction.first(taken)
-        most = max(MOST if first is reduction.coarse else MOST_IN_BAND, count)
+        most = max(OPTIONS.vectors if first is reduction.coarse else OPTIONS.band_vectors, count)
         checked = between(places)
         if mixed:  # few corrections leave most where most relaxes, and of the quick modes that lead where least does
             checked += [int(np.argmax(losses)), int(np.argmin(losses))]
         checked = [points[i] for i in checked]
         fine = reduction.fine(first, taken, most)
         error = reduction.error(fine, checked)
-        if error > TOLERANCE:
+        if error > OPTIONS.tolerance:
             fine = reduction.deeper(fine, taken, most)
             error = reduction.error(fine, checked)
-        if error <= TOLERANCE:
+        if error <= OPTIONS.tolerance:
             break
     return first, fine, error
 
@@ -362,7 +348,7 @@ def _counted(reduced: ReducedFamily, mu: Hashable, leading: np.ndarray, within_b
 def _counted_band(family: PencilFamily, mu: Hashable, within_band: bool = False) -> float:
     """Frequency up to which eigenvalues are counted, Hz."""
     whole = family.relaxation(mu) is not None and not within_band
-    return np.inf if whole else INSIDE * family.reach(mu).band / (2 * np.pi)
+    return np.inf if whole else OPTIONS.inside * family.reach(mu).band / (2 * np.pi)
 
 
 def _beside_changes(leading) -> np.ndarray:

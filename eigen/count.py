@@ -104,7 +104,7 @@ def unstable_count(
     >>> count.number, count.certain
     (1, True)
     """
-    scale = scale or _typical_frequency(pencil)
+    scale = scale or pencil.typical_frequency
     if structure is None:
         structure = Structure(pencil, counted_line(pencil, scale) if line is None else line)
     line, determinant = structure.line, Determinant(pencil, structure)
@@ -293,9 +293,3 @@ def counted_line(pencil: CoupledPencil, scale: float) -> float:
     relaxes = pencil.relaxation is not None and pencil.relaxation.strengths.any()
     undamped = (pencil.C.nnz == 0 or abs(pencil.C).max() == 0) and not relaxes
     return 1e-3 * scale if undamped else 0.0
-
-
-def _typical_frequency(pencil) -> float:
-    stiffness, inertia = np.abs(pencil.K.diagonal()), np.abs(pencil.M.diagonal())
-    value = np.sqrt(np.median(stiffness) / np.median(inertia)) if pencil.n else 1.0
-    return float(value) if np.isfinite(value) and value > 0 else 1.0

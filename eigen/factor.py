@@ -392,19 +392,19 @@ class Workspace:
         factor.refactor(structure.values(shift))
         return factor
 
-    def factored_near(self, pencil: CoupledPencil, shifts):
-        """LU of the structure at the first of some shifts at which it is regular.
+    def factor_stiffness(self, pencil: CoupledPencil):
+        """LU of the stiffness of an undamped structure; where that is singular a little inertia stands in.
 
         Raises
         ------
         SingularShiftError
-            If it is at none.
+            If it is singular with that, too.
         """
-        *others, last = shifts
-        for shift in others:
+        typical = pencil.typical_frequency
+        for share in (0.0, 1e-4):
             with suppress(SingularShiftError):
-                return self.factored(pencil, shift)
-        return self.factored(pencil, last)
+                return self.factored(pencil, share * typical)
+        return self.factored(pencil, 1e-3 * typical)
 
 
 class ShiftedPencil:

@@ -249,6 +249,13 @@ class CoupledPencil:
         return 0 if self.relaxation is None else self.relaxation.branches
 
     @property
+    def typical_frequency(self) -> float:
+        """Angular frequency of a typical unknown by itself, rad/s; 1 where there is none."""
+        stiffness, inertia = np.abs(self.K.diagonal()), np.abs(self.M.diagonal())
+        value = np.sqrt(np.median(stiffness) / np.median(inertia)) if self.n else 1.0
+        return float(value) if np.isfinite(value) and value > 0 else 1.0
+
+    @property
     def relaxing(self) -> tuple[sp.csr_matrix, ...]:
         """Parts K_g of the stiffness that relax."""
         return () if self.relaxation is None else self.relaxation.matrices

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import weakref
 from collections.abc import Hashable, Iterator
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -20,29 +21,68 @@ from .factor import Workspace
 from .family import Pairs, PencilFamily, ReducedFamily
 from .operator import CoupledPencil, Relaxation
 
-#: Frequencies, rad/s, whose inertia stands in where a stiffness is singular.
-SINGULAR = (0.0, 20.0, 100.0)
-#: Leading modes whose error a reduced model is held to.
-HELD = 2
-#: Static corrections below this share of the largest are left out of the first space.
-COMPRESSION = 1e-4
-#: Share of the floor down to which vectors are taken into the second space.
-SNAPSHOT = 0.75
-#: Share of a vector corrected again that the second space lacks, below which it is left out.
-DEEPER = 1e-5
-#: Lowest motions of which a typical frequency is taken.
-TYPICAL = 8
-#: Low motions that inertia corrections are made for.
-MOTIONS = 20
-#: Corrections of a vector where parts of the stiffness relax: one leaves 1e-6 of an eigenvalue, two 1e-8, and more do
-#: not converge, since the inertia is left out of them.
-CORRECTIONS = 2
-#: Lowest motions of the structure taken where a band is searched.
-LOWEST = 24
-#: Further motions that the lowest ones are found with, and steps at most.
-GUARD, REFINED = 6, 8
-#: Relative change of their squares that ends them, a hundred times their error; and of a motion that has nothing new.
-SETTLED, SAME = 1e-6, 1e-10
+
+@dataclass(frozen=True)
+class ReductionOptions:
+    """Sizes of reduced spaces, and how far they are trusted; found by trying on valves with few and many modes.
+
+    Attributes
+    ----------
+    tolerance : float
+        Estimated relative error of an eigenvalue above which a space is enriched, and cells use the full operator.
+    held : int
+        Leading modes whose error a space is held to.
+    compression : float
+        Share of the largest below which static corrections are left out of the first space.
+    inertia_modes : int
+        Low motions that inertia corrections are made for.
+    band_modes : int
+        Lowest motions of the structure in the first space where a band is searched.
+    vectors, band_vectors : int
+        Leading vectors taken at each point: where damping orders the modes, and for a band.
+    snapshot : float
+        Share of the floor of growth rates down to which vectors are taken.
+    weak, deeper : float
+        Shares of a vector that the second space lacks, below which it is left out: at first, and corrected again.
+    corrections : int
+        Corrections of a vector where parts of the stiffness relax: one leaves 1e-6 of an eigenvalue, two 1e-8, and more
+        do not converge, since the inertia is left out of them.
+    typical_modes : int
+        Lowest motions of which a typical frequency is taken.
+    losses : int
+        Points at least at which vectors are taken where the relaxations differ.
+    joint, close : float
+        Directions weaker than these are left out of the space of a count: at first, and where counts disagree.
+    beside : int
+        Leading modes that are found and corrected beside another operator.
+    inside : float
+        Share of a band up to which eigenvalues are counted, clear of those at its end.
+    searched, kept : int
+        Leading modes searched for with the full operator, and kept of a cell.
+    """
+
+    tolerance: float = 1e-6
+    held: int = 2
+    compression: float = 1e-4
+    inertia_modes: int = 20
+    band_modes: int = 24
+    vectors: int = 4
+    band_vectors: int = 12
+    snapshot: float = 0.75
+    weak: float = 3e-7
+    deeper: float = 1e-5
+    corrections: int = 2
+    typical_modes: int = 8
+    losses: int = 4
+    joint: float = 3e-3
+    close: float = 1e-5
+    beside: int = 6
+    inside: float = 0.999
+    searched: int = 6
+    kept: int = 8
+
+
+OPTIONS = ReductionOptions()
 
 
 class FamilyReduction:
@@ -55,15 +95,23 @@ class FamilyReduction:
         Keep the symbolic factorisation between families of one pattern: of the stiffness, and of that which a typical
         motion sees where parts of it relax.
 
+    options : ReductionOptions
+
     Raises
     ------
     SingularShiftError
         If the stiffness is singular.
     """
 
-    def __init__(self, family: PencilFamily, static: Workspace | None = None, stiffened: Workspace | None = None):
-        self.family = family
-        self.solver = (static or Workspace()).factored_near(self._elastic(family.stiffness), SINGULAR)
+    def __init__(
+        self,
+        family: PencilFamily,
+        static: Workspace | None = None,
+        stiffened: Workspace | None = None,
+        options: ReductionOptions = OPTIONS,
+    ):
+        self.family, self.options = family, options
+        self.solver = (static or Workspace()).factor_stiffness(self._elastic(family.stiffness))
         self._workspace, self._stiffened = stiffened or Workspace(), (None, None)
         #: Of a family next to another one: frequency, shares and solver of that.
         self._beside: tuple | None = None
@@ -82,18 +130,20 @@ class FamilyReduction:
             self.solver.solve(family.forces.toarray()),
             self.solver.solve_transposed(family.slope.toarray().T.copy()),
         ]
-        first, inertia = orthonormal(family.mass, np.hstack(still), COMPRESSION, passes=1)
+        first, inertia = orthonormal(family.mass, np.hstack(still), self.options.compression, passes=1)
         # one step of subspace iteration on the lowest motions found there
         stiffness = first.T @ (family.stiffness @ first)
-        lowest = la.eigh(0.5 * (stiffness + stiffness.T), subset_by_index=(0, min(MOTIONS, first.shape[1]) - 1))[1]
+        lowest = la.eigh(
+            0.5 * (stiffness + stiffness.T), subset_by_index=(0, min(self.options.inertia_modes, first.shape[1]) - 1)
+        )[1]
         moving = self.solver.solve(inertia @ lowest)
-        return ReducedFamily(family, np.hstack([first, moving]), COMPRESSION)
+        return ReducedFamily(family, np.hstack([first, moving]), self.options.compression)
 
     @cached_property
     def wide(self) -> ReducedFamily:
         """First stage with the lowest motions of the structure itself, for bands that damping does not end."""
-        lowest = lowest_modes(self._elastic(self.family.stiffness), LOWEST)[1]
-        return ReducedFamily(self.family, np.hstack([lowest, self.coarse.V]), COMPRESSION)
+        lowest = lowest_modes(self._elastic(self.family.stiffness), self.options.band_modes)[1]
+        return ReducedFamily(self.family, np.hstack([lowest, self.coarse.V]), self.options.compression)
 
     def first(self, points) -> ReducedFamily:
         """First stage for some parameter points: with the lowest motions where all modes of a band are close to
@@ -108,8 +158,8 @@ class FamilyReduction:
         `mu` is a parameter point of this one whose relaxation is that of both by and large.
         """
         other = object.__new__(FamilyReduction)
-        other.family, other.solver = family, self.solver
-        other.coarse = other.wide = ReducedFamily(family, space, COMPRESSION)
+        other.family, other.solver, other.options = family, self.solver, self.options
+        other.coarse = other.wide = ReducedFamily(family, space, self.options.compression)
         relaxation = self.family.relaxation(mu)
         other._beside = () if relaxation is None else (*self._typical(mu), self._stiffened_by(relaxation, mu))
         family.model = weakref.ref(other)
@@ -119,25 +169,26 @@ class FamilyReduction:
         """Lowest frequencies of the undamped symmetric structure, Hz, ascending, as the function of that name has them;
         none where the first stage does not lead to them.
         """
-        family, coarse = self.family, self.coarse
+        family, coarse, guard = self.family, self.coarse, 6
         squares, turn = la.eigh(0.5 * (coarse.stiffness + coarse.stiffness.T))
-        order = np.argsort(np.abs(squares))[: count + GUARD]  # those next to zero, as shift and invert finds them
+        order = np.argsort(np.abs(squares))[: count + guard]  # those next to zero, as shift and invert finds them
         if self._beside is not None:
             return np.sqrt(np.maximum(np.sort(squares[order][:count]), 0.0)) / (2 * np.pi)
         X, squares = coarse.V @ turn[:, order], squares[order]
         symmetric = ((family.stiffness + family.stiffness.T) * 0.5).tocsr()
         KX, MX = symmetric @ X, family.mass @ X
-        for _ in range(REFINED):
+        for _ in range(8):
             known = squares[:count]
             X = np.hstack([X, self.solver.solve((KX - MX * squares)[:, :count])])
-            X, MX = orthonormal(family.mass, X, SAME)
+            X, MX = orthonormal(family.mass, X, 1e-10)
             KX = symmetric @ X
             squares, turn = la.eigh(X.T @ KX)
-            order = np.argsort(np.abs(squares))[: count + GUARD]
+            order = np.argsort(np.abs(squares))[: count + guard]
             squares, turn = squares[order], turn[:, order]
             X, KX, MX = X @ turn, KX @ turn, MX @ turn
             found = squares[:count]
-            if known.size == found.size and (np.abs(found - known) <= SETTLED * np.abs(found)).all():
+            # their change is a hundred times their error
+            if known.size == found.size and (np.abs(found - known) <= 1e-6 * np.abs(found)).all():
                 return np.sort(np.sqrt(np.maximum(found, 0.0))) / (2 * np.pi)
         return np.zeros(0)
 
@@ -167,7 +218,7 @@ class FamilyReduction:
         if relaxation is not None:
             frequency, share = self._typical(points[0])
             typical = 1.0 + share @ relaxation.factors(1j * frequency).real
-            solver, passes = self._stiffened_by(relaxation, points[0]), CORRECTIONS
+            solver, passes = self._stiffened_by(relaxation, points[0]), self.options.corrections
         for pairs, mu in zip(several, points):
             below = 1.0 + pairs.values * self.family.rayleigh(mu)[1]
             relaxed = 0.0 if relaxation is None else share @ relaxation.factors(pairs.values)
@@ -191,7 +242,7 @@ class FamilyReduction:
             return self._beside[:2]
         coarse = self.coarse
         squares = la.eigvalsh(0.5 * (coarse.stiffness + coarse.stiffness.T))
-        low = squares[squares > 0][:TYPICAL]
+        low = squares[squares > 0][: self.options.typical_modes]
         frequency = float(np.exp(0.5 * np.log(low).mean())) if low.size else 1.0
         return frequency, np.array([m.diagonal().sum() for m in coarse.relaxation(mu).matrices]) / squares.sum()
 
@@ -202,23 +253,23 @@ class FamilyReduction:
         if self._stiffened[0] is not relaxation:
             factors = relaxation.factors(1j * self._typical(mu)[0]).real
             stiffness = self.family.stiffness + sum(x * m for x, m in zip(factors, relaxation.matrices))
-            self._stiffened = relaxation, self._workspace.factored_near(self._elastic(stiffness), SINGULAR)
+            self._stiffened = relaxation, self._workspace.factor_stiffness(self._elastic(stiffness))
         return self._stiffened[1]
 
-    def fine(self, first: ReducedFamily, points, most: int = 4) -> ReducedFamily:
+    def fine(self, first: ReducedFamily, points, most: int) -> ReducedFamily:
         """Second stage: a space made of the corrected leading vectors of a first one at some parameter points."""
         columns = self._corrected_leading(first, points, most)
         # where nothing leads anywhere there is nothing to be found better
-        return ReducedFamily(self.family, columns, 3e-7) if columns.shape[1] else first
+        return ReducedFamily(self.family, columns, self.options.weak) if columns.shape[1] else first
 
-    def deeper(self, fine: ReducedFamily, points, most: int = 4) -> ReducedFamily:
+    def deeper(self, fine: ReducedFamily, points, most: int) -> ReducedFamily:
         """A second stage made wider by its own leading vectors, corrected once more.
 
         What the first space has by too little is corrected by too little at once: an error of 1e-2 of its vectors
         leaves 1e-5 of an eigenvalue however many points they come from.
         """
         columns = self._corrected_leading(fine, points, most)
-        return ReducedFamily(self.family, columns, DEEPER, base=fine) if columns.shape[1] else fine
+        return ReducedFamily(self.family, columns, self.options.deeper, base=fine) if columns.shape[1] else fine
 
     def leading_vectors(self, mu: Hashable, most: int) -> np.ndarray:
         """Right and left leading vectors at a parameter point, corrected with the full matrices, real and imaginary
@@ -232,7 +283,7 @@ class FamilyReduction:
         """Right and left leading vectors of a reduced model at some points, corrected with the full matrices, real and
         imaginary parts side by side.
         """
-        several = [model.pairs(mu, most, SNAPSHOT) for mu in points]
+        several = [model.pairs(mu, most, self.options.snapshot) for mu in points]
         corrected = self._corrected(several, points)
         return np.hstack([part for both in corrected for x in both for part in (x.real, x.imag)])
 
@@ -257,13 +308,13 @@ class FamilyReduction:
         top = times(*own, here) - times(*own, there) * times(added[1], none, here) / both
         return -top / times(*own, T.apply_derivative(pairs.values, pairs.q, pairs.u))
 
-    def error(self, model: ReducedFamily, points, most: int = HELD) -> float:
+    def error(self, model: ReducedFamily, points, most: int | None = None) -> float:
         """Largest relative change of leading eigenvalues of a reduced model under a correction with the full matrices,
         at some points.
         """
         worst = 0.0
         for mu in points:
-            pairs = model.pairs(mu, most)
+            pairs = model.pairs(mu, most or self.options.held)
             change = np.abs(self.correction(pairs, mu)) / np.maximum(np.abs(pairs.values), 1.0)
             worst = max(worst, float(change.max(initial=0.0)))
         return worst

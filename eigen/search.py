@@ -131,10 +131,8 @@ def first_shift(pencil, aim, options, workspace) -> float:
     if options.max_frequency is not None:
         # close to the band its eigenvalues lie well apart; next to a limit point the disc has to stay flat
         return (0.75 if options.limit_point is None else 1.5) * 2 * np.pi * options.max_frequency
-    stiffness, inertia = np.abs(pencil.K.diagonal()), np.abs(pencil.M.diagonal())
-    typical = np.sqrt(np.median(stiffness + 1e-300) / np.median(inertia + 1e-300))
-    probe = 1e-3 * typical if np.isfinite(typical) and typical > 0 else 1.0
-    lowest = probe
+    typical = pencil.typical_frequency
+    lowest = probe = 1e-3 * typical
     for _ in range(3):  # inverse power iteration on the structure with M at the shift
         try:
             factor = workspace.factored(pencil, probe)
