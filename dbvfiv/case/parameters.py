@@ -49,7 +49,7 @@ class Parameter:
     design : bool
         Whether the model is built anew for each value.
     system_name : str
-        Its name in `dbvfiv.model.system.ValveSystem`; its own where not given, none for parameters of the design.
+        Its name in `dbvfiv.model.forms.ValveForms`; its own where not given, none for parameters of the design.
     """
 
     name: str
@@ -150,7 +150,7 @@ _TABLE = (
 PARAMETERS = {row.name: row for row in _TABLE}
 #: Names of those along which modes are tracked.
 SWEPT = tuple(row.name for row in _TABLE if row.swept)
-#: Names in `dbvfiv.model.system.ValveSystem` of those of load and surroundings, for which no model is built anew.
+#: Names in `dbvfiv.model.forms.ValveForms` of those of load and surroundings, for which no model is built anew.
 SYSTEM_NAMES = tuple(row.system_name for row in _TABLE if not row.design)
 #: Names of those that leave the steady state as it is.
 SURROUNDINGS = tuple(row.name for row in _TABLE if row.surrounding)
@@ -236,7 +236,7 @@ class Mu(Mapping[str, float]):
         return {name: value for name, value in self._values.items() if name in DESIGN}
 
     def for_system(self) -> dict[str, float]:
-        """Parameters by the names of `dbvfiv.model.system.ValveSystem`, 0 for what the valve does not have."""
+        """Parameters by the names of `dbvfiv.model.forms.ValveForms`, 0 for what the valve does not have."""
         own = {PARAMETERS[name].system_name or name: value for name, value in self._values.items() if name != OUTSIDE}
         return dict.fromkeys(SYSTEM_NAMES, 0.0) | own
 

@@ -14,8 +14,6 @@ Equation (T.15) of docs/theory.md.
 
 from __future__ import annotations
 
-from functools import partial
-
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -94,45 +92,13 @@ class ValveResidual:
             out[self._forces] += density * self._added(motion[0], motion[2])
         return out
 
-    def second(self, motion, parameters, a, b) -> np.ndarray:
-        """Second directional derivative (n + l,) along two motions."""
-        self._check_at_rest(motion)
-        motion, parameters = self._shaped(motion), self._given(parameters)
-        a, b = self._shaped(a), self._shaped(b)
-        out = self._remainder_form(motion, parameters, a, b)
-        form = partial(_form, self._own_form, motion[0])
-        # form(a0, b0) + beta (form(a0, b1) + form(a1, b0)), in one evaluation where one of the motions has no velocity
-        beta = parameters["beta"]
-        out[self._forces] += form(a[0] + beta * a[1], b[0] + beta * b[1]) - beta**2 * form(a[1], b[1])
-        return out
-
-    def third(self, motion, parameters, a, b, c) -> np.ndarray:
-        """Third directional derivative (n + l,) along three motions."""
-        self._check_at_rest(motion)
-        motion, parameters = self._shaped(motion), self._given(parameters)
-        a, b, c = self._shaped(a), self._shaped(b), self._shaped(c)
-        out = self._remainder_form(motion, parameters, a, b, c)
-        form = partial(_form, self._own_form, motion[0])
-        beta = parameters["beta"]
-        out[self._forces] += form(a[0], b[0], c[0] + beta * c[1]) + beta * (
-            form(a[0], b[1], c[0]) + form(a[1], b[0], c[0])
-        )
-        return out
-
-    def _own_form(self, q, *directions) -> np.ndarray:
-        """Derivative (n,) along two or three directions of the force of shell and weight."""
-        model = self.model
-        own = (model.shell.second if len(directions) == 2 else model.shell.third)(q, *directions)
-        return own if model.weight is None else own + model.weight.form(model.shell, q, *directions)
-
     def remainder_form(self, motion, parameters, *directions) -> np.ndarray:
-        """Directional derivative (n + l,), along two or three motions, of all but the shell's own force."""
+        """Directional derivative (n + l,), along two or three motions, of all but the force of
+        shell and weight and its damping; with contact and the added mass of fluid outside.
+        """
         self._check_at_rest(motion)
         motion, parameters = self._shaped(motion), self._given(parameters)
-        return self._remainder_form(motion, parameters, *map(self._shaped, directions))
-
-    def _remainder_form(self, motion, parameters, *directions) -> np.ndarray:
-        """Form (n + l,) as `remainder_form` for motions in shape, with contact and the added mass of fluid outside."""
+        directions = tuple(map(self._shaped, directions))
         out = np.array(_form_of_remainder(motion, parameters, directions, self._arrays))
         if self.model.contact is not None:
             out[self._forces] += self.model.contact.form(motion[0], *(direction[0] for direction in directions))
@@ -173,13 +139,6 @@ class ValveResidual:
     def _check_at_rest(motion) -> None:
         if np.any(motion[1]):
             raise ValueError("Multilinear forms are taken about a steady state: the velocities must vanish.")
-
-
-def _form(form, q, *directions):
-    """A multilinear form of the structure, which dominates the costs; rates of velocity, for instance, have no part in
-    it.
-    """
-    return form(q, *directions) if all(np.any(direction) for direction in directions) else 0.0
 
 
 def _expand(values, arrays):

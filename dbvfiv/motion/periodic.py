@@ -40,7 +40,7 @@ class PeriodicValve:
     Parameters
     ----------
     rebuild : callable
-        From parameters mu, by the names of `dbvfiv.model.system.ValveSystem`, to the model for them.
+        From parameters mu, by the names of `dbvfiv.model.forms.ValveForms`, to the model for them.
 
     Raises
     ------

@@ -20,12 +20,11 @@ from ..case.parameters import PARAMETERS, Mu
 from ..errors import SolveError
 from ..flow.stepping import MovingFluid
 from ..model import ValveModel
-from ..model.memory_forms import ValveMemoryForms
+from ..model.forms import ValveForms
 from ..model.state import LipCentre
-from ..model.system import ValveSystem
 from ..motion.periodic import PeriodicValve
 from .case import Case
-from .stability.place import rebuilder
+from .stability.place import models_of
 from .stability.walk import StabilityWalk
 
 #: Leading modes of which the basis of the corrections is made at the start.
@@ -86,7 +85,7 @@ class Orbit:
     ----------
     model : ValveModel
     mu : dict
-        Parameters by the names of `dbvfiv.model.system.ValveSystem`.
+        Parameters by the names of `Mu.for_system`.
     motion : PeriodicMotion
     """
 
@@ -210,8 +209,7 @@ class Follower:
 
     def __init__(self, case: Case, walk: StabilityWalk, place: Mu, parameter: str, spectrum):
         self.case, self.walk, self.place, self.parameter = case, walk, place, parameter
-        system = ValveSystem(walk.built(Mu.of(case)).model, rebuilder(case))
-        self.system = PeriodicValve(system.model, place.for_system())
+        self.system = PeriodicValve(models_of(case, walk.built(Mu.of(case)).model), place.for_system())
         self.solver = CycleSolver(self.system, _basis(self.system, spectrum))
         self.name = PARAMETERS[parameter].system_name or parameter
         model = self.system.model(place.for_system())
@@ -258,7 +256,7 @@ class Follower:
             If the mode does not move the middle of the lips.
         """
         mu, n = onset.place.for_system(), self.system.size - self.system.inner
-        forms = _AtRest(ValveMemoryForms(self.system.model(mu), self.walk.equilibrium(onset.place), mu))
+        forms = _AtRest(ValveForms(self.system.model(mu), self.walk.equilibrium(onset.place), mu))
         weight = np.append(np.ones(n), np.full(self.system.inner, self.system.flow_weight))
         row, rest = np.zeros(self.system.size), forms.rest[self.lip]
         row[self.lip] = 1.0
@@ -352,7 +350,7 @@ class Follower:
 class _AtRest:
     """Steady state of a valve with the unknowns of its periodic motions: velocities are none of them."""
 
-    def __init__(self, forms: ValveMemoryForms):
+    def __init__(self, forms: ValveForms):
         self.pencil, self.slope = forms.pencil, forms.slope
         self.rest = np.concatenate([forms.q, forms.rest[2 * len(forms.q) :]])
 

@@ -11,7 +11,6 @@ from dbvfiv.model import linearise
 from dbvfiv.model.equilibria import LoadPath, SteadyOptions
 from dbvfiv.model.newton import NewtonOptions
 from dbvfiv.model.residual import ValveResidual
-from dbvfiv.model.system import ValveSystem
 from dbvfiv.motion.equations import ValveMotion
 from dbvfiv.motion.scheme import scheme
 from dbvfiv.motion.state import consistent_state
@@ -50,73 +49,8 @@ def settled(request, make_model):
 
 def test_the_steady_state_is_one_of_the_equations_of_motion(settled):
     model, q = settled
-    system = ValveSystem(model)
-    u = system.state(q, MU)
-    assert system.size == 2 * model.size + model.flow.inner
-    assert np.abs(system.residual(u, MU)).max() < 1e-8 * PRESSURE
-    assert system.parameters == (*model.flow.names, "alpha", "beta")
-
-
-def difference(function, step):
-    f = [function(k * step) for k in (-2, -1, 1, 2)]
-    return (f[0] - 8 * f[1] + 8 * f[2] - f[3]) / (12 * step)
-
-
-def directions(system, u, number):
-    """Smooth directions that all unknowns take part in; the flow's by their own size."""
-    generator, n = np.random.default_rng(6), (system.size - len(system.split(u)[2])) // 2
-    for _ in range(number):
-        yield np.concatenate(
-            [
-                1e-3 * generator.standard_normal(n),
-                np.zeros(n),
-                0.1 * np.abs(u[2 * n :]) * generator.standard_normal(len(u) - 2 * n),
-            ]
-        )
-
-
-def opened(model, q):
-    """Away from the equilibrium, opened so far that no stop changes sides."""
-    nodal = model.nodal(q)
-    nodal[:, 1] += 0.02 * np.clip(1 - model.mesh.nodes[:, 2] / 0.49, 0, 1) ** 2
-    return model.shell.dofs.restrict(nodal)
-
-
-def test_linearisation_and_forms_against_differences(settled):
-    model, q = settled
-    system = ValveSystem(model)
-    q = opened(model, q)
-    u = system.state(q, MU)
-    a, b = directions(system, u, 2)
-    blocks = [slice(0, model.size), slice(model.size, 2 * model.size), slice(2 * model.size, None)]
-    linear = system.linear(u, MU)
-    for found, expected, tolerance in (
-        (linear.matvec(a), difference(lambda h: system.residual(u + h * a, MU), 1e-3), 1e-6),
-        (system.d2(u, MU, a, b), difference(lambda h: system.linear(u + h * b, MU).matvec(a), 1e-3), 1e-5),
-        (system.mass_d(u, MU, b, a), difference(lambda h: system.linear(u + h * a, MU).mass_matvec(b), 1e-3), 1e-5),
-    ):
-        for block in blocks:
-            scale = np.abs(expected[block]).max(initial=0.0)
-            assert np.abs(found[block] - expected[block]).max(initial=0.0) <= tolerance * scale + 1e-12
-    for name in model.flow.names:
-        known = model.flow.values(MU)[name]
-        step = 1e-3 * known
-        slope = difference(lambda h: system.residual(u, MU | {name: known + h}), step)
-        rounding = 1e-14 * np.abs(model.structure(q)[0]).max() / step  # of forces, which some parameters do not move
-        found = system.d_parameter(u, MU, name)
-        assert found == pytest.approx(slope, rel=1e-6, abs=1e-8 * np.abs(slope).max() + rounding)
-
-
-@pytest.mark.slow
-def test_third_derivatives_with_three_unknowns(make_model):
-    model = with_law(make_model, "vessel")
-    system = ValveSystem(model)
-    u = system.state(opened(model, model.rest()), MU)
-    a, b = directions(system, u, 2)
-    expected = difference(lambda h: system.d2(u + h * b, MU, a, b), 1e-3)
-    found = system.d3(u, MU, a, b, b)
-    for block in (slice(0, 2 * model.size), slice(2 * model.size, None)):
-        assert np.abs(found[block] - expected[block]).max() <= 1e-4 * np.abs(expected[block]).max()
+    zero, inner = np.zeros(model.size), model.flow.steady_inner(model.rows.areas(model.nodal(q)), MU)
+    assert np.abs(ValveResidual(model).value((q, zero, zero, inner, np.zeros_like(inner)), MU)).max() < 1e-8 * PRESSURE
 
 
 def test_modes_satisfy_the_equations_of_motion(settled):

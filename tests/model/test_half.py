@@ -6,19 +6,21 @@ import numpy as np
 import pytest
 import scipy.sparse as sp
 
+from continuation.normal_form import Motion
 from dbvfiv.case.parameters import Mu
 from dbvfiv.case.part import HALF, QUARTER
 from dbvfiv.exchange.bodies import WallFaces, shape_of
 from dbvfiv.exchange.files import triangulated
 from dbvfiv.model.classes import linearise_class
-from dbvfiv.model.residual import ValveResidual
+from dbvfiv.model.forms import ValveForms
 from dbvfiv.model.symmetry import HALF_SYMMETRIES, SYMMETRIES
 from dbvfiv.motion.start import steady_positions
 from dbvfiv.record.mesh import MeshData, WholeValve
 from eigen.search import leading_modes
 from tests.model.test_coupled_tangent import difference, direction_of
+from tests.model.test_flow_laws import MU
+from tests.model.test_residual_forms import check, motions
 from tests.model.test_residual_forms import difference as mixed_difference
-from tests.model.test_residual_forms import motions
 from tests.small_valves import find_open_state, make_valve
 
 PRESSURE = 12e3
@@ -216,13 +218,7 @@ def test_tangent_of_a_flat_bottom_against_differences(flat, flat_state):
 
 @pytest.mark.slow
 def test_second_derivatives_of_a_flat_bottom(flat, flat_state):
-    residual, still = ValveResidual(flat), np.zeros(flat.size)
-    speed = flat.flow.inlet_velocity(flat.rows.areas(flat.nodal(flat_state)), 4e3, 10.0)
-    about = (flat_state, still, still, speed, 0.0)
-    parameters = {"inlet": 4e3, "density": 10.0, "alpha": 2.0, "beta": 0.003, "storage": 1.0}
+    forms = ValveForms(flat, flat_state, MU | {"inlet": 4e3, "storage": 1.0})
     # of motions ten times smaller than those of the quarter's check: the lips of this state stand nearer to their stops
-    directions = [tuple(0.1 * np.asarray(x) for x in motion) for motion in motions(residual, 2)]
-    exact = residual.second(about, parameters, *directions)
-    found = mixed_difference(residual, about, parameters, directions)
-    assert exact[:-1] == pytest.approx(found[:-1], abs=1e-3 * np.abs(found[:-1]).max())
-    assert exact[-1] == pytest.approx(found[-1], rel=1e-3)
+    directions = [Motion(motion.rate, 0.1 * motion.vector) for motion in motions(forms, 2)]
+    check(forms, forms.second(*directions).real, mixed_difference(forms, directions, forms.mu), 1e-3)

@@ -8,11 +8,9 @@ import numpy as np
 import pytest
 
 from dbvfiv.case.parameters import Mu
-from dbvfiv.errors import SolveError
 from dbvfiv.materials.prony import Prony
 from dbvfiv.model import ValveModel, linearise
 from dbvfiv.model.build import build_section
-from dbvfiv.model.system import ValveSystem
 from dbvfiv.shell import Section
 from dbvfiv.studies.case import thesis_case
 
@@ -79,26 +77,3 @@ def test_a_system_has_the_same_pencil(valve, state):
     assert np.array_equal(found.relaxation.strengths, expected.relaxation.strengths)
     assert all(abs(a - b).max() == 0.0 for a, b in zip(found.relaxing, expected.relaxing))
     assert abs(found.K - expected.K).max() < 1e-12 * abs(expected.K).max()
-
-
-@pytest.mark.slow
-def test_a_system_refuses_what_needs_its_memory(valve, state, one_sentence):
-    system, n = ValveSystem(valve), valve.size
-    mu = {"inlet": 6e3, "density": 10.0, "alpha": 5.0, "beta": 0.0, "loss_factor": 1.0}
-    u = system.state(state.q, mu)
-    still, moving = np.zeros(len(u)), np.zeros(len(u))
-    still[:n], moving[n : 2 * n] = 1e-3, 1e-3
-    assert np.array_equal(system.residual(u, mu), system.residual(u, mu | {"loss_factor": 0.0}))
-    assert np.isfinite(system.d2(u, mu, still, still)).all()
-    linear = system.linear(u, mu)
-    x = linear.solve(system.residual(u, mu))
-    assert np.allclose(linear.matvec(x), system.residual(u, mu), atol=1e-8 * np.abs(system.residual(u, mu)).max())
-    for ask in (
-        lambda: system.residual(u + moving, mu),
-        lambda: system.d2(u, mu, still, moving),
-        lambda: linear.shifted(10j),
-    ):
-        with pytest.raises(SolveError) as refused:
-            ask()
-        assert one_sentence(str(refused.value))
-    system.residual(u + moving, mu | {"loss_factor": 0.0})

@@ -1,78 +1,91 @@
-"""Second and third derivatives of the coupled residual against differences of its value, about a steady state with
-damping and both continuity laws.
+"""Forms of the coupled residual for motions that grow at given rates against differences of its value, under flow laws
+of none, one and three unknowns and with terms.
 """
+
+from __future__ import annotations
 
 import itertools
 
 import numpy as np
 import pytest
 
-from dbvfiv.model import ValveModel
+from continuation.normal_form import Motion
+from dbvfiv.model.forms import ValveForms
 from dbvfiv.model.residual import ValveResidual
-from dbvfiv.studies.case import thesis_case
-from tests.small_valves import EVEN
 
-STEPS = {2: 1e-3, 3: 1e-2}
+from .test_flow_laws import LAWS, MU, with_law
 
-
-@pytest.fixture(scope="module")
-def residual():
-    return ValveResidual(
-        ValveModel(thesis_case(["mesh.around=6", "mesh.along=8", *(f"{key}={value}" for key, value in EVEN.items())]))
-    )
+STEPS = {1: 1e-3, 2: 1e-3, 3: 1e-2}
 
 
-@pytest.fixture(scope="module")
-def about(residual):
-    model = residual.model
+@pytest.fixture(
+    scope="module", params=[law if law == "terms" else pytest.param(law, marks=pytest.mark.slow) for law in LAWS]
+)
+def forms(request, make_model):
+    """Away from an equilibrium, open wide, so that no stop is near; lips of even walls."""
+    model = with_law(make_model, request.param)
     nodal = np.zeros((len(model.mesh.nodes), 5))
-    # open wide, so that no stop is near
     nodal[:, 1] = 0.02 * np.clip(1 - model.mesh.nodes[:, 2] / 0.49, 0, 1) ** 2
-    zero = np.zeros(model.size)
-    return model.shell.dofs.restrict(nodal), zero, zero, 1.3, 0.0
+    return ValveForms(model, model.shell.dofs.restrict(nodal), MU)
 
 
-@pytest.fixture(scope="module", params=[0.0, 1.0], ids=["quasi-steady", "storage"])
-def parameters(request):
-    return {"inlet": 4e3, "density": 10.0, "alpha": 2.0, "beta": 0.003, "storage": request.param}
+def joined(forms, motion):
+    """Displacements, velocities, accelerations, flow unknowns and their rates of a motion at its first instant."""
+    q, inner = np.split(motion.vector, [forms.model.size])
+    s = motion.rate
+    return q, s * q, s * s * q, inner, s * inner
 
 
-def motions(residual, number):
-    """Smooth motions with displacements, velocities and accelerations, of sizes that all terms notice."""
-    n = residual.model.size
-    random = np.random.default_rng(5)
-    return [
-        (random.normal(size=n) * 1e-3, random.normal(size=n), random.normal(size=n), random.normal(), random.normal())
-        for _ in range(number)
-    ]
+def at_rest(forms):
+    n = forms.model.size
+    zero, inner = np.zeros(n), forms.rest[2 * n :]
+    return forms.q, zero, zero, inner, np.zeros_like(inner)
 
 
-def difference(residual, about, parameters, directions):
+def motions(forms, number):
+    """Smooth motions that grow at real rates, of sizes that all terms notice."""
+    n, inner, random = forms.model.size, forms.rest[2 * forms.model.size :], np.random.default_rng(5)
+    for rate in (300.0, -200.0, 500.0)[:number]:
+        yield Motion(rate, np.concatenate([1e-3 * random.normal(size=n), 0.1 * inner * random.normal(size=len(inner))]))
+
+
+def difference(forms, directions, mu=MU):
     """Mixed central difference along all directions."""
-    total, step = 0.0, STEPS[len(directions)]
+    residual, total, step = ValveResidual(forms.model), 0.0, STEPS[len(directions)]
     for signs in itertools.product((-1, 1), repeat=len(directions)):
-        place = list(about)
+        place = list(at_rest(forms))
         for sign, direction in zip(signs, directions):
-            place = [x + sign * step * d for x, d in zip(place, direction)]
-        total = total + np.prod(signs) * residual.value(tuple(place), parameters)
+            place = [x + sign * step * d for x, d in zip(place, joined(forms, direction))]
+        total = total + np.prod(signs) * residual.value(tuple(place), mu)
     return total / (2 * step) ** len(directions)
 
 
-@pytest.mark.parametrize("number, form", [(2, "second"), pytest.param(3, "third", marks=pytest.mark.slow)])
-def test_forms_are_derivatives(residual, about, parameters, number, form):
-    directions = motions(residual, number)
-    exact = getattr(residual, form)(about, parameters, *directions)
-    found = difference(residual, about, parameters, directions)
-    scale = np.abs(found[:-1]).max()
-    assert exact[:-1] == pytest.approx(found[:-1], abs=1e-3 * scale)
-    assert exact[-1] == pytest.approx(found[-1], rel=1e-4)
+def check(forms, found, expected, tolerance):
+    n = forms.model.size
+    for block in (slice(0, n), slice(n, None)):
+        scale = np.abs(expected[block]).max(initial=0.0)
+        assert np.abs(found[block] - expected[block]).max(initial=0.0) <= tolerance * scale
 
 
-def test_motions_without_displacement_or_velocity(residual, about, parameters):
-    """Where parts vanish the shorter evaluation is the same form."""
-    a, b = motions(residual, 2)
-    still = lambda m: (m[0], np.zeros_like(m[0]), m[2], m[3], m[4])  # noqa: E731
-    moving = lambda m: (np.zeros_like(m[0]), m[1], np.zeros_like(m[0]), 0.0, 0.0)  # noqa: E731
-    whole = residual.second(about, parameters, a, b)
-    parts = sum(residual.second(about, parameters, f(a), g(b)) for f in (still, moving) for g in (still, moving))
-    assert parts == pytest.approx(whole, abs=1e-9 * np.abs(whole).max())
+@pytest.mark.parametrize("number", [1, 2, pytest.param(3, marks=pytest.mark.slow)])
+def test_forms_are_derivatives(forms, number):
+    directions = list(motions(forms, number))
+    first = lambda motion: forms.pencil(motion.rate).matvec(motion.vector)  # noqa: E731
+    found = {1: first, 2: forms.second, 3: forms.third}[number](*directions)
+    check(forms, found.real, difference(forms, directions), {1: 1e-4, 2: 1e-4, 3: 1e-3}[number])
+
+
+def test_derivatives_by_parameters_of_the_flow(forms):
+    (motion,), residual, here = motions(forms, 1), ValveResidual(forms.model), at_rest(forms)
+    for name in forms.model.flow.names:
+        known = forms.model.flow.values(MU)[name]
+        step = 1e-3 * known
+        ends = [MU | {name: known + sign * step} for sign in (-1, 1)]
+        low, high = (residual.value(here, mu) for mu in ends)
+        slope = (high - low) / (2 * step)
+        rounding = 1e-14 * np.abs(forms.model.structure(forms.q)[0]).max() / step  # of forces that some do not move
+        found = forms.parameter_slope(name)
+        assert found == pytest.approx(slope, rel=1e-6, abs=1e-5 * np.abs(slope).max() + rounding)
+        low, high = (difference(forms, [motion], mu) for mu in ends)
+        change = (high - low) / (2 * step)
+        assert forms.mixed(motion, name).real == pytest.approx(change, abs=1e-3 * np.abs(change).max() + 1e3 * rounding)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from types import SimpleNamespace
@@ -22,7 +22,7 @@ from continuation.periodic import PeriodicMotion
 
 from ...case.parameters import PARAMETERS, Mu
 from ...errors import CaseError, SolveError
-from ...model.system import ValveSystem
+from ...model import ValveModel
 from ...motion.periodic import check_periodic
 from ...record.mesh import MeshData, WholeValve
 from ...record.record import GrowingRecord, Record
@@ -33,7 +33,7 @@ from ..case import Case
 from ..orbits import MODES, Follower, Orbit
 from ..result import StudyResult
 from ..session import Session
-from ..stability.place import check_scan, describe_fixed, fixed_conditions, rebuilder
+from ..stability.place import check_scan, describe_fixed, fixed_conditions, models_of
 from ..stability.verdict import Verdict
 from ..stability.walk import StabilityWalk
 from ..study import Study, print_rows
@@ -392,7 +392,7 @@ class Point:
         """The motion, over one period."""
         name = PARAMETERS[self.result.parameter].system_name or self.result.parameter
         mu = Mu.of(self.result.case).for_system() | {name: float(self.value)}
-        return Orbit(self.result.system.model(mu), mu, read_motion(self.result.record, self.number))
+        return Orbit(self.result.models(mu), mu, read_motion(self.result.record, self.number))
 
     @cached_property
     def ranges(self) -> LayerRanges:
@@ -464,9 +464,9 @@ class CycleResult(StudyResult):
         return "; ".join(dict.fromkeys(reasons)) or "had not ended when the run did"
 
     @cached_property
-    def system(self) -> ValveSystem:
+    def models(self) -> Callable[[Mapping[str, float]], ValveModel]:
         """Models for parameters."""
-        return ValveSystem(self.model, rebuilder(self.case))
+        return models_of(self.case, self.model)
 
     def nearest(self, value: float | None = None) -> Point:
         """The cycle at the value nearest to one of the parameter; the last one without.

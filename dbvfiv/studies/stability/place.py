@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -10,12 +11,13 @@ from pydantic.fields import FieldInfo
 
 from ...case.describe import quantity_of
 from ...case.materials import BUILT_IN, RUBBERS, BuiltIn, Materials
-from ...case.parameters import OUTSIDE, PARAMETERS, PIPES, Mu
+from ...case.parameters import OUTSIDE, PARAMETERS, PIPES, SYSTEM_NAMES, Mu
 from ...case.quantity import Quantity
 from ...case.section import Section
 from ...case.valve import Valve
 from ...errors import CaseError, SolveError
 from ...model import ValveModel
+from ...model.residual import DAMPING
 from ..case import Case
 
 #: Lengths of the parts of a valve, from the lip on.
@@ -260,6 +262,17 @@ def _shape_beside(case: Case, name: str, value: float) -> dict[str, object]:
         found["valve.wall_map"] = [step | {"to": float(np.interp(step["to"], own, moved))} for step in steps]
     found.pop(name, None)
     return found
+
+
+def models_of(case: Case, own: ValveModel) -> Callable[[Mapping[str, float]], ValveModel]:
+    """Models of a case for parameters by their names in the equations; `own` is that of the case itself."""
+    known, rebuild = {*own.flow.names, *DAMPING, *SYSTEM_NAMES}, rebuilder(case)
+
+    @lru_cache(8)
+    def built(design: tuple) -> ValveModel:
+        return rebuild(dict(design)) if design else own
+
+    return lambda mu: built(tuple(sorted((name, float(x)) for name, x in mu.items() if name not in known)))
 
 
 def rebuilder(case: Case) -> Callable[[Mapping[str, float]], ValveModel]:

@@ -69,7 +69,7 @@ def test_the_error_estimate_sees_a_poor_space(family):
     good, poor = (
         np.abs(reduction.correction(pairs, condition) / pairs.values)
         for pairs in (
-            reduction.fine(reduction.coarse, [condition]).pairs(condition, 1),
+            reduction.fine(reduction.coarse, [condition], 4).pairs(condition, 1),
             reduction.coarse.pairs(condition, 1),
         )
     )

@@ -1,4 +1,4 @@
-"""The valve's residual for motions that grow at given rates, a wall that relaxes included.
+"""The valve's residual for motions that grow at given rates, a wall that relaxes included: what normal forms ask for.
 
 What a wall remembers of a motion exp(s t) is known from s, so no unknowns are needed for it: displacements q and the
 flow's unknowns U have velocities s q, accelerations s^2 q and rates s U, and the stress of a layer its factor r(s).
@@ -15,19 +15,18 @@ import numpy as np
 
 from continuation.normal_form import Motion
 from continuation.system import expand
-from eigen import CoupledPencil
+from eigen import CoupledPencil, SingularShiftError, Workspace
 from eigen.operator import real_apply
 
 from .dynamics import linearise
 from .residual import ValveResidual
-from .system import factored
 from .valve import ValveModel
 
 #: Relative step of central differences by the factor on loss factors.
 _STEP = 1e-4
 
 
-class ValveMemoryForms:
+class ValveForms:
     """`continuation.normal_form.SystemForms` of a steady valve: vectors are (q, U), (n + l,), states (q, v, U).
 
     Parameters
@@ -36,7 +35,7 @@ class ValveMemoryForms:
     q : (n,) array
         Displacements of the steady state.
     mu : mapping
-        Parameters of a `ValveSystem`, `loss_factor` among them where the wall relaxes.
+        Parameters by their names in the equations (`Mu.for_system`), `loss_factor` among them where the wall relaxes.
     """
 
     def __init__(self, model: ValveModel, q: np.ndarray, mu: Mapping[str, float]):
@@ -108,9 +107,13 @@ class ValveMemoryForms:
         # beta damps with the tangent of the unrelaxed wall, so its force is the rate of the elastic one
         damped = self.mu["beta"] * sum(rates)
         vectors = [motion.vector[:n] for motion in motions]
-        out[:n] += self.model.shell.relaxed_form(self.q, vectors, self._factors(rates) + damped)
-        if self.model.weight is not None:
-            weight, shell = self.model.weight, self.model.shell
+        weight, shell = self.model.weight, self.model.shell
+        if self._coupled.relaxation is None:
+            own = shell.second if len(vectors) == 2 else shell.third
+            out[:n] += (1.0 + damped) * expand(lambda *x: own(self.q, *x), *vectors)
+        else:
+            out[:n] += shell.relaxed_form(self.q, vectors, self._factors(rates) + damped)
+        if weight is not None:
             out[:n] += (1.0 + damped) * expand(lambda *x: weight.form(shell, self.q, *x), *vectors)
         return out
 
@@ -136,6 +139,19 @@ class ValveMemoryForms:
     def _split(self, joined: np.ndarray) -> tuple:
         n, inner = self.model.size, self.model.flow.inner
         return tuple(np.split(joined, [n, 2 * n, 3 * n, 3 * n + inner]))
+
+
+def factored(pencil: CoupledPencil, shift: complex):
+    """LU at a shift, a hair beside it where an eigenvalue sits on it to rounding: products use the exact shift, so
+    bordered solves refine themselves.
+    """
+    size = max(abs(shift), 1.0)
+    for nudge in (0.0, 1e-9, -1e-8, 1e-7, -1e-6):
+        try:
+            return Workspace().shifted(pencil, shift + nudge * size)
+        except SingularShiftError as error:
+            refused = error
+    raise refused
 
 
 class PencilAt:

@@ -8,8 +8,7 @@ import pytest
 from continuation.normal_form import Motion
 from continuation.system import expand
 from dbvfiv.model.dynamics import linearise
-from dbvfiv.model.memory_forms import PencilAt, ValveMemoryForms
-from dbvfiv.model.system import ValveSystem
+from dbvfiv.model.forms import PencilAt, ValveForms
 
 from .test_relaxing_wall import relaxing_valve
 
@@ -40,7 +39,7 @@ def directions(valve):
 
 def test_pencil_and_its_slope(valve, steady, parameters, directions):
     """Products, transposed products and solves belong together, and the slope is that of the products."""
-    forms = ValveMemoryForms(valve, steady, parameters)
+    forms = ValveForms(valve, steady, parameters)
     s, (x, y, _) = RATES[0], directions
     pencil = forms.pencil(s)
     assert isinstance(pencil, PencilAt) and pencil.pencil.branches == 3
@@ -57,7 +56,7 @@ def test_pencil_and_its_slope(valve, steady, parameters, directions):
 @pytest.mark.parametrize("name", ["density", "alpha", "inlet", "loss_factor"])
 def test_change_of_the_pencil_with_a_parameter(valve, steady, parameters, directions, name):
     """At a fixed state, flow unknowns included."""
-    forms = ValveMemoryForms(valve, steady, parameters)
+    forms = ValveForms(valve, steady, parameters)
     inner, step = forms.rest[2 * valve.size :], 1e-3 * parameters[name]
 
     def product(value):
@@ -68,28 +67,6 @@ def test_change_of_the_pencil_with_a_parameter(valve, steady, parameters, direct
     difference = (product(parameters[name] + step) - product(parameters[name] - step)) / (2 * step)
     found = forms.mixed(Motion(RATES[0], directions[0]), name)
     assert found == pytest.approx(difference, abs=1e-5 * np.abs(difference).max())
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("count", [2, 3])
-def test_a_wall_that_does_not_remember(valve, steady, parameters, directions, count):
-    """With factors of one the forms are those of the elastic wall, of the shell alone and of the residual."""
-    shell, n = valve.shell, valve.size
-    plain = [x[:n] for x in directions[:count]]
-    elastic = expand(lambda *x: (shell.second, shell.third)[count - 2](steady, *x), *plain)
-    ones = np.ones((2**count, len(shell.section.layers)))
-    assert shell.relaxed_form(steady, plain, ones) == pytest.approx(elastic, abs=1e-12 * np.abs(elastic).max())
-    forms = ValveMemoryForms(valve, steady, parameters | {"loss_factor": 0.0})
-    motions = [Motion(s, x) for s, x in zip(RATES, directions[:count])]
-    found = (forms.second, forms.third)[count - 2](*motions)
-    system, u, mu = ValveSystem(valve), forms.rest, parameters | {"loss_factor": 0.0}
-    states = [forms.state(motion) for motion in motions]
-    expected = expand(lambda *x: (system.d2, system.d3)[count - 2](u, mu, *x), *states)
-    for i, motion in enumerate(motions):
-        others = states[:i] + states[i + 1 :]
-        rates = lambda c, *x: (system.mass_d, system.mass_d2)[count - 2](u, mu, c, *x)  # noqa: E731
-        expected = expected - expand(rates, motion.rate * states[i], *others)
-    assert -found == pytest.approx(expected[n:], abs=1e-9 * np.abs(expected).max())
 
 
 @pytest.mark.slow
