@@ -12,8 +12,8 @@ import numpy as np
 
 from dbvfiv.model import ValveModel
 from dbvfiv.model.equilibria import find_equilibria
-from dbvfiv.model.linear import DirectFactor
 from dbvfiv.studies.case import thesis_case
+from eigen.factor import DirectFactor
 
 from .registry import Row, benchmark, medians, seconds
 

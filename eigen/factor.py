@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import weakref
 from contextlib import suppress
-from functools import cached_property
+from functools import cache, cached_property
 
 import numpy as np
 import scipy.linalg as la
@@ -108,103 +108,147 @@ class StructureMatrices:
         return order.indptr, order.indices, order.data.astype(np.int64)
 
 
-class MumpsFactorization:
-    """LU by MUMPS through PETSc, with the symbolic analysis kept between refactorisations.
+@cache
+def direct_solver() -> str:
+    """Name of the best LU package of this PETSc: MUMPS, SuperLU, UMFPACK or its own."""
+    from petsc4py import PETSc
+
+    probe = PETSc.Mat().createAIJ((1, 1), nnz=1, comm=PETSc.COMM_SELF)
+    probe.setValue(0, 0, 1.0)
+    probe.assemble()
+    for name in ("mumps", "superlu", "umfpack", "petsc"):
+        try:
+            solver = PETSc.PC().create(PETSc.COMM_SELF)
+            solver.setType("lu")
+            solver.setFactorSolverType(name)
+            solver.setOperators(probe)
+            solver.setUp()
+        except PETSc.Error:
+            continue
+        return name
+    raise RuntimeError("This PETSc offers no LU factorisation.")
+
+
+class DirectFactor:
+    """LU factors of a matrix of fixed pattern through PETSc; the symbolic analysis is done once.
 
     Parameters
     ----------
-    structure : StructureMatrices
-        Only the pattern is taken; call `refactor` before solving.
+    indptr, indices : int32 arrays
+        CSR pattern. Values are handed to `refactor` in the same order.
+
+    Attributes
+    ----------
+    values : array
+        Matrix values, in PETSc's scalars.
+    factorisations : int
     """
 
-    def __init__(self, structure: StructureMatrices):
+    def __init__(self, indptr: np.ndarray, indices: np.ndarray):
         from petsc4py import PETSc
 
-        self._petsc = PETSc
-        self.dtype = np.dtype(PETSc.ScalarType)
-        n = structure.shape[0]
-        self._values = np.ones(structure.indices.size, dtype=self.dtype)
-        self._indptr = structure.indptr.astype(PETSc.IntType)
-        self._indices = structure.indices.astype(PETSc.IntType)
-        self._matrix = PETSc.Mat().createAIJWithArrays(
-            (n, n), (self._indptr, self._indices, self._values), comm=PETSc.COMM_SELF
-        )
-        self._matrix.assemble()
+        self._petsc, self._mumps, self.factorisations = PETSc, direct_solver() == "mumps", 0
+        self.dtype, self.size = np.dtype(PETSc.ScalarType), len(indptr) - 1
+        self.values = np.zeros(len(indices), self.dtype)
+        self._pattern = tuple(np.ascontiguousarray(part, PETSc.IntType) for part in (indptr, indices))
+        shape = self.size, self.size
+        self._matrix = PETSc.Mat().createAIJWithArrays(shape, (*self._pattern, self.values), comm=PETSc.COMM_SELF)
         self._solver = PETSc.KSP().create(comm=PETSc.COMM_SELF)
         self._solver.setType("preonly")
-        self._solver.setOperators(self._matrix)
-        pc = self._solver.getPC()
-        pc.setType("lu")
-        pc.setFactorSolverType("mumps")
-        self._factor = None
-        self._rhs_array = np.zeros(n, self.dtype)
-        self._out_array = np.zeros(n, self.dtype)
-        self._rhs = PETSc.Vec().createWithArray(self._rhs_array, comm=PETSc.COMM_SELF)
-        self._out = PETSc.Vec().createWithArray(self._out_array, comm=PETSc.COMM_SELF)
-        # PETSc keeps what Python lets go of, factors included, until it is told
-        self._held = [pc, self._solver, self._matrix, self._rhs, self._out]
+        self._rhs_array, self._out_array = np.zeros((2, self.size), self.dtype)
+        arrays = self._rhs_array, self._out_array
+        self._rhs, self._out = (PETSc.Vec().createWithArray(array, comm=PETSc.COMM_SELF) for array in arrays)
+        # PETSc keeps what Python lets go of, factors included, until it is told; runs that start afresh often would
+        # fill the memory
+        self._held = [self._solver.getPC(), self._solver, self._matrix, self._rhs, self._out]
         release = weakref.finalize(self, _release, self._held)
         release.atexit = False
+        self._begin()
 
-    def refactor(self, values: np.ndarray) -> None:
-        """Factor the matrix with these entries on the pattern.
-
-        Raises
-        ------
-        SingularShiftError
-            If MUMPS meets a zero pivot.
-        """
-        self._values[:] = values
-        self._matrix.stateIncrease()
-        pc = self._solver.getPC()
-        if self._factor is None:
-            pc.setFactorSetUpSolverType()
-            self._factor = pc.getFactorMatrix()
-            self._held.append(self._factor)
-            self._factor.setMumpsIcntl(14, 50)  # room, in per cent, for what pivoting takes beyond the estimate
-        self._solver.setOperators(self._matrix)
-        self._solver.setUp()
-        failure = self._factor.getMumpsInfog(1)
-        if failure < 0:
-            self.__init_again()
-            raise SingularShiftError(f"MUMPS could not factor the matrix (INFOG(1) = {failure}).")
-
-    def __init_again(self):
-        # a failed factor is kept by PETSc and would be used again: start afresh next time
+    def _begin(self) -> None:
+        """Start without factors: failed ones are kept by PETSc and would be used again."""
         self._solver.reset()
         self._solver.setOperators(self._matrix)
         pc = self._solver.getPC()
         pc.setType("lu")
-        pc.setFactorSolverType("mumps")
+        pc.setFactorSolverType(direct_solver())
         self._factor = None
+
+    def refactor(self, values: np.ndarray | None = None) -> None:
+        """Factor the matrix with its `values`, or with others that take their place.
+
+        Raises
+        ------
+        SingularShiftError
+            If the values are not finite or the matrix is singular to working precision.
+        """
+        if values is not None:
+            self.values[:] = values
+        if not np.isfinite(self.values).all():
+            raise SingularShiftError("The matrix holds numbers that are not finite.")
+        self._matrix.assemble()
+        self._matrix.stateIncrease()
+        pc = self._solver.getPC()
+        try:
+            if self._factor is None:
+                pc.setFactorSetUpSolverType()
+                self._factor = pc.getFactorMatrix()
+                self._held.append(self._factor)
+                if self._mumps:  # room, in per cent, for what pivoting takes beyond the estimate
+                    self._factor.setMumpsIcntl(14, 50)
+            self._solver.setOperators(self._matrix)
+            self._solver.setUp()
+            failed = (
+                self._factor.getMumpsInfog(1) < 0
+                if self._mumps
+                else not np.isfinite(self.solve(np.ones(self.size))).all()
+            )
+        except self._petsc.Error:
+            failed = True
+        if failed:
+            self._begin()
+            raise SingularShiftError("The matrix is singular.")
+        self.factorisations += 1
 
     def solve(self, b: np.ndarray) -> np.ndarray:
         """Solve for one right-hand side, shape (n,), or a block, shape (n, k)."""
+        if b.ndim == 2 and not b.shape[1]:
+            return np.array(b)
+        if np.iscomplexobj(b) and self.dtype.kind == "f":
+            if b.ndim == 1:
+                return self.solve(b.real) + 1j * self.solve(b.imag)
+            both = self.solve(np.hstack([b.real, b.imag]))
+            return both[:, : b.shape[1]] + 1j * both[:, b.shape[1] :]
         if b.ndim == 2:
-            return self._block(b)
-        if self._splits(b):
-            return self.solve(b.real) + 1j * self.solve(b.imag)
-        self._rhs_array[:] = b
-        self._factor.solve(self._rhs, self._out)
-        return self._out_array.copy()
+            out = self._block(b)
+        else:
+            self._rhs_array[:] = b
+            self._factor.solve(self._rhs, self._out)
+            out = self._out_array.copy()
+        return out if np.iscomplexobj(b) or not self._is_real else np.ascontiguousarray(out.real)
+
+    @property
+    def _is_real(self) -> bool:
+        """True where the matrix is real, whatever PETSc's scalars are."""
+        return self.dtype.kind == "f" or not self.values.imag.any()
 
     def solve_transposed(self, b: np.ndarray) -> np.ndarray:
         """Solve with the transpose (not the adjoint)."""
+        if not self._mumps:
+            if b.ndim == 2:
+                return np.stack([self.solve_transposed(x) for x in b.T], axis=1) if b.shape[1] else np.array(b)
+            if np.iscomplexobj(b) and self.dtype.kind == "f":
+                return self.solve_transposed(b.real) + 1j * self.solve_transposed(b.imag)
+            self._rhs_array[:] = b
+            self._factor.solveTranspose(self._rhs, self._out)
+            return self._out_array.copy()
         self._factor.setMumpsIcntl(9, 0)  # MUMPS solves with the transpose, whole blocks too, when told so
         try:
             return self.solve(b)
         finally:
             self._factor.setMumpsIcntl(9, 1)
 
-    def _splits(self, b):
-        return np.iscomplexobj(b) and self.dtype.kind == "f"
-
-    def _block(self, b):
-        if b.shape[1] == 0:
-            return np.array(b)
-        if self._splits(b):
-            both = self._block(np.hstack([b.real, b.imag]))
-            return both[:, : b.shape[1]] + 1j * both[:, b.shape[1] :]
+    def _block(self, b: np.ndarray) -> np.ndarray:
         right = np.asfortranarray(b, dtype=self.dtype)
         out = np.zeros(right.shape, self.dtype, order="F")
         wrapped = [self._petsc.Mat().createDense(a.shape, array=a, comm=self._petsc.COMM_SELF) for a in (right, out)]
@@ -345,7 +389,7 @@ class Workspace:
 
     def __init__(self):
         self._structure: StructureMatrices | None = None
-        self._real: MumpsFactorization | None = None
+        self._real: DirectFactor | None = None
         self._loaded: CoupledPencil | None = None
 
     def structure(self, pencil: CoupledPencil) -> StructureMatrices:
@@ -383,10 +427,10 @@ class Workspace:
         structure = self.structure(pencil)
         if complex(shift).imag == 0.0:
             if self._real is None:
-                self._real = MumpsFactorization(structure)
+                self._real = DirectFactor(structure.indptr, structure.indices)
             factor = self._real
         elif petsc_is_complex():
-            factor = MumpsFactorization(structure)
+            factor = DirectFactor(structure.indptr, structure.indices)
         else:
             return ScaledLU(structure.columns(structure.values(shift)))
         factor.refactor(structure.values(shift))

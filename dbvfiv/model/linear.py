@@ -14,109 +14,10 @@ of its own.
 
 from __future__ import annotations
 
-import weakref
-from functools import cache
-
 import numpy as np
 import scipy.sparse as sp
-from petsc4py import PETSc
 
-
-@cache
-def direct_solver() -> str:
-    """Name of the best LU package of this PETSc: MUMPS, SuperLU, UMFPACK or its own."""
-    probe = PETSc.Mat().createAIJ((1, 1), nnz=1, comm=PETSc.COMM_SELF)
-    probe.setValue(0, 0, 1.0)
-    probe.assemble()
-    for name in ("mumps", "superlu", "umfpack", "petsc"):
-        try:
-            solver = PETSc.PC().create(PETSc.COMM_SELF)
-            solver.setType("lu")
-            solver.setFactorSolverType(name)
-            solver.setOperators(probe)
-            solver.setUp()
-        except PETSc.Error:
-            continue
-        return name
-    raise RuntimeError("This PETSc offers no LU factorisation.")
-
-
-class DirectFactor:
-    """LU factors of a matrix of fixed pattern; the symbolic analysis is done once.
-
-    Parameters
-    ----------
-    indptr, indices : int32 arrays
-        CSR pattern. Values are handed to `refactor` in the same order.
-    """
-
-    def __init__(self, indptr: np.ndarray, indices: np.ndarray):
-        self.size = len(indptr) - 1
-        self._data = np.zeros(len(indices), PETSc.ScalarType)  # real numbers, whatever PETSc's scalars
-        indptr, indices = np.ascontiguousarray(indptr, PETSc.IntType), np.ascontiguousarray(indices, PETSc.IntType)
-        self._matrix = PETSc.Mat().createAIJWithArrays(
-            (self.size, self.size), (indptr, indices, self._data), comm=PETSc.COMM_SELF
-        )
-        self._keep = (indptr, indices)
-        self._solver = PETSc.KSP().create(PETSc.COMM_SELF)
-        self._solver.setType("preonly")
-        self._solver.setOperators(self._matrix)
-        self._pc = self._solver.getPC()
-        self._pc.setType("lu")
-        self._pc.setFactorSolverType(direct_solver())
-        self._rhs, self._solution = self._matrix.createVecs()
-        self.factorisations = 0
-        # PETSc keeps what Python lets go of, factors included, until it is told; runs that start afresh often would
-        # fill the memory
-        release = weakref.finalize(self, _release, self._pc, self._solver, self._matrix, self._rhs, self._solution)
-        release.atexit = False
-
-    @property
-    def values(self) -> np.ndarray:
-        """Matrix values to fill before `refactor`."""
-        return self._data
-
-    def refactor(self) -> None:
-        """Factor the present values.
-
-        Raises
-        ------
-        SingularMatrix
-            If the values are not finite or the matrix is singular to working precision.
-        """
-        if not np.isfinite(self._data).all():
-            raise SingularMatrix("The tangent holds numbers that are not finite.")
-        self._matrix.assemble()
-        self._solver.setOperators(self._matrix)
-        try:
-            self._solver.setUp()
-            # a broken-down factorisation shows in the first solve only, whatever the package
-            self._rhs.set(1.0)
-            self._solver.solve(self._rhs, self._solution)
-        except PETSc.Error as error:
-            raise SingularMatrix("The tangent is singular.") from error
-        if self._solver.getConvergedReason() < 0:
-            raise SingularMatrix("The tangent is singular.")
-        self.factorisations += 1
-
-    def solve(self, rhs: np.ndarray) -> np.ndarray:
-        self._rhs.setArray(rhs)
-        self._pc.apply(self._rhs, self._solution)
-        return np.array(self._solution.getArray().real)
-
-    def solve_transpose(self, rhs: np.ndarray) -> np.ndarray:
-        self._rhs.setArray(rhs)
-        self._pc.applyTranspose(self._rhs, self._solution)
-        return np.array(self._solution.getArray().real)
-
-
-def _release(*objects: PETSc.Object) -> None:
-    for item in objects:
-        item.destroy()
-
-
-class SingularMatrix(ArithmeticError):
-    """A factorisation broke down."""
+from eigen.factor import DirectFactor
 
 
 class CoupledFactor:
@@ -196,4 +97,4 @@ class CoupledFactor:
     def solve_transpose(self, rhs: np.ndarray) -> np.ndarray:
         self._padded[:] = 0.0
         self._padded[: self.size] = rhs
-        return self._factor.solve_transpose(self._padded)[: self.size]
+        return self._factor.solve_transposed(self._padded)[: self.size]

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from petsc4py import PETSc
 
-from .linear import SingularMatrix
+from eigen import SingularShiftError
 
 _REASONS = {
     -1: "the residual or tangent could not be evaluated",
@@ -158,7 +158,7 @@ class EquilibriumSolver:
             self._rounding = self.model.rounding(q, self.tangent)
         try:
             self.model.refactor(self.factor, self.tangent)
-        except SingularMatrix as error:
+        except SingularShiftError as error:
             self._error = str(error)
             raise
         preconditioner.assemble()

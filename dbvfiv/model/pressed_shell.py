@@ -12,9 +12,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from eigen.factor import DirectFactor
+
 from ..shell import Shell
 from ..shell.pressure import pressure_force, pressure_stiffness
-from .linear import DirectFactor
 
 
 @dataclass(frozen=True)

@@ -13,10 +13,12 @@ from __future__ import annotations
 
 import numpy as np
 
+from eigen.factor import DirectFactor
+
 from ..case.parameters import Mu
 from ..flow.stepping import Flow, FrozenFluid, MovingFluid, SteadyFluid
 from ..model import ValveModel
-from ..model.linear import CoupledFactor, DirectFactor
+from ..model.linear import CoupledFactor
 from ..model.supports import FaceStep
 from ..shell import Memory, StepWall, WallMemory
 from .outside import MovingOutside, OutsideCorrection
@@ -156,7 +158,7 @@ class ValveMotion:
 
         Raises
         ------
-        SingularMatrix
+        SingularShiftError
         """
         model = self.model
         q_load, v_load = (q, v) if q_load is None else (q_load, v_load)

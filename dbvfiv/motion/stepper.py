@@ -13,8 +13,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from eigen import SingularShiftError
+
 from ..flow.stepping import Flow
-from ..model.linear import SingularMatrix
 from .scheme import Scheme
 from .scheme import scheme as member
 from .state import MotionState
@@ -146,7 +147,7 @@ class Stepper:
             trial = Trial(self.motion, scheme, state, h, self.pressure, robust)
             try:
                 self._iterate(trial)
-            except SingularMatrix as error:
+            except SingularShiftError as error:
                 raise StepFailure(str(error)) from error
             if robust or self._kept_momentum(trial, momenta):
                 break

@@ -10,8 +10,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from dbvfiv.materials import IsotropicElastic, OrthotropicPly, published_rubber
-from dbvfiv.model.linear import DirectFactor
 from dbvfiv.shell import Layer, Section, Shell, ShellMesh
+from eigen.factor import DirectFactor
 
 
 @dataclass(frozen=True)

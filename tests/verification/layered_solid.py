@@ -15,7 +15,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from dbvfiv.materials import MooneyRivlin
-from dbvfiv.model.linear import DirectFactor
+from eigen.factor import DirectFactor
 
 BULK_RATIO = 1000.0  # bulk over shear modulus of rubber
 

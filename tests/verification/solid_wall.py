@@ -21,8 +21,8 @@ from dbvfiv.geometry import surface_of
 from dbvfiv.geometry.divisions import grading
 from dbvfiv.materials import IsotropicElastic
 from dbvfiv.model import ValveModel
-from dbvfiv.model.linear import DirectFactor
 from dbvfiv.studies.case import thesis_case
+from eigen.factor import DirectFactor
 from tests.verification import layered_solid
 
 #: One material for the whole wall (App. B).

@@ -10,12 +10,12 @@ from scipy.integrate import solve_bvp
 from scipy.optimize import brentq
 
 from dbvfiv.contact import ContactLaw, ContactState, PlaneContact, tributary_area
-from dbvfiv.model.linear import DirectFactor
 from dbvfiv.model.load_steps import LoadStepOptions, LoadSteps
 from dbvfiv.model.newton import NewtonOptions
 from dbvfiv.shell import Shell, ShellMesh
 from dbvfiv.studies.closure.energy import EnergyLedger
 from dbvfiv.studies.closure.valve import force_imbalance
+from eigen.factor import DirectFactor
 from tests.shell.structures import grid, isotropic_section
 from tests.systems.pressed import ShellOnPlane
 

@@ -13,8 +13,8 @@ import numpy as np
 import pytest
 
 from dbvfiv.materials import OrthotropicPly
-from dbvfiv.model.linear import DirectFactor
 from dbvfiv.shell import Layer, Section, Shell, ShellMesh
+from eigen.factor import DirectFactor
 from tests.shell.structures import grid, isotropic_section
 
 PLY = OrthotropicPly(3300.0, 1100.0, 0.25, 660.0, 660.0, 660.0, 1.0)

@@ -20,8 +20,9 @@ from typing import Any, NamedTuple
 import numpy as np
 import scipy.sparse.linalg as spla
 
+from eigen.factor import DirectFactor
+
 from ...errors import SolveError
-from ...model.linear import DirectFactor
 from ...model.load_curve import LoadCurve
 from ...model.load_steps import LoadStepOptions, LoadSteps
 
