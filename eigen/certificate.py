@@ -59,10 +59,22 @@ class Certificate:
         return self.unstable == 0 if self.agrees else None
 
     @property
+    def statement(self) -> str:
+        """Both counts in a sentence."""
+        listed = f"{self.unstable} unstable eigenvalues{self.where}"
+        if self.agrees:
+            return f"{listed}: the spectrum and the independent count agree."
+        if self.counted < 0:
+            return f"{listed} are listed; nobody counted them."
+        if not self.certain:
+            return f"{listed} are listed; the independent count ({self.counted}) is uncertain."
+        return f"{listed} are listed, the independent count finds {self.counted}: they disagree."
+
+    @property
     def where(self) -> str:
         """The region in words, empty for the whole right half-plane."""
         text = "" if self.line == 0 else f" with a growth rate above {self.line:.4g} 1/s"
-        return text + ("" if np.isinf(self.band) else f" up to {self.band:.4g} Hz")
+        return text + (f" up to {self.band:.4g} Hz" if np.isfinite(self.band) else "")
 
 
 #: Pairs beyond the band that are looked for at most, and real ones.
@@ -215,21 +227,14 @@ class CertifiedSpectrum:
     @property
     def statement(self) -> str:
         """The verdict in a sentence."""
-        listed, counted, where = self.unstable_count, self.count.number, self.certificate.where
+        said, beyond = self.certificate.statement, self.spectrum.count_right_of(self.count.line) - self.unstable_count
         if self.agrees:
-            beyond = self.spectrum.count_right_of(self.count.line) - listed
-            return f"{listed} unstable eigenvalues{where}: the spectrum and the independent count agree" + (
-                f"; {beyond} more are listed beyond that band." if beyond else "."
-            )
-        listing = f"The spectrum lists {listed} unstable eigenvalues{where}"
+            return said if not beyond else f"{said[:-1]}; {beyond} more are listed beyond that band."
         if not self.count.certain:
-            return f"{listing}; the independent count ({counted}) is uncertain: {' '.join(self.count.notes)}"
+            return f"{said} {' '.join(self.count.notes)}"
         if not self.certificate.certain:
-            return (
-                f"{listing}; the reduced basis behind the independent count ({counted}) is too coarse "
-                f"(error {self.response_error:.2g})."
-            )
-        return f"{listing}, the independent count finds {counted}: they disagree."
+            return f"{said} The reduced basis behind that count is too coarse (error {self.response_error:.2g})."
+        return said
 
 
 def certified_spectrum(

@@ -305,17 +305,8 @@ class DenseOperator:
     """T(s) and T'(s) of a small pencil as bordered matrices, shape (n + b, n + b)."""
 
     def __init__(self, pencil: CoupledPencil):
-        p, n = pencil, pencil.n
-        self.inner, self._relaxation = p.b, p.relaxation
-        G, J = p.G.toarray(), p.J.toarray()
-        self._powers = np.zeros((3, n + p.b, n + p.b))
-        for power, structure in enumerate((p.K, p.C, p.M)):
-            A, R = getattr(p, f"A{power}"), getattr(p, f"R{power}")
-            self._powers[power, :n, :n], self._powers[power, n:, :n] = structure.toarray() - G @ A @ J, R @ J
-            if power < 2:
-                B, S = getattr(p, f"B{power}"), getattr(p, f"S{power}")
-                self._powers[power, :n, n:], self._powers[power, n:, n:] = -G @ B, S
-        self._relaxing = [m.toarray() for m in p.relaxing]
+        self.inner, self._relaxation, self._powers = pencil.b, pencil.relaxation, pencil.dense
+        self._relaxing = [m.toarray() for m in pencil.relaxing]
 
     def __call__(self, s: complex) -> tuple[np.ndarray, np.ndarray]:
         """Both matrices at a place."""

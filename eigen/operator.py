@@ -7,6 +7,7 @@ from dataclasses import KW_ONLY, dataclass, fields, replace
 from functools import cached_property
 
 import numpy as np
+import scipy.linalg as la
 import scipy.sparse as sp
 
 from .spectrum import CLEAR
@@ -361,6 +362,16 @@ class CoupledPencil:
         M, C, K = (V.T @ (matrix @ V) for matrix in (self.M, self.C, self.K))
         return replace(self, M=M, C=C, K=K, G=V.T @ self.G, J=self.J @ V, relaxation=relaxation)
 
+    @cached_property
+    def dense(self) -> np.ndarray:
+        """Dense coefficients of 1, lambda and lambda^2, (3, n + b, n + b), what relaxes left out; for small pencils."""
+        unit, found = np.eye(self.b), np.zeros((3, self.n + self.b, self.n + self.b))
+        forces, slope = la.block_diag(self.G.toarray(), unit), la.block_diag(self.J.toarray(), unit)
+        for own, matrix, fluid in zip(found, (self.K, self.C, self.M), self._bordered):
+            own[:] = forces @ fluid @ slope
+            own[: self.n, : self.n] += matrix.toarray()
+        return found
+
     def first_order(self) -> tuple[np.ndarray, np.ndarray]:
         """Dense F, E with F x = lambda E x, x = (q, lambda q, U, z); for small pencils.
 
@@ -369,21 +380,12 @@ class CoupledPencil:
         F, E : ndarray, shape (order, order)
         """
         n, b = self.n, self.b
-        G, J = self.G.toarray(), self.J.toarray()
         F, E = np.zeros((self.order, self.order)), np.zeros((self.order, self.order))
-        q, v, u = slice(0, n), slice(n, 2 * n), slice(2 * n, 2 * n + b)
-        E[q, q] = np.eye(n)
-        F[q, v] = np.eye(n)
-        E[v, v] = self.M.toarray() - G @ self.A2 @ J
-        E[v, u] = -G @ self.B1
-        F[v, q] = -(self.K.toarray() - G @ self.A0 @ J)
-        F[v, v] = -(self.C.toarray() - G @ self.A1 @ J)
-        F[v, u] = G @ self.B0
-        E[u, v] = self.R2 @ J
-        E[u, u] = self.S1
-        F[u, q] = -self.R0 @ J
-        F[u, v] = -self.R1 @ J
-        F[u, u] = -self.S0
+        q, v, u, both = slice(0, n), slice(n, 2 * n), slice(2 * n, 2 * n + b), slice(n, 2 * n + b)
+        first, second, third = self.dense
+        E[q, q] = F[q, v] = np.eye(n)
+        E[both, v], E[both, u] = third[:, :n], second[:, n:]
+        F[both, q], F[both, v], F[both, u] = -first[:, :n], -second[:, :n], -first[:, n:]
         parts = [matrix.toarray() for matrix in self.relaxing]
         for j in range(self.branches):
             z = slice(2 * n + b + j * n, 2 * n + b + (j + 1) * n)

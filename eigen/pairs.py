@@ -2,7 +2,7 @@ r"""Eigenpairs from a solver to a result: all of a small pencil; verified, refin
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
@@ -12,7 +12,7 @@ import scipy.sparse.linalg as spla
 from .derivative import coupling_of_modes
 from .factor import SingularShiftError, Workspace
 from .operator import CoupledPencil, real_apply
-from .spectrum import Oval, SearchedRegion, Spectrum
+from .spectrum import Oval, SearchedRegion
 
 
 def all_pairs(pencil: CoupledPencil, *, left: bool):
@@ -489,17 +489,6 @@ def left_by_inverse_iteration(pencil, value, workspace):
         size = np.linalg.norm(w) or np.linalg.norm(W)
         w, W = w / size, W / size
     return w, W
-
-
-def with_left_vectors(pencil: CoupledPencil, spectrum: Spectrum) -> Spectrum:
-    """Spectrum with left vectors, by inverse iteration on a small pencil."""
-    workspace = Workspace()
-    found = [left_by_inverse_iteration(pencil, value, workspace) for value in spectrum.eigenvalues]
-    if not found:
-        return replace(spectrum, left_q=spectrum.q, left_u=spectrum.u)
-    w, W = (np.array(part).reshape(len(found), -1).T.conj() for part in zip(*found))
-    w, W, _, _ = biorthogonalise(pencil, spectrum.eigenvalues, spectrum.q, spectrum.u, w, W)
-    return replace(spectrum, left_q=w, left_u=W)
 
 
 def biorthogonalise(pencil: CoupledPencil, eigenvalues, q, u, w, W, cluster: float = 1e-7):

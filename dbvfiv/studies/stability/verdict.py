@@ -14,6 +14,8 @@ from typing import Any
 
 import numpy as np
 
+from eigen import Certificate
+
 from ...case.parameters import PARAMETERS
 from ...texts import shortly
 
@@ -105,7 +107,7 @@ class Verdict:
         values = np.asarray(eigenvalues, complex)
         values = values[np.isfinite(values.real)]
         agrees = certain and unstable == counted
-        statement = statement or describe_counts(unstable, counted, certain, line, band)
+        statement = statement or Certificate(unstable, counted, certain, line, band).statement
         statement = f"{SEALED} {statement}" if sealed else statement
         if not values.size:
             return cls(UNDECIDED, f"No mode was found in the search, which says nothing of the state. {statement}")
@@ -204,19 +206,6 @@ def _of_modes(modes: np.ndarray) -> dict[str, float]:
         "frequency": float(abs(leading.imag) / (2 * np.pi)),
         "damping_ratio": float((-modes.real / np.abs(modes)).min()),
     }
-
-
-def describe_counts(unstable: int, counted: int, certain: bool, line: float, band: float) -> str:
-    """Sentence on the unstable eigenvalues listed and counted, and on the region that was looked at."""
-    where = "" if line == 0 else f" with a growth rate above {line:.4g} 1/s"
-    where += "" if not np.isfinite(band) else f" up to {band:.4g} Hz"
-    if certain and unstable == counted:
-        return f"{unstable} unstable eigenvalues{where}: the spectrum and the independent count agree."
-    if counted < 0:
-        return f"{unstable} unstable eigenvalues{where} are listed; nobody counted them."
-    if not certain:
-        return f"{unstable} unstable eigenvalues{where} are listed; the independent count ({counted}) is uncertain."
-    return f"{unstable} unstable eigenvalues{where} are listed, the independent count finds {counted}: they disagree."
 
 
 def not_valid_at(parameter: str, unsound: Mapping[float, str]) -> str:

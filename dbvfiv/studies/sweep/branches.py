@@ -10,7 +10,6 @@ from typing import Any
 import numpy as np
 
 from eigen import Branches, CoupledPencil, SearchOptions, Spectrum, TrackOptions, Workspace, leading_modes, track
-from eigen.pairs import with_left_vectors
 
 from ...case.parameters import Mu
 from ...errors import SolveError
@@ -140,11 +139,9 @@ class Tracking:
         if not self.is_reduced:
             return leading_modes(pencil, count, replace(options, left=True), workspace=self._workspace)
         # the linear form of a viscoelastic wall is several times as large
-        krylov = pencil.relaxation is not None and count < pencil.n
-        asked = SearchOptions(options.max_frequency, tolerance=options.tolerance, method="auto" if krylov else "dense")
-        if krylov:
-            return with_left_vectors(pencil, leading_modes(pencil, count, asked))
-        return leading_modes(pencil, count, replace(asked, left=True))
+        method = "auto" if pencil.relaxation is not None and count < pencil.n else "dense"
+        asked = SearchOptions(options.max_frequency, tolerance=options.tolerance, left=True, method=method)
+        return leading_modes(pencil, count, asked)
 
     def _done(self, value: float, _solves: int) -> None:
         self._keep(self.line.sample(value, self._solve(self._pencil(value))))
