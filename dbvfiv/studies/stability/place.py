@@ -17,7 +17,6 @@ from ...case.section import Section
 from ...case.valve import Valve
 from ...errors import CaseError, SolveError
 from ...model import ValveModel
-from ...model.residual import DAMPING
 from ..case import Case
 
 #: Lengths of the parts of a valve, from the lip on.
@@ -266,7 +265,7 @@ def _shape_beside(case: Case, name: str, value: float) -> dict[str, object]:
 
 def models_of(case: Case, own: ValveModel) -> Callable[[Mapping[str, float]], ValveModel]:
     """Models of a case for parameters by their names in the equations; `own` is that of the case itself."""
-    known, rebuild = {*own.flow.names, *DAMPING, *SYSTEM_NAMES}, rebuilder(case)
+    known, rebuild = {*own.flow.names, *SYSTEM_NAMES}, rebuilder(case)
 
     @lru_cache(8)
     def built(design: tuple) -> ValveModel:
