@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 from functools import cached_property
@@ -66,9 +67,8 @@ NOT_SEALED = "not sealed"
 PAYS = 48
 #: Samples of the final density of a rare event over all that may be used; the others lead there.
 FINAL = 0.4
-#: Quantities whose percentiles are told, and their units in lines.
-_SPREADS = {"damping_ratio": ("least damping ratio, %", 100.0), "frequency": ("frequency, Hz", 1.0)}
-_SPREADS |= {"opening": ("opening, cm2", 1e4), "flow": ("flow, L/s", 1e3)}
+#: Quantities whose percentiles are told.
+_SPREADS = ("damping_ratio", "frequency", "opening", "flow")
 
 
 def tables_of(_mesh: MeshData) -> tuple[TableSpec, ...]:
@@ -268,33 +268,29 @@ class _Sampling:
         for sample in new:
             self.record.item(sample)
 
-    def rare(self) -> None:
-        """Samples about a rare flutter: steps towards it, then those of its final density."""
-        asked, dimension = self.plan.case.uncertainty, len(self.plan.inputs)
-        stages = iter(range(1000))
-        each = max(32, round((1 - FINAL) * asked.samples / 5))
+    def _stages(self) -> Callable[[np.ndarray, np.ndarray], np.ndarray]:
+        """Function from scores and the logarithm of their weights to performances, one stage after another."""
+        stages = itertools.count()
 
         def evaluate(scores: np.ndarray, log_weight: np.ndarray) -> np.ndarray:
             stage = next(stages)
             self.record.progress(f"step {stage} towards flutter, {len(scores)} samples")
             return self.verdicts(scores, log_weight, stage)
 
-        density: Shifted = approach(evaluate, dimension, each, asked.seed)
-        random = np.random.default_rng([asked.seed, 1])
-        scores = density.draw(max(32, round(FINAL * asked.samples)), random)
-        self.verdicts(scores, density.log_weight(scores), next(stages))
+        return evaluate
+
+    def rare(self) -> None:
+        """Samples about a rare flutter: steps towards it, then those of its final density."""
+        asked, evaluate = self.plan.case.uncertainty, self._stages()
+        each = max(32, round((1 - FINAL) * asked.samples / 5))
+        density: Shifted = approach(evaluate, len(self.plan.inputs), each, asked.seed)
+        scores = density.draw(max(32, round(FINAL * asked.samples)), np.random.default_rng([asked.seed, 1]))
+        evaluate(scores, density.log_weight(scores))
 
     def subset(self) -> None:
         """Samples of levels towards a rare flutter."""
-        stages = iter(range(10000))
-
-        def evaluate(scores: np.ndarray, log_level: np.ndarray) -> np.ndarray:
-            stage = next(stages)
-            self.record.progress(f"step {stage} towards flutter, {len(scores)} samples")
-            return self.verdicts(scores, log_level, stage)
-
         asked = self.plan.case.uncertainty
-        subset(evaluate, len(self.plan.inputs), asked.samples, asked.seed)
+        subset(self._stages(), len(self.plan.inputs), asked.samples, asked.seed)
 
 
 class UncertaintyResult(StudyResult):
