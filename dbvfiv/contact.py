@@ -185,34 +185,87 @@ class PlaneContact:
         n = self.nodes
         return self.shell.mesh.nodes[n] + nodal[n, :3] - self.depth[:, None] * directors[n]
 
-    def state(self, nodal: np.ndarray, directors: np.ndarray) -> ContactState:
-        """Gaps, pressures and forces of nodal unknowns (nn, c) with directors (nn, 3)."""
-        gap = self.gap(nodal, directors)
+    def nodal(self, q: np.ndarray) -> np.ndarray:
+        """Nodal displacements and rotations (nn, c) of unknowns (n,)."""
+        return self.shell.dofs.expand(q)
+
+    def gaps(self, q: np.ndarray) -> np.ndarray:
+        """Gaps (k,), m, of unknowns (n,)."""
+        nodal = self.nodal(q)
+        return self.gap(nodal, self.shell.directors(nodal)[0])
+
+    def state(self, q: np.ndarray) -> ContactState:
+        """Gaps, pressures and forces of unknowns (n,)."""
+        gap = self.gaps(q)
         _, pressure, _ = self.law.respond(gap)
         return ContactState(gap, pressure, self.area * pressure)
 
-    def energy(self, nodal, directors) -> float:
+    def touching(self, q: np.ndarray) -> int:
+        """Number of nodes that are pressed."""
+        return int(np.count_nonzero(self.state(q).touching))
+
+    def energy(self, q: np.ndarray) -> float:
         """Energy stored in the contact, J."""
-        return float(self.area @ self.law.respond(self.gap(nodal, directors))[0])
+        return float(self.area @ self.law.respond(self.gaps(q))[0])
 
-    def add_force(self, force, nodal, directors, first) -> None:
-        """Add the internal force, the derivative of the potential, to force (n,).
-
-        `first` (nn, 2, 3) are the derivatives of the directors.
-        """
+    def force(self, q: np.ndarray) -> np.ndarray:
+        """Internal force (n,), the derivative of the energy."""
+        force, nodal = np.zeros(self.shell.size), self.nodal(q)
+        directors, first, _ = self.shell.directors(nodal)
         _, pressure, _ = self.law.respond(self.gap(nodal, directors))
         self.add_pressure_force(force, pressure, first)
+        return force
+
+    def add_tangent(self, q: np.ndarray, data: np.ndarray) -> None:
+        """Add the symmetric tangent to values (nnz,) on the shell's pattern."""
+        nodal = self.nodal(q)
+        self.add_blocks(data, self._tangent_blocks(nodal, *self.shell.directors(nodal)))
+
+    def form(self, q: np.ndarray, *directions: np.ndarray) -> np.ndarray:
+        """Derivative (n,) of the force at unknowns (n,) along any number of directions (n,).
+
+        The law is made of pieces; at their joints the derivatives are those of one side.
+        """
+        n, axis, mesh = self.nodes, self.axis, self.shell.mesh
+        columns, nodal = [axis, 3, 4], self.nodal(q)
+        data = mesh.nodes[n, axis] + self.lift, self.depth, self.area, mesh.directors[n], mesh.frames[n]
+        law = (self.law.penalty, self.law.rounding)
+        along = tuple(self.nodal(direction)[n][:, columns] for direction in directions)
+        out = np.zeros_like(nodal)
+        out[n[:, None], columns] = np.asarray(_form(axis, law, nodal[n][:, columns], along, data))
+        return self.shell.dofs.restrict(out)
+
+    def stiffness_of_class(self, q: np.ndarray, shell: Shell, apart: bool) -> sp.csr_matrix:
+        """Tangent (k, k) at unknowns (n,) in a class of motion with its shell, of k unknowns; `apart` where the two
+        walls move against each other, so that contact resists; where they move together it only turns.
+        """
+        nodal = self.nodal(q)
+        directors, first, second = self.shell.directors(nodal)
+        if apart:
+            block, columns = self._tangent_blocks(nodal, directors, first, second), [self.axis, 3, 4]
+        else:
+            block, columns = self._blocks_together(q, first)
+        unknowns, width = shell.dofs.index[self.nodes][:, columns], len(columns)
+        rows = np.repeat(unknowns[:, :, None], width, axis=2)
+        across = np.repeat(unknowns[:, None, :], width, axis=1)
+        keep = (rows >= 0) & (across >= 0) & (block != 0)
+        return sp.csr_matrix((block[keep], (rows[keep], across[keep])), shape=(shell.size, shell.size))
+
+    def _blocks_together(self, q: np.ndarray, first: np.ndarray) -> tuple[np.ndarray, list[int]]:
+        """Tangent (k, 4, 4) of each contact node and the columns (4) of its nodal unknowns that it belongs to."""
+        along = [axis for axis in range(3) if axis != self.axis]
+        force = self.state(q).force
+        turn = first[self.nodes][:, :, along].transpose(0, 2, 1)  # director along the plane by the rotations
+        block = np.zeros((self.count, 4, 4))
+        block[:, 2:, 2:] = (force * self.depth)[:, None, None] * (turn.transpose(0, 2, 1) @ turn)
+        block[:, :2, 2:] = -force[:, None, None] * turn
+        block[:, 2:, :2] = block[:, :2, 2:].transpose(0, 2, 1)
+        return block, [*along, 3, 4]
 
     def add_pressure_force(self, force, pressure, first) -> None:
         """Add the internal force of contact pressures (k,), Pa, to force (n,)."""
-        _add(force, self._unknowns, -(self.area * pressure)[:, None] * self.slope(first))
-
-    def add_force_and_tangent(self, force, data, nodal, directors, first, second) -> None:
-        """Add force and symmetric tangent values on the shell's pattern; `second` (nn, 3, 3) as `Shell.directors`
-        returns.
-        """
-        self.add_force(force, nodal, directors, first)
-        self.add_blocks(data, self.tangent_blocks(nodal, directors, first, second))
+        keep, values = self._unknowns >= 0, -(self.area * pressure)[:, None] * self.slope(first)
+        force[self._unknowns[keep]] += values[keep]  # every unknown belongs to one contact node only
 
     def add_blocks(self, data, block) -> None:
         """Add blocks (k, 3, 3) of each contact node in its displacement across the plane and its rotations to matrix
@@ -222,7 +275,7 @@ class PlaneContact:
         keep = slots >= 0
         data[slots[keep]] += block[keep]
 
-    def tangent_blocks(self, nodal, directors, first, second) -> np.ndarray:
+    def _tangent_blocks(self, nodal, directors, first, second) -> np.ndarray:
         """Tangent (k, 3, 3) of each contact node in its displacement across the plane and its rotations."""
         _, pressure, stiffness = self.law.respond(self.gap(nodal, directors))
         slope = self.slope(first)
@@ -260,76 +313,6 @@ class PlaneContact:
         if keep.any():
             slots[keep] = np.asarray(number[rows[keep], columns[keep]]).ravel() - 1
         return slots
-
-
-def _add(force: np.ndarray, unknowns: np.ndarray, values: np.ndarray) -> None:
-    keep = unknowns >= 0
-    force[unknowns[keep]] += values[keep]  # every unknown belongs to one contact node only
-
-
-def _blocks_together(contact: PlaneContact, nodal, directors, first) -> tuple[np.ndarray, list[int]]:
-    """Tangent (k, 4, 4) of each contact node and the columns (4) of its nodal unknowns that it belongs to.
-
-    Parameters
-    ----------
-    nodal, directors, first : (nn, c), (nn, 3), (nn, 2, 3) arrays
-        Nodal unknowns, directors and their derivatives.
-    """
-    along = [axis for axis in range(3) if axis != contact.axis]
-    force = contact.state(nodal, directors).force
-    turn = first[contact.nodes][:, :, along].transpose(0, 2, 1)  # director along the plane by the rotations
-    block = np.zeros((contact.count, 4, 4))
-    block[:, 2:, 2:] = (force * contact.depth)[:, None, None] * (turn.transpose(0, 2, 1) @ turn)
-    block[:, :2, 2:] = -force[:, None, None] * turn
-    block[:, 2:, :2] = block[:, :2, 2:].transpose(0, 2, 1)
-    return block, [*along, 3, 4]
-
-
-def class_stiffness(contact: PlaneContact, nodal: np.ndarray, shell: Shell, apart: bool) -> sp.csr_matrix:
-    """Tangent (n, n) of a contact in a class of motion.
-
-    Parameters
-    ----------
-    contact : PlaneContact
-    nodal : (nn, c) array
-        Nodal unknowns of the state.
-    shell : Shell
-        With the n unknowns of the class.
-    apart : bool
-        Whether the two walls move against each other, so that contact resists; where they move together it only turns.
-    """
-    directors, first, second = contact.shell.directors(nodal)
-    if apart:
-        block = contact.tangent_blocks(nodal, directors, first, second)
-        columns = [contact.axis, 3, 4]
-    else:
-        block, columns = _blocks_together(contact, nodal, directors, first)
-    unknowns, width = shell.dofs.index[contact.nodes][:, columns], len(columns)
-    rows = np.repeat(unknowns[:, :, None], width, axis=2)
-    across = np.repeat(unknowns[:, None, :], width, axis=1)
-    keep = (rows >= 0) & (across >= 0) & (block != 0)
-    return sp.csr_matrix((block[keep], (rows[keep], across[keep])), shape=(shell.size, shell.size))
-
-
-def contact_form(contact: PlaneContact, nodal: np.ndarray, *directions: np.ndarray) -> np.ndarray:
-    """Derivative (nn, c) of the contact force at nodal unknowns (nn, c) along any number of directions (nn, c).
-
-    The law is made of pieces; at their joints the derivatives are those of one side.
-    """
-    n, axis, mesh = contact.nodes, contact.axis, contact.shell.mesh
-    columns = [axis, 3, 4]
-    data = (
-        mesh.nodes[n, axis] + contact.lift,
-        contact.depth,
-        contact.area,
-        mesh.directors[n],
-        mesh.frames[n],
-    )
-    law = (contact.law.penalty, contact.law.rounding)
-    along = tuple(field[n][:, columns] for field in directions)
-    out = np.zeros_like(nodal)
-    out[n[:, None], columns] = np.asarray(_form(axis, law, nodal[n][:, columns], along, data))
-    return out
 
 
 def _potential(axis, law, v, data):
@@ -402,58 +385,53 @@ def mean_pressure(law: ContactLaw, old: np.ndarray, new: np.ndarray) -> tuple[np
 
 
 class ContactStep:
-    """Contact of one step that starts from given nodal unknowns.
+    """Contact of one step that starts from given unknowns.
 
     Parameters
     ----------
-    plane : PlaneContact
-    nodal : (nn, c) array
+    contact : PlaneContact
+    q : (n,) array
         Where the step starts.
     h : float, s
     rebound : Rebound
     """
 
-    def __init__(self, plane: PlaneContact, nodal: np.ndarray, h: float, rebound: Rebound = Rebound()):
-        self.plane, self.h, self.rebound = plane, float(h), rebound
-        self._nodal = nodal
-        self._gap = plane.gap(nodal, plane.shell.directors(nodal)[0])
-        self._energy = self._stored(self._gap)
-
-    def _stored(self, gap: np.ndarray) -> float:
-        return float(self.plane.area @ self.plane.law.respond(gap)[0])
+    def __init__(self, contact: PlaneContact, q: np.ndarray, h: float, rebound: Rebound = Rebound()):
+        self.contact, self.h, self.rebound = contact, float(h), rebound
+        self._nodal, self._gap, self._energy = contact.nodal(q), contact.gaps(q), contact.energy(q)
 
     def _pressure(self, gap: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        mean, slope = mean_pressure(self.plane.law, self._gap, gap)
+        mean, slope = mean_pressure(self.contact.law, self._gap, gap)
         factor, bend = self.rebound.factor((gap - self._gap) / self.h)
         return factor * mean, factor * slope + bend * mean / self.h
 
-    def force(self, nodal: np.ndarray) -> np.ndarray:
-        """Internal force (n,) over a step that ends at nodal unknowns (nn, c).
+    def force(self, q: np.ndarray) -> np.ndarray:
+        """Internal force (n,) over a step that ends at unknowns (n,).
 
         Gaps bend with the rotations; their slope is that in the middle, so that the work of the force misses pressure
         times the change of the gap by the third power of a director's turn.
         """
-        plane = self.plane
-        directors = plane.shell.directors
-        pressure, _ = self._pressure(plane.gap(nodal, directors(nodal)[0]))
-        force = np.zeros(plane.shell.size)
+        contact = self.contact
+        pressure, _ = self._pressure(contact.gaps(q))
+        force = np.zeros(contact.shell.size)
         if pressure.any():
-            plane.add_pressure_force(force, pressure, directors(0.5 * (self._nodal + nodal))[1])
+            middle = 0.5 * (self._nodal + contact.nodal(q))
+            contact.add_pressure_force(force, pressure, contact.shell.directors(middle)[1])
         return force
 
-    def add_tangent(self, nodal: np.ndarray, data: np.ndarray, weight: float) -> None:
+    def add_tangent(self, q: np.ndarray, data: np.ndarray, weight: float) -> None:
         """Add a multiple of the derivative of `force` by the new unknowns to values (nnz,) on the shell's pattern."""
-        plane = self.plane
-        directors = plane.shell.directors
+        contact, nodal = self.contact, self.contact.nodal(q)
+        directors = contact.shell.directors
         d, first, _ = directors(nodal)
-        pressure, slope = self._pressure(plane.gap(nodal, d))
+        pressure, slope = self._pressure(contact.gap(nodal, d))
         if not (pressure.any() or slope.any()):
             return
         _, first_mid, second_mid = directors(0.5 * (self._nodal + nodal))
-        block = -(plane.area * slope)[:, None, None] * plane.slope(first_mid)[:, :, None] * plane.slope(first)[:, None]
-        block += 0.5 * plane.bending_blocks(pressure, second_mid)
-        plane.add_blocks(data, weight * block)
+        block = -(contact.area * slope)[:, None, None] * contact.slope(first_mid)[:, :, None]
+        block = block * contact.slope(first)[:, None] + 0.5 * contact.bending_blocks(pressure, second_mid)
+        contact.add_blocks(data, weight * block)
 
-    def stored(self, nodal: np.ndarray) -> float:
-        """Energy gained by the contact up to nodal unknowns (nn, c), J."""
-        return self._stored(self.plane.gap(nodal, self.plane.shell.directors(nodal)[0])) - self._energy
+    def stored(self, q: np.ndarray) -> float:
+        """Energy gained by the contact up to unknowns (n,), J."""
+        return self.contact.energy(q) - self._energy

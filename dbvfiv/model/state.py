@@ -223,7 +223,7 @@ def _boundless(model: ValveModel, area: np.ndarray, pressure: float) -> str:
 def parted_width(model: ValveModel, q: np.ndarray) -> tuple[float, float]:
     """Widths, m, of the whole lip that has parted, and that is pressed at rest, of a bill that is moulded shut."""
     row, where = model.mesh.rows[0], np.full(len(model.mesh.nodes), -1)
-    where[model.contact.plane.nodes] = np.arange(model.contact.plane.count)
+    where[model.contact.nodes] = np.arange(model.contact.count)
     known = where[row] >= 0
     x = np.abs(model.mesh.nodes[row, 0])
     width = np.gradient(x) if model.mesh.part.is_quarter else np.abs(np.gradient(model.mesh.nodes[row, 0]))

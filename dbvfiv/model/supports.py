@@ -21,19 +21,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import scipy.sparse as sp
 
 from ..case.model import Case
-from ..contact import (
-    ContactLaw,
-    ContactState,
-    ContactStep,
-    PlaneContact,
-    Rebound,
-    class_stiffness,
-    contact_form,
-    tributary_area,
-)
+from ..contact import ContactLaw, PlaneContact, tributary_area
 from ..geometry import ValveMesh
 from ..shell import Shell
 from ..shell.mesh import nodal_thickness
@@ -108,72 +98,17 @@ def lip_stops(case: Case, mesh: ValveMesh, index: np.ndarray) -> LipStops:
 ROUNDING, PRESET_ROUNDING = 0.01, 1 / 3
 
 
-@dataclass(frozen=True)
-class FaceContact:
-    """Contact of a shell's inner face with the plane y = 0, by its free unknowns.
-
-    Attributes
-    ----------
-    shell : Shell
-    plane : PlaneContact
-    """
-
-    shell: Shell
-    plane: PlaneContact
-
-    def nodal(self, q: np.ndarray) -> np.ndarray:
-        """Nodal displacements and rotations (nn, c) of unknowns (n,)."""
-        return self.shell.dofs.expand(q)
-
-    def state(self, q: np.ndarray) -> ContactState:
-        """Gaps, pressures and forces of a state (n,), of the part."""
-        nodal = self.nodal(q)
-        return self.plane.state(nodal, self.shell.directors(nodal)[0])
-
-    def touching(self, q: np.ndarray) -> int:
-        """Number of nodes whose face is pressed."""
-        return int(np.count_nonzero(self.state(q).touching))
-
-    def energy(self, q: np.ndarray) -> float:
-        """Stored in the contact, J of the part."""
-        nodal = self.nodal(q)
-        return self.plane.energy(nodal, self.shell.directors(nodal)[0])
-
-    def force(self, q: np.ndarray) -> np.ndarray:
-        """Internal force (n,), the derivative of the energy."""
-        force, nodal = np.zeros(self.shell.size), self.nodal(q)
-        d, d1, _ = self.shell.directors(nodal)
-        self.plane.add_force(force, nodal, d, d1)
-        return force
-
-    def add_tangent(self, q: np.ndarray, data: np.ndarray) -> None:
-        """Add the symmetric tangent to values (nnz,) on the shell's pattern."""
-        nodal = self.nodal(q)
-        self.plane.add_force_and_tangent(np.zeros(self.shell.size), data, nodal, *self.shell.directors(nodal))
-
-    def form(self, q: np.ndarray, *directions: np.ndarray) -> np.ndarray:
-        """Derivative (n,) of the force along two or three directions (n,); of the law's pieces, not of their joints."""
-        fields = [self.nodal(direction) for direction in directions]
-        return self.shell.dofs.restrict(contact_form(self.plane, self.nodal(q), *fields))
-
-    def stiffness_of_class(self, q: np.ndarray, shell: Shell, apart: bool) -> sp.csr_matrix:
-        """Tangent (k, k) in a class of motion with its shell: faces that move against each other resist, those that
-        move together turn their force (see `together_blocks`).
-        """
-        return class_stiffness(self.plane, self.nodal(q), shell, apart)
-
-
 #: What closes a valve that is pressed from outside: contact of the faces, or the supports of Th. 3.6.
 CONTACT, HELD_LIPS = "contact", "held-lips"
 
 
-def face_contact(case: Case, mesh: ValveMesh, shell: Shell, closed_by: str | None = None) -> FaceContact | None:
+def face_contact(case: Case, mesh: ValveMesh, shell: Shell, closed_by: str | None = None) -> PlaneContact | None:
     """Contact of the inner faces of a case, as drawn of a closed valve; None where it has stops."""
     every, area, gap = np.arange(shell.mesh.node_count), tributary_area(shell), case.valve.initial_gap
     preset = case.valve.is_preset
     law = ContactLaw(case.face_stiffness, (PRESET_ROUNDING if preset else ROUNDING) * gap)
     if closed_by == HELD_LIPS:
-        return FaceContact(shell, PlaneContact(shell, every, 0.0, area, law))
+        return PlaneContact(shell, every, 0.0, area, law)
     if not case.faces_touch:
         return None
     depth, gap = 0.5 * nodal_thickness(shell.mesh), np.full(len(every), gap)
@@ -185,39 +120,10 @@ def face_contact(case: Case, mesh: ValveMesh, shell: Shell, closed_by: str | Non
     if preset or closed_by is None:
         at_lips = mesh.nodes[:, 2] <= case.valve.duckbill_length * (1 + 1e-9)
         depth = np.where(at_lips, depth + _inside(case, gap), depth)
-    return FaceContact(shell, PlaneContact(shell, every, depth, area, law, least_gap=gap))
+    return PlaneContact(shell, every, depth, area, law, least_gap=gap)
 
 
 def _inside(case: Case, gap: np.ndarray) -> np.ndarray:
     """Distance (nn,), m, of the faces in contact inside those of the duckbill's wall without patches."""
     valve = case.valve
     return valve.duckbill_wall_deduction - gap - 0.5 * valve.thickness_at(0.0)
-
-
-class FaceStep:
-    """Contact in a step that starts from positions (n,); see `dbvfiv.contact.step.ContactStep`.
-
-    Parameters
-    ----------
-    faces : FaceContact
-    q : (n,) array
-    h : float, s
-    rebound : float
-        Share of the stored energy that parting faces get back.
-    """
-
-    def __init__(self, faces: FaceContact, q: np.ndarray, h: float, rebound: float):
-        self._faces = faces
-        self._step = ContactStep(faces.plane, faces.nodal(q), h, Rebound(rebound))
-
-    def force(self, q: np.ndarray) -> np.ndarray:
-        """Internal force (n,) over a step that ends at positions (n,)."""
-        return self._step.force(self._faces.nodal(q))
-
-    def add_tangent(self, q: np.ndarray, values: np.ndarray, weight: float) -> None:
-        """Add a multiple of its derivative to values (nnz,)."""
-        self._step.add_tangent(self._faces.nodal(q), values, weight)
-
-    def stored(self, q: np.ndarray) -> float:
-        """Energy gained by the contact up to positions (n,), J of the part."""
-        return self._step.stored(self._faces.nodal(q))

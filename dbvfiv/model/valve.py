@@ -19,6 +19,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from ..case.model import Case
+from ..contact import PlaneContact
 from ..errors import SolveError
 from ..flow import RowAreas
 from ..flow.terms.line import Line, PiecedLine
@@ -32,7 +33,7 @@ from .load_steps import Loading
 from .newton import EquilibriumSolver, NewtonOptions
 from .outside import OutsideFluid
 from .relaxing import WallRelaxation
-from .supports import HELD_LIPS, FaceContact, face_contact, free_unknowns, held_rows, lip_stops
+from .supports import HELD_LIPS, face_contact, free_unknowns, held_rows, lip_stops
 
 #: Faces that meet change the residual from one step to the next: its norm has to fall.
 _AT_REST = NewtonOptions(1e-10, 200, "l2")
@@ -90,7 +91,7 @@ class ValveModel:
         dofs = self.shell.dofs
         self.rows = RowAreas(self.mesh, dofs.index)
         self.stops = lip_stops(case, self.mesh, dofs.index)
-        self.contact: FaceContact | None = face_contact(case, self.mesh, self.shell, closed_by)
+        self.contact: PlaneContact | None = face_contact(case, self.mesh, self.shell, closed_by)
         self.station_of_node = np.empty(len(self.mesh.nodes), np.int64)
         self.station_of_node[self.mesh.rows] = np.arange(len(self.mesh.rows))[:, None]
         self.loaded = loaded_share(self.mesh, case)
@@ -226,7 +227,7 @@ class ValveModel:
         """
         if self.contact is None:
             return np.inf
-        plane = self.contact.plane
+        plane = self.contact
         nodal = self.nodal(q)
         directors, first, _ = self.shell.directors(nodal)
         columns = [plane.axis, 3, 4]
@@ -377,7 +378,7 @@ class ValveModel:
         """
         if self.shell.stress_free is None:
             return 1.0
-        law = self.contact.plane.law
+        law = self.contact.law
         return 1.0 + (law.rounding - law.gap_at(self.shell.closing_pressure)) / self.case.valve.initial_gap
 
     def open_share(self, area: np.ndarray) -> float:

@@ -16,10 +16,10 @@ import numpy as np
 from eigen.factor import DirectFactor
 
 from ..case.parameters import Mu
+from ..contact import ContactStep, Rebound
 from ..flow.stepping import Flow, FrozenFluid, MovingFluid, SteadyFluid
 from ..model import ValveModel
 from ..model.linear import CoupledFactor
-from ..model.supports import FaceStep
 from ..shell import Memory, StepWall, WallMemory
 from .outside import MovingOutside, OutsideCorrection
 from .trial import Weights
@@ -44,7 +44,7 @@ class ValveMotion:
         What the wall remembers; None where it is elastic.
     fluid : MovingFluid
         The flow law in steps.
-    contact : FaceContact or None
+    contact : PlaneContact or None
         Of the inner faces; None where the valve has stops.
     """
 
@@ -139,7 +139,7 @@ class ValveMotion:
         q_load=None,
         v_load=None,
         step: StepWall | None = None,
-        contact: tuple[FaceStep, float] | None = None,
+        contact: tuple[ContactStep, float] | None = None,
     ) -> None:
         """Factor the iteration matrix.
 
@@ -153,7 +153,7 @@ class ValveMotion:
             Those that the fluid's equations are met at, if others.
         step : StepWall, optional
             The wall at the end of the step, if it relaxes.
-        contact : (FaceStep, float), optional
+        contact : (ContactStep, float), optional
             Contact of faces in the step, and its weight.
 
         Raises
@@ -190,9 +190,9 @@ class ValveMotion:
         solve = self._factor.solve_with_inner if self._correction is None else self._correction.solve
         return solve(force, rest)
 
-    def contact_step(self, q: np.ndarray, h: float) -> FaceStep:
+    def contact_step(self, q: np.ndarray, h: float) -> ContactStep:
         """Contact of the faces in a step of length h, s, from positions (n,)."""
-        return FaceStep(self.contact, q, h, self.model.case.supports.rebound)
+        return ContactStep(self.contact, q, h, Rebound(self.model.case.supports.rebound))
 
     def accelerated(self, q: np.ndarray, force: np.ndarray) -> np.ndarray:
         """Accelerations (n,) by a force (n,) against the inertia of the wall and of the fluid outside."""

@@ -78,7 +78,7 @@ class MeshData:
             branch_strength=branches.strengths[group, time],
             line_places=model.flow.line.places[0] if isinstance(model.flow, LineChannel) else np.zeros(0),
             gas_unknowns=np.array([model.flow.inner] if model.flow.compressed else [], np.int32),
-            face_nodes=np.zeros(0, np.int32) if model.contact is None else model.contact.plane.nodes.astype(np.int32),
+            face_nodes=np.zeros(0, np.int32) if model.contact is None else model.contact.nodes.astype(np.int32),
             part_name=(model.mesh.part.name,),
         )
 

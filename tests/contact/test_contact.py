@@ -7,7 +7,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from dbvfiv.contact import ContactLaw, PlaneContact, contact_form, tributary_area
+from dbvfiv.contact import ContactLaw, PlaneContact, tributary_area
 from dbvfiv.shell import Shell, ShellMesh
 from dbvfiv.shell.mesh import nodal_thickness
 from tests.shell.structures import grid, mixed_section
@@ -70,7 +70,7 @@ def test_a_law_that_makes_no_sense_is_refused(given):
 def test_force_is_the_derivative_of_the_energy(law):
     pressed = _pressed(law)
     q = _state(pressed)
-    assert 3 < pressed.contact.touching(q) < pressed.contact.plane.count
+    assert 3 < pressed.contact.touching(q) < pressed.contact.count
     shell_force = pressed.shell.force(q)
     force = pressed.structure(q)[0] - shell_force
     direction = np.random.default_rng(5).standard_normal(len(q))
@@ -100,7 +100,6 @@ def test_second_derivatives_agree_with_differences_of_the_tangent():
     q = _state(pressed)
     generator = np.random.default_rng(9)
     a, b = generator.standard_normal((2, len(q)))
-    expand, restrict = pressed.nodal, pressed.shell.dofs.restrict
     h = 1e-7
 
     def contact_only(q):
@@ -108,7 +107,7 @@ def test_second_derivatives_agree_with_differences_of_the_tangent():
         return pressed.shell.dofs.matrix(whole - bare) @ a
 
     change = (contact_only(q + h * b) - contact_only(q - h * b)) / (2 * h)
-    exact = restrict(contact_form(pressed.contact.plane, expand(q), expand(a), expand(b)))
+    exact = pressed.contact.form(q, a, b)
     assert exact == pytest.approx(change, rel=1e-4, abs=1e-5 * np.abs(change).max())
 
 
@@ -137,7 +136,7 @@ def test_a_contact_force_passes_through_the_touching_point():
 
 def test_points_that_start_beyond_the_plane_are_pushed_only_when_they_close_further():
     pressed = _pressed(ContactLaw(1e9), depth=np.full(30, 0.0095), least_gap=1e-4)
-    contact = pressed.contact.plane
+    contact = pressed.contact
     assert 0 < np.count_nonzero(contact.start < 0) < contact.count
     assert np.count_nonzero(contact.lifted) >= np.count_nonzero(contact.start < 0)
     rest = pressed.contact.state(pressed.rest())

@@ -62,7 +62,7 @@ def _ends(plane, size=1.0):
     pressed = type("Pressed", (), {"shell": plane.shell})
     old = _state(pressed)
     new = old + size * (_state(pressed, seed=8) - old)
-    return (plane.shell.dofs.expand(q) for q in (old, new))
+    return old, new
 
 
 @pytest.mark.parametrize("law", LAWS, ids=["kink", "rounded"])
@@ -72,8 +72,7 @@ def test_force_does_its_work_but_for_the_third_power_of_turns(law):
     for size in (0.1, 0.05):
         old, new = _ends(plane, size)
         step = ContactStep(plane, old, 1e-3)
-        way = plane.shell.dofs.restrict(new - old)
-        missing.append(abs(step.force(new) @ way - step.stored(new)))
+        missing.append(abs(step.force(new) @ (new - old) - step.stored(new)))
     assert missing[0] < 1e-3 * abs(step.stored(new))
     assert missing[1] < 0.25 * missing[0]
 
@@ -88,7 +87,7 @@ def test_tangent_is_the_derivative_of_the_force(law):
     step.add_tangent(new, data, 2.0)
     direction = np.random.default_rng(2).standard_normal(dofs.size)
     h = 1e-9
-    ahead, behind = (step.force(new + sign * h * dofs.expand(direction)) for sign in (1, -1))
+    ahead, behind = (step.force(new + sign * h * direction) for sign in (1, -1))
     change = (ahead - behind) / (2 * h)
     assert dofs.matrix(data) @ direction == pytest.approx(2.0 * change, rel=1e-4, abs=1e-5 * np.abs(change).max())
 
@@ -97,5 +96,6 @@ def test_without_contact_nothing_is_done():
     plane = _plane(LAWS[0])
     nodal = plane.shell.dofs.expand(np.zeros(plane.shell.dofs.size))
     nodal[5:, 1] += 0.05
-    step = ContactStep(plane, nodal, 1e-3)
-    assert not step.force(nodal).any() and step.stored(nodal) == 0.0
+    q = plane.shell.dofs.restrict(nodal)
+    step = ContactStep(plane, q, 1e-3)
+    assert not step.force(q).any() and step.stored(q) == 0.0

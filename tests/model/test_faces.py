@@ -47,7 +47,7 @@ def test_faces_meet_where_the_passage_is_used_up(make_model, changes):
     model = make_model(**FACES, **changes)
     valve = model.case.valve
     left = valve.lip_radius - valve.duckbill_wall_deduction + (1 - model.case.fluid.area_floor) * valve.initial_gap
-    at_rest = dict(zip(model.contact.plane.nodes, model.contact.state(model.rest()).gap))
+    at_rest = dict(zip(model.contact.nodes, model.contact.state(model.rest()).gap))
     assert np.array([at_rest[node] for node in _flat(model)]) == pytest.approx(left, rel=1e-6)
     assert min(at_rest.values()) > 0 and model.touching(model.rest()) == 0
 
@@ -66,7 +66,7 @@ def test_lips_that_lie_on_each_other_leave_the_area_of_a_shut_valve(model):
 
 def test_the_gap_of_a_bowed_lip_is_its_lens(make_model):
     model = make_model(**FACES, valve__lip_rise=5e-3)
-    plane, valve = model.contact.plane, model.case.valve
+    plane, valve = model.contact, model.case.valve
     middle = np.flatnonzero(plane.nodes == model.mesh.rows[0, 0])[0]
     gap = model.contact.state(model.rest()).gap[middle]
     inside = valve.duckbill_wall_deduction - (1 - model.case.fluid.area_floor) * valve.initial_gap
@@ -95,7 +95,7 @@ def _direction(model, seed):
 
 def _safe_step(model, q, direction) -> float:
     """Step within which no face leaves its piece of the contact's law."""
-    plane, nodal = model.contact.plane, model.nodal(q)
+    plane, nodal = model.contact, model.nodal(q)
     gap = plane.gap(nodal, model.shell.directors(nodal)[0])
     distance = np.minimum(np.abs(gap - plane.law.rounding), np.abs(gap + plane.law.rounding))
     there = model.nodal(q + 1e-9 * direction)
@@ -105,7 +105,7 @@ def _safe_step(model, q, direction) -> float:
 
 def test_tangent_against_differences(model, pressed_state):
     q = pressed_state
-    assert 3 < model.touching(q) < model.contact.plane.count
+    assert 3 < model.touching(q) < model.contact.count
     tangent = model.tangent(q, 18e3)
     assert np.allclose(tangent.residual, model.residual(q, 18e3), rtol=0, atol=1e-12 * np.abs(tangent.residual).max())
     direction = _direction(model, 2)
@@ -149,7 +149,7 @@ def test_a_valve_under_outside_pressure_is_the_pressed_shell(make_model):
     model = make_model(**FACES, drive__kind="uniform", drive__side="outside")
     path = LoadPath(model, SteadyOptions(NewtonOptions(1e-11), 1e-3))
     path.go_to(2e3)
-    pressed = ShellOnPlane(model.shell, model.contact.plane)
+    pressed = ShellOnPlane(model.shell, model.contact)
     pressed.loaded = model.loaded
     left = np.linalg.norm(pressed.residual(path.q, 2e3)) / pressed.force_scale(path.q, 2e3)
     state = model.contact.state(path.q)

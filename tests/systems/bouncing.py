@@ -44,7 +44,7 @@ class Planes:
 
 
 class PlaneStep:
-    """What a step asks of them, as `dbvfiv.motion.contact.FaceStep`."""
+    """What a step asks of them, as `dbvfiv.contact.ContactStep`."""
 
     def __init__(self, planes: Planes, q, h):
         self.planes, self.q, self.h = planes, q, h

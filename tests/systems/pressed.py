@@ -6,10 +6,9 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from dbvfiv.contact import PlaneContact, class_stiffness
+from dbvfiv.contact import PlaneContact
 from dbvfiv.model.classes import shell_of_class
 from dbvfiv.model.pressed_shell import PressedShell
-from dbvfiv.model.supports import FaceContact
 from dbvfiv.shell.pressure import pressure_stiffness
 
 
@@ -20,7 +19,7 @@ class ShellOnPlane(PressedShell):
 
     def __init__(self, shell, plane: PlaneContact | None = None, sign: float = -1.0):
         super().__init__(shell, sign)
-        self.contact = None if plane is None else FaceContact(shell, plane)
+        self.contact = plane
         self.length_unit = float(np.mean(shell.mesh.thickness))
 
     def internal_force(self, q):
@@ -51,5 +50,5 @@ def class_matrices(model: ShellOnPlane, free, apart: bool, q, pressure: float):
     pressure_stiffness(surface.quads, surface.nodes, nodal, uniform, model.loaded, dofs.slots, -1.0, values)
     stiffness = dofs.matrix(values)
     if model.contact is not None:
-        stiffness = stiffness + class_stiffness(model.contact.plane, nodal, shell, apart)
+        stiffness = stiffness + model.contact.stiffness_of_class(q, shell, apart)
     return stiffness.tocsr(), dofs.matrix(shell.mass(still))

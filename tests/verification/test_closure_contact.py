@@ -70,7 +70,7 @@ def test_a_strip_pressed_on_a_plane_lifts_off_where_beam_theory_says():
         state = model.contact.state(u)
         assert state.penetration < 1e-7
         errors.append(abs(state.total / WIDTH - force) / force)
-        x = model.mesh.nodes[model.contact.plane.nodes, 0]
+        x = model.mesh.nodes[model.contact.nodes, 0]
         fronts.append(abs(x[state.touching].min() - free))
         inner = state.touching & (x > free + (0.2 if elements == 40 else 0.1))  # behind the force at the front
         assert state.pressure[inner] == pytest.approx(q, rel=2e-3)
@@ -114,7 +114,7 @@ def _squeezed(elements: int, distances) -> list[ContactState]:
         step = (target - at) / 4
         while at < target - 1e-15:
             aim = min(at + step, target)
-            model.contact.plane.lift[:] = -aim
+            model.contact.lift[:] = -aim
             trial = _newton(model, factor, q)
             if trial is None:
                 step /= 2

@@ -15,6 +15,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -32,7 +33,8 @@ TOLERANCE = 1e-7
 _REFUSALS = 6
 
 
-class StiffnessSpectrum(NamedTuple):
+@dataclass(frozen=True, eq=False)
+class StiffnessSpectrum:
     """Eigenvalues nearest to zero at one state, ascending.
 
     Attributes
@@ -40,19 +42,29 @@ class StiffnessSpectrum(NamedTuple):
     values : (k,) complex array, 1/s2
         Of the whole tangent, by real part.
     vectors : (n, k) complex array
-    residuals : (k,) array
-        Norm of K x - mu M x over that of |K| |x|.
-    symmetric_values : (k,) array, 1/s2
-        Of the symmetric part.
-    asymmetry : float
-        Largest entry of K - K' over that of K.
+    stiffness, mass : (n, n) sparse matrices
     """
 
     values: np.ndarray
     vectors: np.ndarray
-    residuals: np.ndarray
-    symmetric_values: np.ndarray
-    asymmetry: float
+    stiffness: Any
+    mass: Any
+
+    @cached_property
+    def symmetric_values(self) -> np.ndarray:
+        """(k,) those of the symmetric part, 1/s2."""
+        symmetric = (0.5 * (self.stiffness + self.stiffness.T)).tocsr()
+        symmetric.sort_indices()
+        look = {"sigma": 0.0, "OPinv": _inverse(symmetric), "v0": _start(symmetric), "tol": 1e-12}
+        try:
+            return np.sort(spla.eigsh(symmetric, len(self.values), self.mass, return_eigenvectors=False, **look))
+        except (spla.ArpackError, ArithmeticError) as error:
+            raise SolveError(f"The lowest eigenvalues of the symmetric stiffness were not found ({error}).") from error
+
+    @property
+    def asymmetry(self) -> float:
+        """Largest entry of K - K' over that of K."""
+        return float(abs(self.stiffness - self.stiffness.T).max() / abs(self.stiffness).max())
 
     @property
     def lowest(self) -> float:
@@ -82,14 +94,11 @@ def spectrum_of(stiffness, mass, pressure: float, count: int = 4, tolerance: flo
     SolveError
         If the eigenvalues did not converge, or did not to the accuracy asked for.
     """
-    symmetric = (0.5 * (stiffness + stiffness.T)).tocsr()
-    symmetric.sort_indices()
     try:
         values, vectors, residuals = _nearest(stiffness, mass, count, 0.0)
         if residuals.max() > tolerance:
             # An eigenvalue next to the shift drowns the others; stand off by a fraction of their distance.
             values, vectors, residuals = _nearest(stiffness, mass, count, -0.1 * float(np.abs(values).max()))
-        lower = _symmetric(symmetric, mass, count)
     except (spla.ArpackError, ArithmeticError) as error:
         raise SolveError(f"The lowest stiffness eigenvalues at {pressure:.6g} Pa were not found ({error}).") from error
     if residuals.max() > tolerance:
@@ -97,8 +106,7 @@ def spectrum_of(stiffness, mass, pressure: float, count: int = 4, tolerance: flo
             f"The lowest stiffness eigenvalues at {pressure:.6g} Pa were found to a relative residual of "
             f"{residuals.max():.2g} only, not to {tolerance:.2g}."
         )
-    skew = abs(stiffness - stiffness.T).max() / abs(stiffness).max()
-    return StiffnessSpectrum(values, vectors, residuals, lower, float(skew))
+    return StiffnessSpectrum(values, vectors, stiffness, mass)
 
 
 def _nearest(stiffness, mass, count, shift):
@@ -110,11 +118,6 @@ def _nearest(stiffness, mass, count, shift):
     # Measured against the size of the terms that cancel, for an eigenvalue may be zero.
     size = np.linalg.norm(abs(stiffness) @ np.abs(vectors), axis=0)
     return values, vectors, np.linalg.norm(stiffness @ vectors - mass @ vectors * values, axis=0) / size
-
-
-def _symmetric(symmetric, mass, count):
-    look = {"sigma": 0.0, "OPinv": _inverse(symmetric), "v0": _start(symmetric), "tol": 1e-12}
-    return np.sort(spla.eigsh(symmetric, count, mass, return_eigenvectors=False, **look))
 
 
 def _start(matrix) -> np.ndarray:

@@ -194,7 +194,7 @@ class ClosedValve(ValveModel):
         self.supports = case.closure.supports
         super().__init__(case.replace(CLOSED), closed_by=self.supports)
         self.held = held_rows(case, self.mesh) & (self.supports == HELD_LIPS)
-        faces = face_contact(self.case, self.mesh, self.shell, CONTACT).plane
+        faces = face_contact(self.case, self.mesh, self.shell, CONTACT)
         self.face = InnerFace(self.mesh, self.shell, faces, case.valve.initial_gap, case.closure.shut_fraction)
 
     @property
@@ -259,7 +259,7 @@ class Pressed:
 
     def describe(self) -> None:
         """Add the columns that only states have."""
-        model, plane, touch = self.model, self.model.contact.plane, self.touch
+        model, plane, touch = self.model, self.model.contact, self.touch
         self.sealed_area = float(model.mesh.part.walls * plane.area[touch.touching].sum())
         self.largest_contact_pressure = float(touch.pressure.max(initial=0.0))
         self.contact_nodes = int(np.count_nonzero(touch.touching))
@@ -281,7 +281,7 @@ class Pressed:
         plane, model = self.model.face.plane, self.model
         movable = np.ones(len(self.nodal), bool)
         movable[model.mesh.rows[model.held].ravel()] = False
-        gap = plane.gap(self.nodal, model.shell.directors(self.nodal)[0])
+        gap = plane.gaps(self.q)
         return float(max(0.0, -gap[movable[plane.nodes]].min(initial=0.0)))
 
     @property
@@ -315,7 +315,7 @@ def force_imbalance(model: Any, q: np.ndarray, load: np.ndarray) -> float:
     The supports give what the internal forces at held displacements ask for, so the check knows nothing of how the
     state was found.
     """
-    nodal, plane = model.nodal(q), model.contact.plane
+    nodal, plane = model.nodal(q), model.contact
     internal, contact = model.shell.with_free().force(nodal.ravel()).reshape(nodal.shape), np.zeros_like(nodal)
     contact[plane.nodes, plane.axis] = model.contact.state(q).force
     held = np.where(model.shell.dofs.free, 0.0, internal - load - contact)
