@@ -9,7 +9,7 @@ import numpy as np
 
 from dbvfiv.case.parameters import Mu
 from dbvfiv.model import ValveModel, linearise
-from dbvfiv.model.equilibria import find_equilibria
+from dbvfiv.model.equilibria import find_equilibrium
 from dbvfiv.motion.control import RunOptions
 from dbvfiv.studies.case import thesis_case
 from dbvfiv.studies.stability.walk import StabilityWalk
@@ -42,7 +42,7 @@ def _times(functions: dict, rounds: int = 3) -> dict[str, float]:
 def modes():
     """Ten leading pairs at 6 kPa with their linearisation, and a column of 64 densities with its steady state."""
     models = {"dry": ValveModel(thesis_case()), "wet": ValveModel(thesis_case(WATER))}
-    q = find_equilibria(models["dry"], [6e3]).states[0].q
+    q = find_equilibrium(models["dry"], 6e3).q
     workspace, wet = Workspace(), models["wet"]
     structure = wet.shell.dofs.matrix(wet.structure(q)[1])
 

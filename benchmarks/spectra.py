@@ -8,7 +8,7 @@ import numpy as np
 
 from dbvfiv.case.parameters import Mu
 from dbvfiv.model import ValveModel, linearise, select_search
-from dbvfiv.model.equilibria import find_equilibria
+from dbvfiv.model.equilibria import find_equilibrium
 from dbvfiv.studies.case import thesis_case
 from dbvfiv.studies.stability.walk import StabilityWalk
 from eigen import Relaxation, SearchOptions, Workspace, certified_spectrum, leading_modes, lowest_frequencies
@@ -26,7 +26,7 @@ REFERENCE = Mu(density=10.0, alpha=0.0, beta=3e-3)
 def modes():
     """Ten leading coupled pairs at one state, linearisation included."""
     model = model_of(28, 48)
-    q = find_equilibria(model, [6e3]).states[0].q
+    q = find_equilibrium(model, 6e3).q
     factor = refactorisation(model, q)
     workspace = Workspace()
 
@@ -66,7 +66,7 @@ def modes_behind_a_line():
     conditions, times, found = Mu(density=1000.0, alpha=0.0, beta=4e-4), {}, {}
     for name, keys in (("rigid", {}), ("elastic", {"upstream.wave_speed": 1000.0})):
         model = ValveModel(thesis_case(LINE | keys))
-        pencil = linearise(model, find_equilibria(model, [18e3]).states[0].q, 18e3).pencil(conditions)
+        pencil = linearise(model, find_equilibrium(model, 18e3).q, 18e3).pencil(conditions)
         options, workspace = SearchOptions(200.0, limit_point=-1 / conditions.beta), Workspace()
         solves = {
             "leading modes": lambda p=pencil, o=options, w=workspace: leading_modes(p, 10, o, workspace=w),
@@ -95,7 +95,7 @@ def modes_that_relax():
     """
     model = model_of(28, 48)
     for pressure in (6e3, 20e3):
-        linear = linearise(model, find_equilibria(model, [pressure]).states[0].q, pressure)
+        linear = linearise(model, find_equilibrium(model, pressure).q, pressure)
         relaxation = Relaxation([share * linear.structure for share in SHARES], STRENGTHS, TIMES)
         structure = linear.pencil(Mu(density=10.0, alpha=0.0, beta=0.0), fluid=False).replace(relaxation=relaxation)
         workspaces = Workspace(), Workspace()
@@ -150,7 +150,7 @@ LAWS = {"storage": 1.0, "quasi-steady": 0.0}
 def modes_at_any_state():
     """Ten leading coupled pairs at one state under light and heavy damping and fluid, linearisation left out."""
     model = model_of(28, 48)
-    q = find_equilibria(model, [6e3]).states[0].q
+    q = find_equilibrium(model, 6e3).q
     linear, factor, workspace = linearise(model, q, 6e3), refactorisation(model, q), Workspace()
     structure = linear.pencil(REFERENCE, fluid=False)
 
@@ -182,7 +182,7 @@ def density_sweep():
     sample.
     """
     model = model_of(28, 48)
-    state = linearise(model, find_equilibria(model, [6e3]).states[0].q, 6e3)
+    state = linearise(model, find_equilibrium(model, 6e3).q, 6e3)
     options = SearchOptions(limit_point=-1 / REFERENCE.beta)
     workspace = Workspace()
 
@@ -193,7 +193,7 @@ def density_sweep():
     densities = np.geomspace(1.0, 1000.0, 100)
     place = Mu.of(model.case).at(pressure=6e3, alpha=REFERENCE.alpha, beta=REFERENCE.beta)
     walk = StabilityWalk(model.case, model=model)
-    walk.give(place, find_equilibria(model, [6e3]).states[0].q)
+    walk.give(place, find_equilibrium(model, 6e3).q)
     places = [place.at(density=float(density)) for density in densities]
     spent, result = seconds(lambda: walk.column(places, 6, edges=True, count=6))
     yield Row(

@@ -11,7 +11,7 @@ import tempfile
 import numpy as np
 
 from dbvfiv.model import ValveModel
-from dbvfiv.model.equilibria import find_equilibria
+from dbvfiv.model.equilibria import LoadPath, find_equilibrium
 from dbvfiv.studies.case import thesis_case
 from eigen.factor import DirectFactor
 
@@ -34,7 +34,7 @@ def refactorisation(model: ValveModel, q: np.ndarray) -> DirectFactor:
 
 
 def assembly(model: ValveModel, rounds: int = 15) -> tuple[dict[str, float], np.ndarray]:
-    q = find_equilibria(model, [6e3]).states[0].q
+    q = find_equilibrium(model, 6e3).q
     factor = refactorisation(model, q)
     times = medians(
         {
@@ -68,8 +68,8 @@ def head_discharge():
         model = model_of(around, along)
         times, _ = assembly(model, 5)
         unit = len(CURVE) * 4 * (times["tangent"] + times["lu"])
-        spent, result = seconds(lambda: find_equilibria(model, CURVE))
-        iterations = sum(state.iterations for state in result.states)
+        spent, result = seconds(lambda: [path.go_to(pressure) for path in [LoadPath(model)] for pressure in CURVE])
+        iterations = sum(state.iterations for state in result)
         target = 8.0 if (around, along) == (28, 48) else None
         yield Row(
             f"{around} x {along}: 12 pressures over 12 x 4 (assembly + LU)",

@@ -1,8 +1,8 @@
-"""Equilibria over a list of pressures, by load steps from rest or from a given state."""
+"""Equilibria at inlet pressures, by load steps from rest or from a given state."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -26,35 +26,13 @@ _UNBALANCED = 1e-4
 
 @dataclass(frozen=True)
 class SteadyOptions(LoadStepOptions):
-    """Options of a list of equilibria."""
+    """Options of a path of equilibria."""
 
     @classmethod
     def of(cls, case) -> SteadyOptions:
         """Options of a case file."""
         steady = case.steady
         return cls(NewtonOptions(steady.tolerance, steady.max_iterations), steady.min_step)
-
-
-@dataclass(frozen=True)
-class Equilibria:
-    """Equilibria in the order asked for.
-
-    Attributes
-    ----------
-    model : ValveModel
-    states : tuple of SteadyState
-        Converged states only.
-    failures : tuple of str
-        One sentence for each pressure that was not reached.
-    warnings : tuple of str
-    interrupted : bool
-    """
-
-    model: ValveModel
-    states: tuple[SteadyState, ...]
-    failures: tuple[str, ...] = ()
-    warnings: tuple[str, ...] = ()
-    interrupted: bool = False
 
 
 #: Passage at the lips over that of the flange from which on a lost equilibrium is put down to it.
@@ -167,44 +145,6 @@ class LoadPath(LoadSteps):
         )
 
 
-def find_equilibria(
-    model: ValveModel,
-    pressures: Iterable[float],
-    options: SteadyOptions | None = None,
-    observer: Observer | None = None,
-    start: SteadyState | None = None,
-) -> Equilibria:
-    """Equilibria at a list of inlet pressures, Pa, each reached from the one before.
-
-    A pressure that is not reached is reported in `failures` and the list goes on from the last equilibrium; an
-    interrupt ends the list and keeps what was found.
-    """
-    options = SteadyOptions.of(model.case) if options is None else options
-    observer = Observer() if observer is None else observer
-    pressures = [float(pressure) for pressure in pressures]
-    path = LoadPath(model, options, observer=observer)
-    if start is not None:
-        path.q, path.pressure = start.q, start.pressure
-    states: list[SteadyState] = []
-    failures: list[str] = []
-    warnings = list(model_warnings(model))
-    observer.begin("steady", len(pressures))
-    for sentence in warnings:
-        observer.warn(sentence)
-    interrupted = False
-    try:
-        for state in _states(path, pressures, failures, observer):
-            states.append(state)
-            observer.item(state)
-    except KeyboardInterrupt:
-        interrupted = True
-    for sentence in state_warnings(model, states):
-        warnings.append(sentence)
-        observer.warn(sentence)
-    observer.end(interrupted)
-    return Equilibria(model, tuple(states), tuple(failures), tuple(warnings), interrupted)
-
-
 def find_equilibrium(model: ValveModel, pressure: float, observer: Observer | None = None) -> SteadyState:
     """Equilibrium at one inlet pressure, Pa, by load steps from rest.
 
@@ -276,15 +216,6 @@ def require_equilibrium(model: ValveModel, state: SteadyState) -> None:
             f"{unbalanced:.2g} N against "
             f"{scale:.2g} N of pressure, so it has no modes; find the equilibrium first."
         )
-
-
-def _states(path: LoadPath, pressures: list[float], failures: list[str], observer: Observer) -> Iterator[SteadyState]:
-    for pressure in pressures:
-        try:
-            yield path.go_to(pressure)
-        except SolveError as error:
-            failures.append(str(error))
-            observer.warn(str(error))
 
 
 def model_warnings(model: ValveModel) -> Iterator[str]:

@@ -1,4 +1,4 @@
-"""Equilibria over pressures: what is reached, what is said when it is not, and what an interrupt leaves."""
+"""Equilibria over pressures: what is reached, and what is said when it is not."""
 
 from __future__ import annotations
 
@@ -8,12 +8,11 @@ import pytest
 from dbvfiv.case.load import make_case, parse_toml
 from dbvfiv.errors import CaseError, SolveError
 from dbvfiv.model import ValveModel
-from dbvfiv.model.equilibria import LoadPath, SteadyOptions, find_equilibria, model_warnings
+from dbvfiv.model.equilibria import LoadPath, SteadyOptions, model_warnings
 from dbvfiv.model.newton import NewtonOptions
 from dbvfiv.model.state import LipCentre
 from dbvfiv.record.states import summarise
 from dbvfiv.studies.case import Case, thesis_case
-from tests.observers import Stop
 
 
 @pytest.fixture(scope="module")
@@ -100,10 +99,8 @@ def test_heads_of_the_fluid():
 
 def test_run_keeps_the_order_asked_for(model):
     pressures = [5e3, 20e3, 2e3]
-    result = find_equilibria(model, pressures)
-    assert [state.pressure for state in result.states] == pressures
-    assert not result.failures and not result.interrupted
-    points = [summarise(state) for state in result.states]
+    path = LoadPath(model)
+    points = [summarise(path.go_to(pressure)) for pressure in pressures]
     assert points[0]["mass_flow"] < points[1]["mass_flow"]
     wanted = {
         "pressure",
@@ -144,20 +141,6 @@ def test_failure_is_one_sentence(model, one_sentence):
     assert path.pressure == 0.0 and np.all(path.q == 0.0)
 
 
-def test_failed_pressures_are_reported_and_the_list_goes_on(model):
-    rest = LoadPath(model).go_to(2e3)
-    result = find_equilibria(model, [40e3, 2e3], one_iteration(model), start=rest)
-    assert len(result.failures) == 1 and "40000 Pa" in result.failures[0]
-    assert [state.pressure for state in result.states] == [2e3]
-
-
-def test_an_interrupt_keeps_what_is_done(model):
-    observer = Stop(2)
-    result = find_equilibria(model, [2e3, 4e3, 6e3], observer=observer)
-    assert result.interrupted and observer.ended is True
-    assert [state.pressure for state in result.states] == [2e3, 4e3]
-
-
 def test_uniform_pressure():
     model = ValveModel(thesis_case({"mesh.around": 8, "mesh.along": 12, "drive.kind": "uniform"}))
     state = LoadPath(model).go_to(2e3)
@@ -168,6 +151,5 @@ def test_uniform_pressure():
 def test_a_state_without_a_finite_flow_is_an_error():
     """Lips 100 mm apart at rest open beyond the flange: before, a flow of inf was "converged"."""
     model = ValveModel(thesis_case({"mesh.around": 8, "mesh.along": 16, "valve.initial_gap": "100 mm"}))
-    result = find_equilibria(model, [6e3])
-    assert not result.states
-    assert "no finite steady flow" in result.failures[0] or "No equilibrium" in result.failures[0]
+    with pytest.raises(SolveError, match="no finite steady flow|No equilibrium"):
+        LoadPath(model).go_to(6e3)

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from scipy.sparse.linalg import eigsh
 
-from dbvfiv.model.equilibria import find_equilibria
+from dbvfiv.model.equilibria import find_equilibrium
 from tests.verification.solid_wall import FoldedWallError, SolidWall, valve_model
 
 pytestmark = pytest.mark.slow
@@ -48,7 +48,7 @@ def test_small_displacements_under_pressure(factor, through, _, near):
     """Lips of the valve under a small uniform pressure; it hardly matters which face it acts on."""
     pressure = factor**3
     model = valve_model(48, 48, factor, **UNIFORM)
-    state = find_equilibria(model, [pressure]).states[-1]
+    state = find_equilibrium(model, pressure)
     wall = SolidWall(model, through)
     lips = [wall.middle(wall.respond(pressure, share))[0, 0, 1] for share in (0.5, 1.0)]
     print(
@@ -64,7 +64,7 @@ def test_the_shell_is_of_second_order_in_the_thickness():
     errors = []
     for factor in (0.85, 0.5):
         model = valve_model(48, 48, factor, **UNIFORM)
-        state, wall = find_equilibria(model, [factor**3]).states[-1], SolidWall(model, 2)
+        state, wall = find_equilibrium(model, factor**3), SolidWall(model, 2)
         errors.append(abs(state.lip_displacement / wall.middle(wall.respond(factor**3, 0.5))[0, 0, 1] - 1.0))
     print(f"\nerrors of the lips at 0.85 and 0.5 of the thickness: {errors[0]:.4f}, {errors[1]:.4f}")
     assert errors[0] / errors[1] > (0.85 / 0.5) ** 2
@@ -73,7 +73,7 @@ def test_the_shell_is_of_second_order_in_the_thickness():
 def test_large_displacements_under_the_pressures_of_the_flow():
     """Half the thickness at 500 Pa, where the lips open by 18 mm: the pressures of the law on the inner face."""
     model = valve_model(48, 48, 0.5)
-    state = find_equilibria(model, [500.0]).states[-1]
+    state = find_equilibrium(model, 500.0)
     shell = model.nodal(state.q)[model.mesh.rows][::2, ::2, :3]
     solid = SolidWall(model)
     moved = solid.middle(solid.solve(model.mesh.z, state.station_pressure))
@@ -98,7 +98,7 @@ def test_layers_of_unlike_stiffness_need_lengths_of_their_own():
     lips = {}
     for metric in ("first-order", "shifted"):
         model = valve_model(48, 48, 0.5, wall, **UNIFORM, **{"shell.metric": metric})
-        lips[metric] = find_equilibria(model, [0.1]).states[-1].lip_displacement
+        lips[metric] = find_equilibrium(model, 0.1).lip_displacement
     solid = SolidWall(model)
     wanted = solid.middle(solid.respond(0.1, 0.5))[0, 0, 1]
     print("".join(f"\n{name}: {1e6 * lip:.4f} um, solid {1e6 * wanted:.4f}" for name, lip in lips.items()))

@@ -7,7 +7,7 @@ import pytest
 
 from dbvfiv.case.parameters import Mu
 from dbvfiv.model import ValveModel, linearise
-from dbvfiv.model.equilibria import find_equilibria
+from dbvfiv.model.equilibria import LoadPath, SteadyOptions
 from dbvfiv.studies.case import thesis_case
 from eigen import SearchOptions, Workspace, leading_modes
 from eigen.basis import TransferBasis
@@ -22,7 +22,8 @@ def model_of(around, along, **changes):
 
 
 def linearised(model, pressures):
-    return [linearise(model, state.q, state.pressure) for state in find_equilibria(model, pressures).states]
+    path = LoadPath(model, SteadyOptions.of(model.case))
+    return [linearise(model, path.go_to(float(p)).q, float(p)) for p in pressures]
 
 
 @pytest.fixture(scope="module")

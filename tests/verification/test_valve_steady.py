@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 
 from dbvfiv.model import ValveModel
-from dbvfiv.model.equilibria import find_equilibria
+from dbvfiv.model.equilibria import LoadPath, SteadyOptions
 from dbvfiv.studies.case import thesis_case
 from tests.shell.structures import richardson
 from tests.small_valves import FORMER
@@ -29,9 +29,8 @@ def states(pressures, around=28, along=48, **changes):
     case = thesis_case(
         {"mesh.around": around, "mesh.along": along} | {k.replace("__", "."): v for k, v in changes.items()}
     )
-    result = find_equilibria(ValveModel(case), pressures)
-    assert not result.failures
-    return result.states
+    path = LoadPath(ValveModel(case), SteadyOptions.of(case))
+    return [path.go_to(float(pressure)) for pressure in pressures]
 
 
 @cache

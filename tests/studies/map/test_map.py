@@ -10,7 +10,7 @@ import pytest
 from dbvfiv.cli import run
 from dbvfiv.errors import SolveError
 from dbvfiv.model import ValveModel
-from dbvfiv.model.equilibria import LoadPath, find_equilibria
+from dbvfiv.model.equilibria import LoadPath, find_equilibrium
 from dbvfiv.observer import Observer
 from dbvfiv.record.header import Header
 from dbvfiv.record.record import GrowingRecord
@@ -215,7 +215,7 @@ def test_a_map_without_damping_finds_what_modes_finds(undamped, coarse_case):
         for j in (1, 2):
             case = coarse_case.replace(UNDAMPED | {"fluid.density": undamped.plan.y.values[j]})
             model = ValveModel(case)
-            (state,) = find_equilibria(model, [pressure]).states
+            state = find_equilibrium(model, pressure)
             modes = run_modes(model, state)
             assert modes.certificate.agrees
             assert undamped.grid("growth_rate")[0][j, i] == pytest.approx(modes.eigenvalues[0].real, rel=1e-5)

@@ -6,7 +6,7 @@ import pytest
 from dbvfiv.case.parameters import Mu
 from dbvfiv.errors import CaseError
 from dbvfiv.model import ValveModel, linearise
-from dbvfiv.model.equilibria import find_equilibria
+from dbvfiv.model.equilibria import find_equilibrium
 from dbvfiv.model.newton import EquilibriumSolver, NewtonOptions
 from dbvfiv.studies.case import thesis_case
 from dbvfiv.studies.stability.derivatives import Neighbourhood, changed, parameters_of
@@ -22,7 +22,7 @@ MODES = 2
 
 def beside(changes, mu, options):
     model = ValveModel(thesis_case(changes))
-    q = find_equilibria(model, [6e3]).states[0].q
+    q = find_equilibrium(model, 6e3).q
     found = leading_modes(linearise(model, q, 6e3).pencil(mu), MODES + 1, SearchOptions(left=True, **options))
     return Neighbourhood(model, q, 6e3, mu, [found.mode(i) for i in range(MODES)])
 

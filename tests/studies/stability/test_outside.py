@@ -8,7 +8,7 @@ import pytest
 import dbvfiv
 from dbvfiv.case.parameters import Mu
 from dbvfiv.model import ValveModel, linearise
-from dbvfiv.model.equilibria import find_equilibria
+from dbvfiv.model.equilibria import find_equilibrium
 from dbvfiv.studies.case import thesis_case
 from dbvfiv.studies.stability.derivatives import Neighbourhood
 from dbvfiv.studies.stability.walk import StabilityWalk
@@ -55,7 +55,7 @@ def test_sensitivities_are_slopes_of_the_eigenvalue():
     model, pressure, conditions = ValveModel(case), 8e3, Mu(density=200.0, alpha=0.0, beta=0.002)
 
     def leading(pressure, density, near=None):
-        q = find_equilibria(model, [pressure]).states[0].q
+        q = find_equilibrium(model, pressure).q
         pencil = linearise(model, q, pressure).pencil(conditions.at(density=density))
         found = leading_modes(pencil, 6, SearchOptions(limit_point=-500.0, left=near is None))
         i = (
