@@ -12,8 +12,6 @@ from nicegui import ui
 
 from ..errors import CaseError
 
-#: Colour bar below a figure, so that a narrow page keeps its width.
-COLOUR_BAR = {"orientation": "h", "y": -0.05, "yanchor": "top", "thickness": 12}
 #: Steps of a slider; time for which it rests before more than the prediction is computed, s.
 STEPS, REST = 400, 0.25
 #: Numbers that an answer shows: title, entry of the state, factor and unit.
@@ -284,7 +282,7 @@ def _space(found: dict[str, Any], colour: str) -> dict[str, Any]:
     mesh |= {
         "intensity": found["colours"][colour],
         "flatshading": True,
-        "colorbar": COLOUR_BAR | {"title": {"text": colour}},
+        "colorbar": colour_bar(colour, -0.05),
     }
     camera = {"eye": {"x": -1.8, "y": -1.9, "z": 1.1}}
     scene = {"aspectmode": "data", "camera": camera, **{f"{a}axis": {"title": {"text": f"{n}, m"}} for a, n in _AXES}}
@@ -294,6 +292,12 @@ def _space(found: dict[str, Any], colour: str) -> dict[str, Any]:
 
 #: Axes of the figure and of the valve.
 _AXES = (("x", "z"), ("y", "x"), ("z", "y"))
+
+
+def colour_bar(title: str, y: float) -> dict[str, Any]:
+    """Colour bar below a figure, so that a narrow page keeps its width."""
+    place = {"orientation": "h", "y": y, "yanchor": "top", "thickness": 12}
+    return place | {"title": {"text": title, "side": "top"}}
 
 
 def label_of(row: dict[str, Any]) -> str:

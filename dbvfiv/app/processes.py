@@ -146,7 +146,7 @@ class Workers:
     """
 
     def __init__(self) -> None:
-        self.drawing = Worker(BEHIND)
+        self.drawing = Worker(BEHIND // 2)
         self._pairs: OrderedDict[Path, tuple[Worker, Worker]] = OrderedDict()
         self._askers: dict[Path, set[object]] = {}
 

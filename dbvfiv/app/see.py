@@ -14,7 +14,7 @@ from ..case.parameters import PARAMETERS, Mu
 from ..errors import CaseError
 from ..studies import KINDS
 from ..studies.case import load_case
-from .ask import COLOUR_BAR, label_of
+from .ask import colour_bar, label_of
 from .processes import RECORD, Run
 from .sheet import shown_as
 
@@ -164,9 +164,8 @@ def show_map(page: Any, run: Run, found: dict[str, Any]) -> None:
     rows = [shown_as(case, name) for name in names]
     x, y = ([value / row["scale"] for value in axis["values"]] for axis, row in zip(axes, rows))
     limit = max((abs(rate) for row in grid for rate in row if rate is not None), default=1.0)
-    bar = COLOUR_BAR | {"title": {"text": "Growth rate, 1/s"}, "y": -0.25}
     cells = {"type": "heatmap", "x": x, "y": y, "z": grid, "colorscale": "RdBu", "zmin": -limit, "zmax": limit}
-    drawn = [cells | {"colorbar": bar}]
+    drawn = [cells | {"colorbar": colour_bar("Growth rate, 1/s", -0.22)}]
     for curve in found["onset_curves"]:
         points = {name: [point[i] / rows[i]["scale"] for point in curve] for i, name in enumerate("xy")}
         drawn.append({"type": "scatter", "mode": "lines", "line": {"color": "black"}, "showlegend": False} | points)
@@ -177,7 +176,7 @@ def show_map(page: Any, run: Run, found: dict[str, Any]) -> None:
     layout = {"height": 480, "margin": {"t": 40, "r": 10}, "showlegend": False}
     for name, axis, row in zip("xy", axes, rows):
         layout[f"{name}axis"] = {"title": {"text": label_of(row)}, "type": "log" if axis.get("log") else "linear"}
-        layout[f"{name}axis"]["exponentformat"] = "none"
+        layout[f"{name}axis"] |= {"exponentformat": "none", "automargin": True}
     figure = {"data": drawn, "layout": layout, "config": {"responsive": False, "displaylogo": False}}
 
     def go(event: events.GenericEventArguments) -> None:

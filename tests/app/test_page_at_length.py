@@ -121,7 +121,7 @@ def kept(driver, address: str) -> dict[str, bytes]:
     """Files that the page links to, as the browser gets them."""
     script = """const [links, told] = arguments;
         Promise.all(links.map(l => fetch(l).then(r => r.ok ? r.arrayBuffer() : null)).map(p => p.then(b =>
-            b && Array.from(new Uint8Array(b.slice(0, 200)))))).then(told)"""
+            b && Array.from(new Uint8Array(b.slice(0, 4000)))))).then(told)"""
     links = [e.get_attribute("href") for e in driver.find_elements("css selector", f"a[download][href*='{address}']")]
     found = driver.execute_async_script(script, links)
     assert links and None not in found
