@@ -24,7 +24,10 @@ LOOK, LARGEST = 1.0, 15 << 20
 PICTURES = {
     "Head-loss curve": ("steady", ("-p", "{kpa_low:.6g} kPa:{kpa_high:.6g} kPa:10")),
     "Root locus over head": ("sweep", ("--over", "pressure={low:.6g}:{high:.6g}:10")),
-    "Stability map": ("map", ("--x", "pressure={low:.6g}:{high:.6g}:8", "--y", "{damping}:8")),
+    "Stability map": (
+        "map",
+        ("--x", "pressure={low:.6g}:{high:.6g}:8", "--y", "{damping}:8", "--contours", "2 %,5 %"),
+    ),
     "Cycle amplitude": ("cycle", ("--over", "{damping}:6")),
     "Closure": ("closure", ()),
     "Probability of chatter": ("uncertainty", ()),
@@ -166,9 +169,13 @@ def show_map(page: Any, run: Run, found: dict[str, Any]) -> None:
     limit = max((abs(rate) for row in grid for rate in row if rate is not None), default=1.0)
     cells = {"type": "heatmap", "x": x, "y": y, "z": grid, "colorscale": "RdBu", "zmin": -limit, "zmax": limit}
     drawn = [cells | {"colorbar": colour_bar("Growth rate, 1/s", -0.22)}]
-    for curve in found["onset_curves"]:
+    curves = [("onset", "solid", curve) for curve in found["onset_curves"]]
+    curves += [(f"damping ratio {one['level']}", "dot", one["points"]) for one in found.get("contours", ())]
+    for title, dash, curve in curves:
         points = {name: [point[i] / rows[i]["scale"] for point in curve] for i, name in enumerate("xy")}
-        drawn.append({"type": "scatter", "mode": "lines", "line": {"color": "black"}, "showlegend": False} | points)
+        drawn.append(
+            {"type": "scatter", "mode": "lines", "line": {"color": "black", "dash": dash}, "name": title} | points
+        )
     own = Mu.of(case)
     marker = {"symbol": "star", "size": 16, "color": "gold", "line": {"color": "black", "width": 1}}
     star = {axis: [own[name] / row["scale"]] for axis, name, row in zip("xy", names, rows)}
@@ -189,7 +196,9 @@ def show_map(page: Any, run: Run, found: dict[str, Any]) -> None:
         page.asking.open(values)
 
     ui.plotly(figure).classes("full").props('data-at="map"').on("plotly_click", go)
-    ui.label("A click on a cell asks the valve there.").classes("note")
+    ui.label("Solid: onset; dotted: margins of 2 and 5 % damping. A click on a cell asks the valve there.").classes(
+        "note"
+    )
 
 
 class SeePanel:
