@@ -71,7 +71,6 @@ class Chances:
         """
         plan, inputs, count = self.plan, self.inputs, self.plan.case.map.samples
         along, across, law, solver = plan.along, plan.across.parameter, plan.base.storage, ColumnSolver()
-        ends = np.array([0.0, 1.0])
 
         def point(case: Case, row: np.ndarray, place: float) -> Mu:
             return inputs.point(case, row, **({"storage": law} | {across: value, along.parameter: place}))
@@ -88,8 +87,8 @@ class Chances:
         origin = rows(np.zeros((1, d)), np.array([0.5]))[0]
         scales = np.array([*(one.distribution.scale for one in inputs.inputs), np.ptp(along.values)])
         near = quasi_random(TAKEN + CHECKS, d, NEAR_SEED)
-        taken = rows(near[:TAKEN], np.linspace(*ends, TAKEN))
-        checks = rows(near[TAKEN:], np.linspace(*ends, CHECKS + 2)[1:-1])
+        taken = rows(near[:TAKEN], np.linspace(0.0, 1.0, TAKEN))
+        checks = rows(near[TAKEN:], np.linspace(0.0, 1.0, CHECKS + 2)[1:-1])
         own = StabilityWalk(plan.case)
         start = own.equilibrium(plan.place(value, along.values[0], law))
         shared = find_neighbours(at, origin, scales, start, taken, checks)
