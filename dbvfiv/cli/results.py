@@ -229,9 +229,9 @@ def compare(
 
 def _recognise(files: list[Path], columns: Sequence[str], within: float) -> Recognition:
     """A measured record beside a result."""
-    from ..studies.recognition import Reading, Recognition, judge_file
+    from ..studies.recognition import Recognition
     from ..studies.session import load_result
-    from ..verdict import JudgeOptions
+    from ..verdict.reading import Reading, judge_file
 
     if len(files) != 2:
         raise CaseError(
@@ -240,9 +240,7 @@ def _recognise(files: list[Path], columns: Sequence[str], within: float) -> Reco
         )
     if not 0 < within < 100:
         raise CaseError(f"--within is {within:g}; it must be greater than 0 and less than 100.")
-    judged = judge_file(files[0], Reading(columns), JudgeOptions())
-    signals = [(one.signal.name, one.signal.time, one.signal.values, one.verdict) for one in judged]
-    return Recognition(signals, load_result(files[1]), 0.01 * within)
+    return Recognition(judge_file(files[0], Reading(columns)), load_result(files[1]), 0.01 * within)
 
 
 def life(

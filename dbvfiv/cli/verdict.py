@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from ..errors import CaseError
 from .terminal import AsJson, print_json
+
+if TYPE_CHECKING:
+    from ..verdict.reading import Signal
 
 
 def verdict(
@@ -67,14 +70,22 @@ def verdict(
 
     dbvfiv verdict pressure.csv --column 2 --plots figures
     """
-    from ..studies.recognition import Reading, judge_file
+    import h5py
+
+    from ..drawing.signal import save_signal
     from ..verdict import JudgeOptions
+    from ..verdict.reading import Reading, judge_file, judge_signals
 
     reading = Reading(columns or (), time, rate, time_unit, skip_bad, since, until, detrend)
     if not 0 < steady < 1:
         raise CaseError(f"--steady is {steady:g}; it must be greater than 0 and less than 1.")
-    judged = judge_file(file, reading, JudgeOptions(steady=steady), closed_below)
-    figures = [each.draw(plots) for each in judged] if plots is not None else []
+    options = JudgeOptions(steady=steady)
+    if file.is_file() and h5py.is_hdf5(file):
+        judged = judge_signals(file, _signals_of_run(file, columns), reading, options, closed_below)
+    else:
+        judged = judge_file(file, reading, options, closed_below)
+    own = [] if plots is None else [(each.signal, each.verdict) for each in judged]
+    figures = [save_signal(plots, signal.name, signal.time, signal.values, told) for signal, told in own]
     if as_json:
         print_json({"signals": [each.summary() for each in judged]})
         return
@@ -82,3 +93,19 @@ def verdict(
         print("\n".join(each.lines()))
     for figure in figures:
         print(f"Wrote {figure}.")
+
+
+def _signals_of_run(file: Path, columns: list[str] | None) -> list[Signal]:
+    """Signals of a transient run."""
+    from ..studies.session import load_result
+    from ..verdict.reading import Signal
+
+    result = load_result(file)
+    if result.kind != "transient":
+        raise CaseError(f"{str(file)!r} holds a result of kind {result.kind!r} and no time series.")
+    known = [name for name, values in result.history.items() if values.ndim == 1]
+    names = columns or ["mass_flow", "lip_opening"]
+    for name in names:
+        if name not in known:
+            raise CaseError(f"The run has no column {name!r}; it has {', '.join(known)}.")
+    return [Signal(name, result.history["time"], result.history[name], measured=False) for name in names]

@@ -17,10 +17,9 @@ from ...case.parameters import DESIGN, PARAMETERS, Mu
 from ...case.quantity import head_of
 from ...errors import CaseError, SolveError
 from ...observer import Observer
-from ...verdict import JudgeOptions
+from ...verdict.reading import Reading, judge_file
 from ..case import Case
 from ..inputs import Plan
-from ..recognition import Reading, judge_file
 from ..stability.walk import StabilityWalk
 
 #: Leading modes taken of a valve at a place.
@@ -78,7 +77,7 @@ def measured_of(case: Case, record: int) -> tuple[list[Measured], str]:
         return [one], f"a mode of {one.frequency:.5g} Hz"
     found, said = [], []
     columns = [given.column] if given.column else []
-    for judged in judge_file(given.file, Reading(columns, rate=given.rate), JudgeOptions()):
+    for judged in judge_file(given.file, Reading(columns, rate=given.rate)):
         for line in judged.verdict.lines:
             if line.get("rate") and line["called"] in ("", "resonance") and line["damping_ratio_interval"]:
                 numbers = (line[key] for key in ("frequency", "frequency_interval", "damping_ratio"))
