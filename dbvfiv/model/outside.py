@@ -36,7 +36,7 @@ from eigen import CoupledPencil, NotConvergedError, NotPositiveError, SingularSh
 from ..case.model import Case
 from ..case.part import QUARTER, Part
 from ..errors import CaseError, SolveError
-from ..flow.outside import BODY, ROOM, Impedance, Panels, PotentialFlow, Surroundings
+from ..flow.outside import BODY, ROOM, Impedance, Panels, PotentialFlow, ShapeDerivative, Surroundings
 from ..flow.outside.surfaces import arc, end_face, extruded, pipe, ring_face, stretched, strip
 from ..geometry import ValveMesh
 from ..shell import Shell
@@ -208,9 +208,25 @@ class OutsideFluid:
 
     def impedance(self, q: np.ndarray, frozen: Panels | None = None, symmetry: str | None = None) -> Impedance:
         """S (ne, ne), 1/m, in motions of a class, by default that of the equilibria: see `PotentialFlow.impedance`."""
-        panels = self.panels(q)
-        opening = 2 * (len(self._edge) - 1) if self.open_lips else 0
-        return self._flow(symmetry or self.equilibria).impedance(panels, len(self.shell.mesh.quads), opening, frozen)
+        count = len(self.shell.mesh.quads), self._opening
+        return self._flow(symmetry or self.equilibria).impedance(self.panels(q), *count, frozen)
+
+    @property
+    def _opening(self) -> int:
+        """Number of panels of the opening between the lips."""
+        return 2 * (len(self._edge) - 1) if self.open_lips else 0
+
+    def all_panels(self, q: np.ndarray) -> Panels:
+        """Panels at a state, those of the surroundings behind them."""
+        return self._flow(self.equilibria).all_panels(self.panels(q))
+
+    def shape_derivative(self, q: np.ndarray, left: np.ndarray, right: np.ndarray) -> ShapeDerivative:
+        """Derivative of the product of the added mass with two motions (n,), complex, of equilibria's class, by what
+        changes the shape; that of E is not in it.
+        """
+        fluxes = self.face.fluxes(self.shell.dofs.expand(q))
+        count = len(self.shell.mesh.quads), self._opening
+        return ShapeDerivative(self._flow(self.equilibria), self.panels(q), *count, fluxes @ left, fluxes @ right)
 
     def operator(self, q: np.ndarray) -> tuple[sp.csr_matrix, Impedance]:
         """E (ne, n), m2, and S (ne, ne), 1/m, at a state."""

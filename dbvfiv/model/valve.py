@@ -12,6 +12,7 @@ pressures.
 
 from __future__ import annotations
 
+from copy import copy
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -100,6 +101,18 @@ class ValveModel:
         self.outside = OutsideFluid(case, self.mesh, self.shell) if case.outside.is_there else None
         self.relaxation = WallRelaxation.of(self.shell.section)
         self._stop_slots = dofs.diagonal_slots[self.stops.unknowns]
+
+    def with_section(self, section: Section) -> ValveModel:
+        """Model of the same valve with other layers; of a bill that is moulded shut its shape without stress changes,
+        so that it is made anew.
+        """
+        if self.shell.stress_free is not None:
+            return ValveModel(self.case, section)
+        found = copy(self)
+        found.shell = self.shell.with_section(section)
+        found.weight = build_weight(self.case, found.shell)
+        found.relaxation = WallRelaxation.of(section)
+        return found
 
     # -- layout
     # ----

@@ -162,9 +162,10 @@ def _enhancement(x, geometry: ReferenceGeometry, section, compatible: np.ndarray
     covariant = np.linalg.solve(geometry.q, modes)
     local = local_map(geometry)
     strained = np.concatenate([modes, -geometry.qk @ covariant], axis=2)  # (ne, 4, 6, m)
-    pull = np.einsum("ep,epia,eij->epaj", geometry.area, strained, wall_at_rest(section, geometry.thickness))
-    stiffness = np.einsum("epaj,epjb->eab", pull, strained)
-    load = np.einsum("epaj,epjk->eak", pull, local @ compatible)
+    weighed = geometry.area[..., None, None] * np.swapaxes(strained, 2, 3)
+    pull = weighed @ wall_at_rest(section, geometry.thickness)[:, None]
+    stiffness = (pull @ strained).sum(axis=1)
+    load = (pull @ (local @ compatible)).sum(axis=1)
     amplitude = -np.linalg.solve(stiffness, load)
     return covariant @ amplitude[:, None]
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from copy import copy
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -84,18 +85,19 @@ class Shell:
     ):
         self.mesh = mesh
         self.stress_free, self.closing_pressure = stress_free, float(closing_pressure)
-        unstrained = mesh if stress_free is None else stress_free
-        self.section = section
         free = np.ones((mesh.node_count, UNKNOWNS_PER_NODE), bool) if free is None else np.asarray(free, bool)
         self.dofs = DofMap(free, mesh.quads)
-        self.metric = metric
-        self.geometry = reference_geometry(unstrained)
-        g = self.geometry
-        self.element = element
-        self.zones = zones
-        self.mass_kind = mass_kind
+        self.metric, self.element, self.zones, self.mass_kind = metric, element, zones, mass_kind
+        self.geometry = reference_geometry(mesh if stress_free is None else stress_free)
+        self._frames = np.ascontiguousarray(mesh.frames)
+        self._lay(section)
+
+    def _lay(self, section: Section) -> None:
+        """Take a section for the wall."""
+        self.section, mesh, zones, g = section, self.mesh, self.zones, self.geometry
         self.at_rest = section if zones is None else WallParts(section, zones)
-        self._assumed = a = assumed_strains(unstrained, g, self.at_rest, element)
+        unstrained = mesh if self.stress_free is None else self.stress_free
+        self._assumed = a = assumed_strains(unstrained, g, self.at_rest, self.element)
         reference = (a.products, g.shear0, local_map(g) @ a.inplane, shear_map(g), g.area, g.thickness)
         if zones is None:
             self.parts = (_Part(slice(None), mesh.quads, reference),)
@@ -104,12 +106,19 @@ class Shell:
                 _Part(own, mesh.quads[own], tuple(array[own] for array in reference)) for own in self.at_rest.elements
             )
         self.wall = self.wall_of()
-        self.inertia_integrals = mass_integrals(g, self.at_rest, mass_kind)
-        self._frames = np.ascontiguousarray(mesh.frames)
+        self.inertia_integrals = mass_integrals(g, self.at_rest, self.mass_kind)
 
     def with_free(self, free=None) -> Shell:
         """Copy of the shell with other free unknowns (nn, 5); all free by default."""
         return self._copy(free, self.stress_free, self.closing_pressure)
+
+    def with_section(self, section: Section) -> Shell:
+        """Copy of the shell, in the same shape without stress, with other layers."""
+        found = copy(self)
+        for derived in ("energies", "point_volumes"):
+            vars(found).pop(derived, None)
+        found._lay(section)
+        return found
 
     def preset(self, stress_free: ShellMesh, closing_pressure: float) -> Shell:
         """Copy of the shell without stress in another shape of its mesh; a pressure, Pa, holds it in its own."""

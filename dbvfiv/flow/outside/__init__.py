@@ -2,5 +2,6 @@
 
 from .panels import Panels
 from .potential_flow import BODY, ROOM, Impedance, PotentialFlow, Surroundings
+from .shape import ShapeDerivative
 
-__all__ = ["BODY", "ROOM", "Impedance", "Panels", "PotentialFlow", "Surroundings"]
+__all__ = ["BODY", "ROOM", "Impedance", "Panels", "PotentialFlow", "ShapeDerivative", "Surroundings"]

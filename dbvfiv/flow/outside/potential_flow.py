@@ -10,6 +10,7 @@ Equation (T.19) of docs/theory.md.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 import scipy.linalg as la
@@ -127,8 +128,15 @@ class PotentialFlow:
         self.symmetry, self.closed = symmetry, closed
         self.signs = image_signs(symmetry)
         self._fixed, self._open = self.surroundings.panels, self.surroundings.rigid_count
-        if self._fixed is not None:
-            self._alone = smooth_influence(self._fixed, self._fixed, self.signs, True)
+
+    @cached_property
+    def _alone(self) -> tuple[np.ndarray, np.ndarray]:
+        """Influence of the surroundings on themselves."""
+        return smooth_influence(self._fixed, self._fixed, self.signs, True)
+
+    def all_panels(self, moving: Panels) -> Panels:
+        """Moving panels, then those of the surroundings."""
+        return moving if self._fixed is None else Panels.joined(moving, self._fixed)
 
     def _rows(self, potential, velocity):
         """Conditions on the panels of the surroundings."""

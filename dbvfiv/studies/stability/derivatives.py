@@ -9,7 +9,8 @@ with left and right vectors of the coupled pencil (`eigen.eigenvalue_derivative`
 along the same line. Neither a further equilibrium nor a further eigenvalue search is needed: a parameter costs a
 back-substitution and two linearisations, whatever the number of modes and of other quantities.
 
-Of the fluid outside, the added mass of the motions in these vectors is all that dT x sees.
+Of the fluid outside, dT x sees the added mass of x alone; its derivative by all shapes comes from one further solve a
+mode (`flow.outside.ShapeDerivative`).
 """
 
 from __future__ import annotations
@@ -23,7 +24,7 @@ import numpy as np
 from eigen import CoupledPencil, Mode, eigenvalue_derivative
 
 from ...case.parameters import DESIGN, PARAMETERS, SURROUNDINGS, Mu
-from ...errors import CaseError
+from ...errors import CaseError, SolveError
 from ...model import ValveModel, linearise
 from ...model.sizes import ValveSizes
 from ...model.state import describe_state
@@ -139,12 +140,6 @@ class Neighbourhood:
     def _pencil(self) -> CoupledPencil:
         return self._linear.pencil(self.mu)
 
-    @cached_property
-    def _motions(self) -> np.ndarray:
-        """Real and imaginary parts (n, 2 k) of the right vectors."""
-        vectors = np.column_stack([mode.q for mode in self.modes])
-        return np.hstack([vectors.real, vectors.imag])
-
     def slope(self, name: str) -> Sensitivity:
         """Derivatives by one parameter.
 
@@ -192,18 +187,38 @@ class Neighbourhood:
         if not self.modes:
             return ()
         below, above = (self._linearised(end, q).pencil(end[2]) for end, q in zip(ends, places))
-        outside = np.zeros((self.model.size, len(self.modes)), complex)
+        outside = [0.0] * len(self.modes)
         if self.model.outside is not None and places[0] is not places[1]:
-            density = self.model.case.outside.density(self.mu["density"])
-            less, more = (self.resisting(model, q, self._motions) for (model, _, _), q in zip(ends, places))
-            outside = density * (more - less) @ np.vstack([np.eye(len(self.modes)), 1j * np.eye(len(self.modes))])
+            outside = self._resisting_change(ends, places)
         found = []
-        for mode, resisting in zip(self.modes, outside.T):
+        for mode, resisting in zip(self.modes, outside):
             x = mode.eigenvalue, mode.q, mode.u
             (f, g), (f_below, g_below) = above.apply(*x), below.apply(*x)
             change = (f - f_below + mode.eigenvalue**2 * resisting) / apart, (g - g_below) / apart
             found.append(eigenvalue_derivative(self._pencil, mode, change))
         return tuple(found)
+
+    def _resisting_change(self, ends, places) -> list[np.ndarray]:
+        """Forces (n,) of each mode, whose products with its left vector are those of the difference that two shapes
+        make to the resistance of the fluid outside.
+        """
+        density = self.model.case.outside.density(self.mu["density"])
+        below, above = (model.outside.all_panels(q) for (model, _, _), q in zip(ends, places))
+        first, second = (model.outside.face.fluxes(model.nodal(q)) for (model, _, _), q in zip(ends, places))
+        swept, found = second - first, []
+        for mode, slope in zip(self.modes, self._shape_derivatives):
+            left = mode.left_q.conj()
+            try:
+                change = slope.between(below, above)
+            except ValueError as error:
+                raise SolveError(str(error)) from error
+            change += (swept @ left) @ slope.pressures[1] + slope.pressures[0] @ (swept @ mode.q)
+            found.append(density * change * mode.left_q / np.vdot(mode.left_q, mode.left_q).real)
+        return found
+
+    @cached_property
+    def _shape_derivatives(self) -> list:
+        return [self.model.outside.shape_derivative(self.q, mode.left_q.conj(), mode.q) for mode in self.modes]
 
     def _linearised(self, end, q: np.ndarray):
         """Linearised state beside this one, with the added mass of this one."""
@@ -338,7 +353,7 @@ def changed(model: ValveModel, pressure: float, mu: Mu, name: str, value: float)
     if name in DESIGN:
         return ValveModel(redesigned(case, {name: value})), pressure, mu
     if name.startswith("layer "):
-        return ValveModel(case, _section(model.shell.section, name, value)), pressure, mu
+        return model.with_section(_section(model.shell.section, name, value)), pressure, mu
     return ValveModel(redesigned(case, {name: value})), pressure, mu
 
 

@@ -35,21 +35,31 @@ LOSSY = {
 }
 
 
+def check_gradients(changes, share, way):
+    """Derivatives of all that designs are judged by against differences of valves solved anew, along a direction."""
+    problem = DesignProblem(load_small(KEYS, ASKED, changes).case)
+    here, step = problem.at(problem.values_at(share), 6e3, True), 2e-4 * way
+    ends = ([problem.at(problem.values_at(share + k * s * step), 6e3, True) for s in (1, -1)] for k in (2, 1))
+    (wide, simple), widths = ends, np.array([one.high - one.low for one in problem.variables])
+    assert {"flow", "opening", "loss coefficient", "mass", "margin"} == set(here.slopes)
+    for name, slope in here.slopes.items():
+        far, near = ((up.values[name] - down.values[name]) / (k * 4e-4) for k, (up, down) in ((2, wide), (1, simple)))
+        assert slope @ (widths * way) == pytest.approx((4 * near - far) / 3, abs=1e-6 * abs(here.values[name])), name
+
+
 @pytest.mark.parametrize("changes", [{}, LOSSY])
 def test_gradients_are_those_of_valves_solved_anew(changes):
     """Away from the case itself, for a factor and lengths alike, both flow models, with and without loss factors."""
-    problem = DesignProblem(load_small(KEYS, ASKED, changes).case)
-    share = np.array([0.35, 0.55, 0.3])
-    here = problem.at(problem.values_at(share), 6e3, True)
-    for i, one in enumerate(problem.variables):
-        step = np.zeros(3)
-        step[i] = 2e-4
-        far, near = ([problem.at(problem.values_at(share + k * s * step), 6e3, True) for s in (1, -1)] for k in (2, 1))
-        for name, slope in here.slopes.items():
-            width = 2 * step[i] * (one.high - one.low)
-            simple, wide = ((a.values[name] - b.values[name]) / width for a, b in (near, far))
-            direct, size = (4 * simple - wide / 2) / 3, abs(here.values[name]) / (one.high - one.low)
-            assert slope[i] == pytest.approx(direct, rel=2e-6, abs=2e-6 * size), (one.name, name)
+    check_gradients(changes, np.array([0.35, 0.55, 0.3]), np.array([0.6, -0.5, 0.8]))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("number", range(20))
+def test_gradients_at_random_designs(number):
+    """Five designs for each flow model, with Rayleigh damping and with loss factors."""
+    share, way = np.random.default_rng(number).uniform(0.05, 0.95, (2, 3))
+    lossy = LOSSY if number % 2 else {}
+    check_gradients(lossy | {"fluid.continuity": ("quasi-steady", "storage")[number // 2 % 2]}, share, 2 * way - 1)
 
 
 def test_the_design_is_better_and_holds(valve, found):
