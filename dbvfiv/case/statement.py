@@ -19,14 +19,17 @@ QUANTITIES = {
     "loss coefficient": Quantity(""),
     "margin": Quantity("", "%"),
     "mass": Quantity("kg", "kg"),
+    "gap left": Quantity("", "%"),
 }
 #: Those that need no head.
 OF_THE_WALL = ("mass",)
+#: Those under back pressures, which count below zero; "seals at 5 m" asks that a section be shut.
+BEHIND, SEALS = ("gap left",), "seals"
 #: Heads that stand for a span until the least favourable ones are known.
 SPAN = 6
 FORM = (
     f"it must be such as 'loss coefficient at 2 m down' or 'margin from 0.1 m to 5 m at least 5 %', of "
-    f"{', '.join(QUANTITIES)}"
+    f"{', '.join(QUANTITIES)}; or 'seals at 5 m'"
 )
 _FORM = re.compile(
     rf"\s*(?P<what>{'|'.join(QUANTITIES)})"
@@ -45,7 +48,7 @@ class Statement:
     quantity : str
         Of `QUANTITIES`.
     pressures : tuple of float, Pa
-        Inlet pressures at which it is asked; none where it needs none.
+        Inlet pressures at which it is asked, back pressures below zero; none where it needs none.
     span : bool
         Whether all pressures between the first and the last count.
     sign : float
@@ -86,7 +89,7 @@ def parse_statement(text: str, aim: bool, density: float | None = None) -> State
     ValueError
         With a clause that completes "key is given as X, ...".
     """
-    match = _FORM.fullmatch(text)
+    match = _FORM.fullmatch(re.sub(rf"^\s*{SEALS}\s(.*)", rf"{BEHIND[0]} \1 at most 0", text))
     if match is None or (match["sense"] in ("up", "down")) != (match["bound"] is None):
         raise ValueError(f"which cannot be read; {FORM}")
     if aim and match["bound"] is not None:
@@ -101,6 +104,8 @@ def parse_statement(text: str, aim: bool, density: float | None = None) -> State
         raise ValueError(f"which {'has no head: it is that of the wall' if pressures else 'names no head'}; {FORM}")
     if pressures and (pressures[0] <= 0 or (span and pressures[0] == pressures[-1])):
         raise ValueError("whose heads must be greater than 0, and rise")
+    if what in BEHIND:
+        pressures = sorted(-p for p in pressures)
     sign = 1.0 if match["sense"] in ("up", "at least") else -1.0
     found = Statement(" ".join(text.split()), what, tuple(pressures), span, sign, _bounds(match["bound"], what))
     return replace(found, pressures=tuple(found.between(SPAN)))

@@ -39,6 +39,15 @@ def test_what_cannot_be_read_is_said(text, aim, words):
         parse_statement(text, aim, 1000.0)
 
 
+def test_seals_is_a_gap_left_under_back_pressure():
+    found, gap = (
+        parse_statement(f"{text} at 2 m{end}", False, 1000.0)
+        for text, end in (("seals", ""), ("gap left", " at most 5 %"))
+    )
+    assert found.quantity == gap.quantity == "gap left" and found.pressures == gap.pressures == (-19613.3,)
+    assert found.text == "seals at 2 m" and gap.bounds == (0.05,) and found.sign < 0
+
+
 def test_bounds_must_rise():
     with pytest.raises(ValueError, match="do not rise"):
         parse_span("1.4:0.7", Quantity(""))

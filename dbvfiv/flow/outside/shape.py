@@ -204,4 +204,3 @@ class ShapeDerivative:
         own = panels.corners, panels.centres, panels.normals
         near = _sum_near(pairs, own, _sides(panels), self.signs, self._weights)
         return data | {"gauss": gauss, "shares": shares}, near, panel_strength(panels, self.signs)
-

@@ -54,6 +54,11 @@ class Passage:
     shut_fraction: float
 
     @property
+    def left(self) -> float:
+        """Narrowest section over that of the lip at rest."""
+        return float(self.area.min() / self.reference)
+
+    @property
     def shut_length(self) -> float:
         """Length along the axis, m, that is shut."""
         return float(sum(b - a for a, b in self.shut_intervals))

@@ -54,6 +54,28 @@ def rows_to_keep(known: Record, _case: Case) -> dict[str, int]:
     return {STATES: int(asked[-1]) + 1, PATH: path, BUCKLING: buckling}
 
 
+def _load_steps(model: ClosedValve) -> LoadStepOptions:
+    closure, steady = model.case.closure, model.case.steady
+    jump = LARGEST_JUMP * float(np.mean(model.mesh.thickness))
+    newton = NewtonOptions(steady.tolerance, steady.max_iterations)
+    smallest = MIN_STEP if closure.arclength else MIN_STEP_TO_LIMIT
+    return LoadStepOptions(newton, smallest, closure.max_step / FIRST_SHARE, closure.max_step, jump)
+
+
+def close_valve(case: Case, pressure: float) -> tuple[ClosedValve, np.ndarray]:
+    """Valve under a back pressure, Pa, and its displacements (n,), from rest.
+
+    Raises
+    ------
+    SolveError
+        If they are not reached, because a limit point comes before them for one.
+    """
+    model = ClosedValve(case)
+    steps = LoadSteps(model, _load_steps(model))
+    steps.reach(pressure)
+    return model, steps.q
+
+
 class ClosureWalk:
     """The walk of one model; rows of its record are appended as soon as they are found.
 
@@ -71,11 +93,7 @@ class ClosureWalk:
 
     def __init__(self, model: ClosedValve, record: GrowingRecord):
         self.model, self.record = model, record
-        closure, steady = model.case.closure, model.case.steady
-        jump = LARGEST_JUMP * float(np.mean(model.mesh.thickness))
-        newton = NewtonOptions(steady.tolerance, steady.max_iterations)
-        smallest = MIN_STEP if closure.arclength else MIN_STEP_TO_LIMIT
-        options = LoadStepOptions(newton, smallest, closure.max_step / FIRST_SHARE, closure.max_step, jump)
+        options = _load_steps(model)
         self.steps = LoadSteps(model, options, observer=record, accepted=self._accept)
         self.watches = {name: BucklingWatch(model, options, watch) for name, watch in self._spectra().items()}
         self.own = next(iter(self.watches.values()))

@@ -18,8 +18,10 @@ from .problem import AtHead, DesignProblem, together
 
 #: Constraint over its bound that still counts as held.
 HELD = 1e-5
-#: Rounds in which heads are added, and heads of a span that are looked at.
-ROUNDS, LOOK = 3, 13
+#: Rounds in which heads are added, or reserves taken anew, and heads of a span that are looked at.
+ROUNDS, LOOK = 4, 13
+#: Change of a reserve, over the margin, above which it is taken anew.
+SETTLED = 5e-3
 #: Starts tried between one that cannot be computed and the case, each halfway on: the last is 3 % of the way from it.
 BACK = 6
 #: Change of the aim, over its size at the start, at which a search ends.
@@ -86,15 +88,17 @@ class Search:
         self.problem, self.aim, self.constraints, self._tried = problem, aim, list(constraints), tried
         self._seen: dict[tuple, tuple] = {}
         self._sizes: dict[str, float] = {}  # what constraints are counted in, by their texts
+        self.reserves: dict[float, float] = {}  # of margins at pressures, see `AtHead.reserve`
         self._latest: tuple | None = None  # valve of the last step that was one
 
     def from_start(self, share: np.ndarray, evaluations: int) -> Design | None:
         """Best design found from a start, given by shares (n,); None where no valve could be computed."""
         best, tried = None, [share]
+        self.reserves.clear()
         for _ in range(ROUNDS):
             self._seen.clear()
             best = self._optimised(self._first_that_holds(tried), evaluations)
-            if best is None or not self._add_worst_heads(best):
+            if best is None or not (self._renew_reserves(best) | self._add_worst_heads(best)):
                 break
             tried = [self.share(found[4]) for found in self._by_aim()] + [share]
         return best
@@ -193,14 +197,18 @@ class Search:
     def _compute(self, values: tuple[float, ...]):
         heads = self._heads()
         found = {p: self.problem.at(values, p, margin) for p, margin in heads.items()}
+        for p, at in found.items():
+            self.reserves.setdefault(p, at.reserve)
         any_head = next(iter(found.values()))
         widths = np.array([one.high - one.low for one in self.problem.variables])
         asked = [found[p] for p in self.aim.pressures] or [any_head]
-        aim, slope = together(self.aim, asked)
+        aim, slope = together(self.aim, asked, [self.reserves[p] for p in self.aim.pressures])
         values_, missed, slopes, worst = [], [], [], []
         for one in self.constraints:
             here = [found[p] for p in one.pressures] or [any_head]
             values_ = np.array([at.values[one.quantity] for at in here])
+            if one.quantity == "margin":
+                values_ = values_ - np.array([self.reserves[p] for p in one.pressures])
             (bound,) = one.bounds
             size = self._sizes.setdefault(one.text, max(abs(bound), float(np.abs(values_).max())))
             missed += list(one.sign * (bound - values_) / size)
@@ -227,12 +235,22 @@ class Search:
                 added = True
         return added
 
+    def _renew_reserves(self, design: Design) -> bool:
+        """Take the reserves of a design; True where one of them moved."""
+        moved = False
+        for p, margin in self._heads().items():
+            if margin:
+                at = self.problem.at(design.values, p, True)
+                moved |= abs(at.reserve - self.reserves[p]) > SETTLED * max(abs(at.values["margin"]), at.reserve)
+                self.reserves[p] = at.reserve
+        return moved
+
     def _plain(self, values: tuple[float, ...], pressure: float, statement: Statement) -> float:
         try:
             at: AtHead = self.problem.at(values, pressure, statement.quantity == "margin")
         except SolveError:
             return -statement.sign * np.inf
-        return at.values[statement.quantity]
+        return at.values[statement.quantity] - (at.reserve if statement.quantity == "margin" else 0.0)
 
 
 def starts_of(problem: DesignProblem, count: int) -> list[np.ndarray]:

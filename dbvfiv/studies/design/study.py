@@ -20,6 +20,7 @@ from ...record.mesh import MeshData
 from ...record.record import GrowingRecord, Record
 from ...record.table import Column, TableSpec
 from ..case import Case
+from ..closure.walk import close_valve
 from ..result import StudyResult
 from ..session import Session
 from ..stability.place import check_scan
@@ -30,7 +31,7 @@ from . import figures
 from .problem import AtHead, DesignProblem, Variable, statements_of, variables_of
 from .search import LOOK, Design, Search, best_of, starts_of
 
-DESIGNS, VERIFIED, _STATE, _DESIGN = "designs", "verified", "state", "design"
+DESIGNS, VERIFIED, _STATE, _DESIGN, _SHUT = "designs", "verified", "state", "design", "shut"
 #: Number of a design in tables: the case itself.
 CASE = -1
 _DESIGNS = (
@@ -133,7 +134,7 @@ def _known(record: GrowingRecord) -> dict[tuple, AtHead | str]:
         key = tuple(note["values"]), note["pressure"], note["margin"]
         known = note["found"]
         slopes = {} if isinstance(known, str) else {name: np.array(slope) for name, slope in note["slopes"].items()}
-        found[key] = known if isinstance(known, str) else AtHead(known, slopes)
+        found[key] = known if isinstance(known, str) else AtHead(known, slopes, note["reserve"])
     return found
 
 
@@ -142,7 +143,9 @@ def _keep(record: GrowingRecord, key: tuple, found: AtHead | str) -> None:
     values, pressure, margin = key
     told = found if isinstance(found, str) else found.values
     slopes = {} if isinstance(found, str) else {name: list(map(float, s)) for name, s in found.slopes.items()}
-    record.note(_STATE, values=list(values), pressure=pressure, margin=margin, found=told, slopes=slopes)
+    reserve = 0.0 if isinstance(found, str) else found.reserve
+    state = {"values": list(values), "pressure": pressure, "margin": margin, "found": told}
+    record.note(_STATE, **state, slopes=slopes, reserve=reserve)
 
 
 def _write(case: Case, path: Path) -> None:
@@ -150,6 +153,8 @@ def _write(case: Case, path: Path) -> None:
     path.write_text(case_toml(case, comments=False) + "\n")
 
 
+#: Share of a range or a bound within which it is what holds a design back.
+ACTIVE = 1e-3
 #: Difference of an opening between the meshes above which it is said.
 APART = 0.1
 
@@ -161,6 +166,14 @@ def _verify(problem: DesignProblem, case: Case, number: int, design: Design | No
     changes = {"mesh.around": round(finer * mesh.around), "mesh.along": round(finer * mesh.along)}
     walk = StabilityWalk(case.replace(changes), Observer())
     for pressure in pressures:
+        if pressure < 0:
+            record.progress(f"back pressure of {-pressure:.6g} Pa on {finer:g} times the elements each way")
+            try:
+                model, q = close_valve(walk.case, -pressure)
+                record.note(_SHUT, design=number, pressure=-pressure, left=model.passage(q).left)
+            except SolveError as error:
+                record.fail(f"Design {number + 1} could not be closed: {error}" if number >= 0 else str(error))
+            continue
         record.progress(f"verdict at {pressure:.6g} Pa on {finer:g} times the elements each way")
         place = Mu.of(case).at(pressure=pressure)
         try:
@@ -215,7 +228,9 @@ class DesignResult(StudyResult):
 
     @cached_property
     def pressures(self) -> list[float]:
-        """Inlet pressures, Pa, at which designs are verified: those asked, and some between in each span."""
+        """Inlet pressures, Pa, and back pressures below zero, at which designs are verified: those asked, and some
+        between in each span.
+        """
         return sorted({p for one in self.statements for p in one.between(LOOK)})
 
     @property
@@ -232,6 +247,19 @@ class DesignResult(StudyResult):
             found.setdefault(note["design"], []).append(design)
         return {number: best_of(designs, self.statements[0]) for number, designs in found.items()}
 
+    def active(self, number: int = 0) -> list[str]:
+        """Bounds and constraints that hold a design back."""
+        design, found = self.best[number], []
+        for one, value in zip(self.variables, design.values):
+            for end, word in ((one.low, "smallest"), (one.high, "largest")):
+                if abs(value - end) <= ACTIVE * (one.high - one.low):
+                    found.append(f"{one.name} at its {word}")
+        for one, value in zip(self.statements[1:], design.constraints):
+            bound = self.bounds[number] if len(one.bounds) > 1 else one.bounds[0]
+            if abs(value - bound) <= ACTIVE * max(abs(bound), abs(value)):
+                found.append(one.text)
+        return found
+
     def case_of(self, number: int = 0) -> Case:
         """Case of a design."""
         return DesignProblem(self.case).case_at(self.best[number].values)
@@ -246,16 +274,19 @@ class DesignResult(StudyResult):
     def evidence(self, number: int) -> str:
         """Verdicts on a design on the finer mesh, as a sentence."""
         rows = self.verified(number)
+        shut = {note["pressure"]: note["left"] for note in self.record.notes(_SHUT) if note["design"] == number}
+        gaps = "".join(f", gap left at {p:.4g} Pa {left:.3g} of that at rest" for p, left in shut.items())
         if not len(rows["pressure"]):
-            return "not verified"
+            return gaps.removeprefix(", ") or "not verified"
         unstable = [
             f"{OUTCOMES[outcome]} at {p:.4g} Pa"
             for p, outcome in zip(rows["pressure"], rows["outcome"])
             if OUTCOMES[outcome] != STABLE
         ]
         if unstable:
-            return ", ".join(unstable)
-        return f"stable at {len(rows['pressure'])} heads, margin at least {100 * np.nanmin(rows['margin']):.3g} %"
+            return ", ".join(unstable) + gaps
+        margin = 100 * np.nanmin(rows["margin"])
+        return f"stable at {len(rows['pressure'])} heads, margin at least {margin:.3g} %{gaps}"
 
     def summary(self) -> dict[str, Any]:
         aim, *constraints = self.statements
@@ -270,6 +301,7 @@ class DesignResult(StudyResult):
                 "constraints": dict(zip((one.text for one in constraints), design.constraints)),
                 "holds": design.holds,
                 "violation": design.violation,
+                "active": self.active(number),
                 "verified": {name: column.tolist() for name, column in rows.items() if name != "design"}
                 | {"outcome": [OUTCOMES[i] for i in rows["outcome"]]},
             }
@@ -289,6 +321,8 @@ class DesignResult(StudyResult):
     def lines(self) -> list[str]:
         aim, *constraints = self.statements
         lines = [f"Aim: {aim.text}; {'; '.join(one.text for one in constraints) or 'no constraints'}."]
+        if self.case.uncertainty.inputs:
+            lines.append("Margins are those that 95 % of valves with the inputs of [uncertainty] have, to first order.")
         for number, design in self.best.items():
             lines.append(f"Design {number + 1}{_for(self.bounds[number], self.bounds)}:")
             for one, value in zip(self.variables, design.values):
@@ -300,6 +334,7 @@ class DesignResult(StudyResult):
             lines.append(
                 f"  {'all constraints hold' if design.holds else f'a constraint is missed by {design.violation:.2%}'}"
             )
+            lines.append(f"  held back by: {', '.join(self.active(number)) or 'nothing'}")
             lines.append(f"  on the finer mesh: {self.evidence(number)}")
         if len(self.verified(CASE)["pressure"]):
             lines.append(f"The case itself on the finer mesh: {self.evidence(CASE)}.")

@@ -354,7 +354,8 @@ def changed(model: ValveModel, pressure: float, mu: Mu, name: str, value: float)
         return ValveModel(redesigned(case, {name: value})), pressure, mu
     if name.startswith("layer "):
         return model.with_section(_section(model.shell.section, name, value)), pressure, mu
-    return ValveModel(redesigned(case, {name: value})), pressure, mu
+    moved = {each: value for each in SURROUNDINGS if PARAMETERS[each].key == name and each in mu}
+    return ValveModel(redesigned(case, {name: value})), pressure, mu.at(**moved)
 
 
 def _section(section, name, value):

@@ -16,6 +16,7 @@ from dbvfiv.flow.outside import BODY, ROOM, Panels, PotentialFlow, Surroundings
 from dbvfiv.flow.outside.influence import REFLECTIONS, influence
 from dbvfiv.flow.outside.potential_flow import panel_strength
 from dbvfiv.flow.outside.surfaces import arc, end_face, extruded, pipe, ring_face, stretched, strip
+from tests.small_valves import make_valve
 
 
 def quads(grid):
@@ -191,3 +192,24 @@ def test_varying_strengths_add_up():
         np.testing.assert_allclose(found, 1.0 + (mode * np.pi / 32) ** 2 / 24.0, rtol=5e-5)
     whole = tube.areas @ panel_strength(tube, PotentialFlow(symmetry="SS").signs)
     np.testing.assert_allclose(whole, tube.areas, rtol=1e-12)
+
+
+@pytest.mark.parametrize("lips", ["closed", "open"])
+def test_derivative_by_the_shape_is_that_of_changed_shapes(lips):
+    """Of a valve in a pipe, for complex fluxes, where the wall bends; against extrapolated differences."""
+    outside = make_valve({"outside.fluid": "same", "outside.pipe_diameter": "330 mm", "outside.lips": lips}).outside
+    mesh, dofs, rng = outside.shell.mesh, outside.shell.dofs, np.random.default_rng(3)
+    bent = np.sin(20 * mesh.nodes[:, 2:] + 5 * mesh.nodes[:, :1]) * np.sin(np.arange(5))
+    way, rest = dofs.restrict(np.where(dofs.free, bent, 0.0)), np.zeros(dofs.size)
+    left, right = rng.standard_normal((2, dofs.size)) + 1j * rng.standard_normal((2, dofs.size))
+    found, here = outside.shape_derivative(rest, left, right), outside.panels(rest)
+    a, b = (outside.face.fluxes(dofs.expand(rest)) @ np.stack([left, right]).T).T
+
+    def product(h):
+        impedance = outside.impedance(h * way, here)
+        return a @ (impedance @ b.real + 1j * (impedance @ b.imag))
+
+    near, far = ((product(h) - product(-h)) / (2 * h) for h in (2e-6, 4e-6))
+    slope = found.between(*(outside.all_panels(h * way) for h in (-1e-7, 1e-7))) / 2e-7
+    assert found.pressures[1] == pytest.approx(outside.impedance(rest).matrix() @ b, rel=1e-10)
+    assert slope == pytest.approx((4 * near - far) / 3, rel=1e-6)

@@ -5,8 +5,10 @@ import pytest
 
 import dbvfiv
 from dbvfiv.errors import CaseError
-from dbvfiv.studies.design.problem import DesignProblem, together
+from dbvfiv.studies.design.problem import DesignProblem, statements_of, together
 from dbvfiv.studies.design.study import CASE
+from dbvfiv.studies.inputs import Plan, quasi_random
+from dbvfiv.studies.stability.place import redesigned
 from tests.observers import Stop
 from tests.small_valves import load_small
 
@@ -104,6 +106,59 @@ def test_a_front_goes_over_the_bounds(valve):
     assert masses == pytest.approx([7.0, 8.0, 9.0], rel=1e-3)  # the heavier, the stiffer, the less flows
     flows = [design.aim for design in front.best.values()]
     assert flows[0] > flows[1] > flows[2] and set(front.figures()) == {"heads", "front"}
+
+
+def test_what_holds_a_design_back_is_named(found):
+    """Three variables and two constraints: the bounds that the optimum sits on, and the mass or the margin."""
+    named = found.active(0)
+    for one, value in zip(found.variables, found.best[0].values):
+        near = min(value - one.low, one.high - value) <= 1e-3 * (one.high - one.low)
+        assert near == any(text.startswith(one.name) for text in named)
+    assert named and f"held back by: {', '.join(named)}" in "\n".join(found.lines())
+
+
+@pytest.mark.slow
+def test_the_margin_of_uncertain_valves_is_that_of_sampled_ones():
+    """95 % quantile to first order against valves at quasi-random inputs, each solved anew."""
+    inputs = {"thickness": "normal(1, 0.03)", "layers.2.angle": "normal(54 deg, 3 deg)", "damping.beta": "normal(5 %)"}
+    problem = DesignProblem(load_small(KEYS, ASKED, {"uncertainty.inputs": inputs}).case)
+    values = tuple(one.start for one in problem.variables)
+    here, plan = problem.at(values, 6e3, True), Plan(problem.case)
+    margins = []
+    for row in plan.numbers(quasi_random(64, 3, 1)):
+        sample = redesigned(problem.case, dict(zip(inputs, row)))
+        sampled = DesignProblem(sample.replace({"uncertainty.inputs": {}, "design.variables": {}}))
+        margins.append(sampled.at((), 6e3, True).values["margin"])
+    assert here.reserve == pytest.approx(1.645 * np.std(margins), rel=0.1)
+    assert here.values["margin"] - here.reserve == pytest.approx(np.quantile(margins, 0.05), abs=0.2 * here.reserve)
+
+
+@pytest.mark.slow
+def test_a_robust_design_keeps_its_reserve(valve):
+    inputs = {"thickness": "normal(1, 0.03)"}
+    robust = load_small(KEYS, {"uncertainty.inputs": inputs, "design.evaluations": 12}).design(
+        {"thickness": "0.7:1.4"}, aim="mass down", constraints=["margin at 6 kPa at least 1 %"]
+    )
+    problem = DesignProblem(robust.case)
+    at = problem.at(robust.best[0].values, 6e3, True)
+    assert robust.best[0].holds and at.reserve > 5e-4
+    assert at.values["margin"] - at.reserve == pytest.approx(0.01, abs=2e-4)
+
+
+def test_seals_is_what_closure_finds():
+    """The narrowest section under a back pressure over that of the lips at rest, and its change with the wall."""
+    asked = {"design.constraints": ["seals at 1 kPa"]}
+    valve = load_small(KEYS, ASKED, asked)
+    problem = DesignProblem(valve.case)
+    (_, statement), values = statements_of(valve.case), tuple(one.start for one in problem.variables)
+    assert statement.pressures == (-1e3,) and statement.bounds == (0.2,) and statement.sign < 0
+    state = valve.closure(["1 kPa"]).states[0]
+    closed = problem.at(values, -1e3, False)
+    assert closed.values["gap left"] == pytest.approx(state.least_opening / state.reference_opening, rel=1e-3)
+    open_ = problem.at(problem.values_at(np.array([0.5, 0.5, 0.5])), -50.0, False)
+    ends = [problem.at(problem.values_at(np.array([0.5, x, 0.5])), -50.0, False).values for x in (0.4995, 0.5005)]
+    direct = (ends[1]["gap left"] - ends[0]["gap left"]) / 0.001
+    assert 15e-3 * open_.slopes["gap left"][1] == pytest.approx(direct, rel=1e-3)
 
 
 def test_several_heads_of_an_aim_count_together(valve):
