@@ -45,8 +45,8 @@ def command(
     """Change of growth rate and frequency of the leading mode with every parameter: load, fluid, damping, wall, and the
     thickness, angle and constants of each layer.
 
-    The equilibrium moves along. Derivatives by the left and right vectors of the mode: no eigenvalue search beside the
-    state, two equilibria for each parameter that moves it.
+    The equilibrium moves along. Derivatives by the left and right vectors of the mode: neither an eigenvalue search nor
+    an equilibrium beside the state.
 
     dbvfiv sensitivity cases/dbv12.toml -p "6 kPa" --density 10 --of pressure --of thickness --of "layer 3 angle"
     """
