@@ -346,9 +346,10 @@ def fold_coefficient(system, u, mu, v, w) -> float:
         return float(0.5 * (value.w @ system.d2(u, mu, v, v)) / scale)
 
 
-#: Amplitudes over the unit at which the residual is taken for the terms of each order; so large that rounding, which
-#: stiff directions carry, does not matter. Those of half the size take off what the order after the next adds.
-_AMPLITUDES = {2: 0.02, 3: 0.04, 4: 0.08, 5: 0.12, 6: 0.14, 7: 0.16}
+#: Highest order of the amplitude equation and its motion.
+ORDER = 7
+#: Rounding of the residual over its size at the unit amplitude: that of positions, as stiff directions carry it.
+_ROUNDING = 8e-12
 #: Change of the frequency, relative, above which terms are taken anew, and how often.
 _TUNED, _ROUNDS = 5e-3, 4
 
@@ -469,9 +470,9 @@ def amplitude_equation(
         series.extend(order)
         found = series.equation()
         moved = found.frequency - omega
-        if order == max(_AMPLITUDES) and not abs(moved) > _TUNED * omega:
+        if order == ORDER and not abs(moved) > _TUNED * omega:
             break
-        order, omega = max(_AMPLITUDES), omega if np.isnan(moved) else omega + moved
+        order, omega = ORDER, omega if np.isnan(moved) else omega + moved
     return replace(found, residual=series.correction(found))
 
 
@@ -504,7 +505,7 @@ class _MotionSeries:
     def extend(self, order: int) -> None:
         """Add terms up to an order."""
         for m in range(len(self.terms) + 1, order + 1):
-            near, far = (self._defect(r * self._unit, m) for r in (0.5 * _AMPLITUDES[m], _AMPLITUDES[m]))
+            near, far = (self._defect(share * _sampled(m) * self._unit, m) for share in (0.5, 1.0))
             change, g = self._solved((4 * near - far) / 3, range(m % 2, m + 1, 2))
             self.terms.append(change)
             if m % 2:
@@ -558,6 +559,15 @@ class _MotionSeries:
         odd, g = self._solved(self._left(wave + even, omega), range(1, count + 1, 2))
         moved = np.abs((even + odd) @ self._row) @ np.append(1.0, np.full(count, 2.0))
         return float(np.hypot(0.5 * g.real / (r**3 * self.g[1].real), moved / r))
+
+
+def _sampled(order: int) -> float:
+    """Amplitude over the unit at which the residual is taken for the terms of an order.
+
+    Of what comes four orders later the extrapolation from r/2 and r leaves r^4/4 where its terms are of size one at the
+    unit, and of rounding (4/3) 2^order / r^order: both are the same here.
+    """
+    return (16 / 3 * 2.0**order * _ROUNDING) ** (1 / (order + 4))
 
 
 def _summed(terms, square: float) -> tuple[list[float], list[float]]:

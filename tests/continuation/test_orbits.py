@@ -24,6 +24,7 @@ from continuation import (
 )
 from continuation.first_order import DirectLinearisation, FirstOrderSystem
 from continuation.harmonics import Harmonics
+from continuation.normal_form import SystemForms, amplitude_equation
 from continuation.periodic import PeriodicMotion
 from tests.systems.brusselator import brusselator, brusselator_1d
 from tests.systems.literature import fitzhugh_nagumo
@@ -137,6 +138,17 @@ def test_first_orbits_beside_hopf_points(system, start, mu, parameter, limits, c
     predicted = [form.amplitude_coefficient(axis) * np.sqrt(abs(change)) for axis in np.eye(system.size)]
     assert np.allclose(amplitude, predicted, rtol=0.25)
     assert branch.points[0].unstable == (0 if criticality == "super" else 1)
+
+
+def test_the_amplitude_equation_begins_with_the_normal_form():
+    """Its cubic coefficient, read off residuals, is that of exact forms: r = 2 |row . q z| of the observed quantity."""
+    system, mu = brusselator(), {"A": 1.0, "B": 2.0}
+    form = hopf_normal_form(system, [1.0, 2.0], mu, 1.0, [1.0, -1 + 1j])
+    beside, periodic = mu | {"B": 2.0 + 1e-6}, FirstOrderSystem(system)
+    forms = SystemForms(system, np.array([1.0, 2.0 + 1e-6]), beside)
+    found = amplitude_equation(forms, lambda m: -periodic.residual(m, beside), 5e-7 + 1j, form.q, [1.0, 0.0], 0.5)
+    assert found.coefficients[1] == pytest.approx(form.c1 / (2 * abs(form.q[0])) ** 2, rel=1e-5)
+    assert found.amplitude == pytest.approx(2 * abs(form.q[0]) * np.sqrt(-5e-7 / form.c1.real), rel=1e-5)
 
 
 @pytest.mark.parametrize("scale", [None, 0.1, 1.0])
