@@ -5,9 +5,9 @@ import pytest
 from dbvfiv.effects import EFFECTS, explained
 from dbvfiv.fit import outside_band
 from dbvfiv.model import ValveModel
+from dbvfiv.model.closed import ClosedValve
 from dbvfiv.model.equilibria import model_warnings
 from dbvfiv.studies.case import load_case, oddities
-from dbvfiv.studies.closure.valve import ClosedValve
 from dbvfiv.studies.session import Session
 from tests.small_valves import SMALL
 

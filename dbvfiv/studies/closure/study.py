@@ -13,6 +13,7 @@ from matplotlib.figure import Figure
 
 from ...case.measured import AREA, SHAPE
 from ...drawing import views
+from ...model.closed import ClosedValve, Passage
 from ...model.symmetry import equilibria_of
 from ...record.mesh import MeshData, WholeValve
 from ...record.record import GrowingRecord, plain
@@ -50,7 +51,7 @@ from .safety import (
     read_classes,
     sentences,
 )
-from .valve import ClosedValve, Passage, film_leak, layer_maxima
+from .valve import film_leak, layer_maxima
 from .walk import BUCKLING, MOST_EIGENVALUES, PATH, STATES, ClosureWalk, rows_to_keep
 
 

@@ -1,152 +1,15 @@
-"""The valve under back pressure: the one model of the valve, pressed from outside, and the passage left between its
-walls.
-"""
+"""States of the valve under back pressure, their columns, and the leak through the gaps that are left."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from scipy.integrate import trapezoid
 
-from ...contact import PlaneContact
-from ...geometry import ValveMesh
-from ...model import ValveModel
+from ...model.closed import ClosedValve, area_under
 from ...model.state import LipCentre
-from ...model.supports import CONTACT, HELD_LIPS, face_contact, held_rows
-from ...model.symmetry import EQUILIBRIA
-from ...shell import Shell
-from ...shell.mesh import nodal_thickness
 from ...shell.recovery import LayerFields, layer_fields
-from ...texts import shortly
-from ..case import Case
-
-#: Keys of a case that is pressed from outside.
-CLOSED = {
-    "drive.kind": "uniform",
-    "drive.side": "outside",
-    "supports.contact": "faces",
-    "gravity.direction": "none",
-    "outside.fluid": "none",
-}
-
-
-@dataclass(frozen=True)
-class Passage:
-    """Passage between the inner faces, of the part that is computed, by mesh row from the lip.
-
-    Attributes
-    ----------
-    z : (rows,) array, m
-    area : (rows,) array, m2
-        Between inner face and closing plane; overlapping faces count as shut.
-    reference : float, m2
-        Area at the lip at rest.
-    shut_fraction : float
-        A section is shut where less than this share of the reference is left.
-    """
-
-    z: np.ndarray
-    area: np.ndarray
-    reference: float
-    shut_fraction: float
-
-    @property
-    def left(self) -> float:
-        """Narrowest section over that of the lip at rest."""
-        return float(self.area.min() / self.reference)
-
-    @property
-    def shut_length(self) -> float:
-        """Length along the axis, m, that is shut."""
-        return float(sum(b - a for a, b in self.shut_intervals))
-
-    @property
-    def lip_seal(self) -> float:
-        """Length, m, that is shut from the lip on without a break."""
-        shut = self.shut_intervals
-        return shut[0][1] - self.z[0] if shut and shut[0][0] <= self.z[0] else 0.0
-
-    @property
-    def shut_intervals(self) -> list[tuple[float, float]]:
-        """Intervals of z, m, that are shut.
-
-        Between rows the roots of the areas are taken as linear, because walls that touch part from each other with at
-        least the square of the distance.
-        """
-        excess = np.sqrt(self.area) - np.sqrt(self.shut_fraction * self.reference)
-        cuts: list[tuple[float, float]] = []
-        for a, b, fa, fb in zip(self.z[:-1], self.z[1:], excess[:-1], excess[1:]):
-            if fa > 0 and fb > 0:
-                continue
-            start = a if fa <= 0 else a + (b - a) * fa / (fa - fb)
-            stop = b if fb <= 0 else a + (b - a) * fa / (fa - fb)
-            if cuts and abs(cuts[-1][1] - start) < 1e-12:
-                cuts[-1] = (cuts[-1][0], stop)
-            elif stop > start:
-                cuts.append((start, stop))
-        return [(float(a), float(b)) for a, b in cuts]
-
-
-@shortly
-@dataclass(frozen=True)
-class InnerFace:
-    """Inner face of the wall before the closing plane, and the passage between them.
-
-    Attributes
-    ----------
-    mesh : ValveMesh
-    shell : Shell
-    plane : PlaneContact
-        Contact of this face, for its gaps.
-    initial_gap : float, m
-        Least gap at the lip at rest of what a passage is measured against.
-    shut_fraction : float
-    """
-
-    mesh: ValveMesh
-    shell: Shell
-    plane: PlaneContact
-    initial_gap: float
-    shut_fraction: float
-
-    def gaps(self, nodal: np.ndarray) -> np.ndarray:
-        """Gaps (nn,), m, of all nodes for nodal unknowns (nn, c), measured as the contact measures them: faces that
-        touch leave none.
-        """
-        return self._points(nodal)[0]
-
-    def passage(self, nodal: np.ndarray, held: np.ndarray | None = None) -> Passage:
-        """Passage for nodal unknowns (nn, c); `held` (rows,) are rows shut by their supports."""
-        gap, x = self._points(nodal)
-        at_rest, x_rest = self._points(np.zeros_like(nodal))
-        rows = self.mesh.rows
-        area = _area(gap[rows], x[rows])
-        if held is not None:
-            area[held] = 0.0
-        reference = float(_area(np.maximum(at_rest[rows[:1]], self.initial_gap), x_rest[rows[:1]])[0])
-        return Passage(self.mesh.z, area, reference, self.shut_fraction)
-
-    def _points(self, nodal: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Gap (nn,) and x position (nn,) of the inner face at all nodes; the clamped flange is no contact node but has
-        a face all the same.
-        """
-        shell, plane = self.shell, self.plane
-        depth, lift = 0.5 * nodal_thickness(shell.mesh), np.zeros(shell.mesh.node_count)
-        depth[plane.nodes], lift[plane.nodes] = plane.depth, plane.lift
-        directors = shell.directors(nodal)[0] if nodal.any() else shell.mesh.directors
-        point = shell.mesh.nodes + nodal[:, :3] - depth[:, None] * directors
-        gap = point[:, 1] + lift
-        return np.where(gap < plane.law.rounding, np.minimum(gap, 0.0), gap), point[:, 0]
-
-
-def _area(gap: np.ndarray, x: np.ndarray) -> np.ndarray:
-    """Area (rows,) under the gap of rows of points; where the face folds back on itself no width is counted."""
-    height = np.maximum(gap, 0.0)
-    step = np.maximum(np.diff(x, axis=1), 0.0)
-    return np.sum(0.5 * (height[:, 1:] + height[:, :-1]) * step, axis=1)
 
 
 def film_leak(
@@ -168,75 +31,14 @@ def film_leak(
     density : float, kg/m3
     viscosity : float, Pa s
     """
-    area = copies * _area(gap, x)
+    area = copies * area_under(gap, x)
     # Two faces, each before the plane, bound one film.
-    conductance = 0.5 * copies * _area(8.0 * np.maximum(gap, 0.0) ** 3, x)
+    conductance = 0.5 * copies * area_under(8.0 * np.maximum(gap, 0.0) ** 3, x)
     if not area.min() > 0.0 or not conductance.min() > 0.0:
         return 0.0
     film = 12.0 * viscosity * float(trapezoid(1.0 / conductance, z))
     jet = density / (2.0 * area.min() ** 2)
     return float(2.0 * pressure / (film + np.sqrt(film**2 + 4.0 * jet * pressure)))
-
-
-class ClosedValve(ValveModel):
-    """The valve of a case, pressed from outside; nothing flows, and wall and fluid weigh nothing.
-
-    Parameters
-    ----------
-    case : Case
-        Its ``closure.supports`` are "contact": the inner faces touch the closing plane; or "held-lips": the duckbill
-        cannot move across the plane and the mid-surface of the saddle cannot cross it (Th. 3.6).
-
-    Attributes
-    ----------
-    face : InnerFace
-        For measuring gaps with either supports.
-    held : (rows,) bool array
-        Rows that are shut by the supports.
-    """
-
-    def __init__(self, case: Case):
-        self.supports = case.closure.supports
-        super().__init__(case.replace(CLOSED), closed_by=self.supports)
-        self.held = held_rows(case, self.mesh) & (self.supports == HELD_LIPS)
-        faces = face_contact(self.case, self.mesh, self.shell, CONTACT)
-        self.face = InnerFace(self.mesh, self.shell, faces, case.valve.initial_gap, case.closure.shut_fraction)
-
-    @property
-    def nodes_beyond(self) -> np.ndarray:
-        """Numbers of the nodes whose inner face starts beyond the closing plane."""
-        return self.face.plane.nodes[self.face.plane.start < 0]
-
-    def passage(self, q: np.ndarray) -> Passage:
-        """Passage of a state (n,)."""
-        return self.face.passage(self.nodal(q), self.held)
-
-    @property
-    def reference_opening(self) -> float:
-        """Passage between the inner faces of the lip at rest, whole valve, m2."""
-        return self.mesh.part.copies * self.passage(np.zeros(self.size)).reference
-
-    def start_warnings(self) -> Iterator[str]:
-        """Warnings about where the inner face starts, and about supports that hold it."""
-        plane, beyond = self.face.plane, self.nodes_beyond
-        if len(beyond):
-            z = self.mesh.nodes[plane.nodes[plane.lifted], 2]
-            yield (
-                f"The inner face starts beyond the closing plane at {len(beyond)} node{'s' * (len(beyond) > 1)}, by up "
-                f"to {float(-plane.start.min()) * 1e3:.2g} mm, and nearer to it than the initial gap at {len(z)} "
-                f"(z {z.min():.3f} to {z.max():.3f} m, of {plane.count} nodes): there half the wall is thicker than "
-                "the mid-surface is high, and contact resists further closing by more than the initial gap only."
-            )
-        if self.supports == HELD_LIPS:
-            yield (
-                "The duckbill is held shut by its supports, as in Th. 3.6, so that nothing is found out about "
-                "whether its lips seal."
-            )
-            if self.case.closure.symmetry != EQUILIBRIA:
-                yield (
-                    "closure.symmetry asks for all symmetry classes, but lips that are held shut cannot move "
-                    "together, so with these supports only the class of the model is watched for buckling."
-                )
 
 
 class Pressed:

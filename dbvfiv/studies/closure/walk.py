@@ -12,10 +12,11 @@ import numpy as np
 
 from ...errors import SolveError
 from ...model.classes import linearise_class
+from ...model.closed import ClosedValve, load_steps
 from ...model.equilibria import model_warnings, state_warnings
 from ...model.load_curve import LoadCurve
-from ...model.load_steps import LARGEST_JUMP, LoadStepOptions, LoadSteps
-from ...model.newton import NewtonOptions, NewtonResult
+from ...model.load_steps import LoadSteps
+from ...model.newton import NewtonResult
 from ...model.supports import CONTACT
 from ...model.symmetry import ALL, Symmetry, symmetries_of, symmetry_named
 from ...record.record import GrowingRecord, Record
@@ -28,7 +29,7 @@ from .buckling import (
     spectrum_of,
 )
 from .energy import EnergyLedger
-from .valve import ClosedValve, Pressed
+from .valve import Pressed
 
 #: Tables of a walk.
 STATES, PATH, BUCKLING = "states", "path", "buckling"
@@ -38,11 +39,6 @@ LOWEST, BUCKLED_CLASS = "class stiffness", "class buckling"
 MOST_EIGENVALUES = 100
 #: Overlap of the inner faces over the initial gap of the lips from which on the faces count as crossed.
 CROSSED = 0.1
-#: Smallest load step over the target pressure, and of a walk that ends at its limit point, which arclength locates from
-#: there: each halving beside a limit point costs two Newton runs that fail.
-MIN_STEP, MIN_STEP_TO_LIMIT = 1e-5, 1e-3
-#: Largest load step over the first from rest, where the lips meet.
-FIRST_SHARE = 20
 
 
 def rows_to_keep(known: Record, _case: Case) -> dict[str, int]:
@@ -52,28 +48,6 @@ def rows_to_keep(known: Record, _case: Case) -> dict[str, int]:
         return {STATES: 0, PATH: 0, BUCKLING: 0}
     path, buckling = (int(known.value(STATES, f"way/{name}", asked[-1])) for name in ("path", "buckling"))
     return {STATES: int(asked[-1]) + 1, PATH: path, BUCKLING: buckling}
-
-
-def _load_steps(model: ClosedValve) -> LoadStepOptions:
-    closure, steady = model.case.closure, model.case.steady
-    jump = LARGEST_JUMP * float(np.mean(model.mesh.thickness))
-    newton = NewtonOptions(steady.tolerance, steady.max_iterations)
-    smallest = MIN_STEP if closure.arclength else MIN_STEP_TO_LIMIT
-    return LoadStepOptions(newton, smallest, closure.max_step / FIRST_SHARE, closure.max_step, jump)
-
-
-def close_valve(case: Case, pressure: float) -> tuple[ClosedValve, np.ndarray]:
-    """Valve under a back pressure, Pa, and its displacements (n,), from rest.
-
-    Raises
-    ------
-    SolveError
-        If they are not reached, because a limit point comes before them for one.
-    """
-    model = ClosedValve(case)
-    steps = LoadSteps(model, _load_steps(model))
-    steps.reach(pressure)
-    return model, steps.q
 
 
 class ClosureWalk:
@@ -93,7 +67,7 @@ class ClosureWalk:
 
     def __init__(self, model: ClosedValve, record: GrowingRecord):
         self.model, self.record = model, record
-        options = _load_steps(model)
+        options = load_steps(model)
         self.steps = LoadSteps(model, options, observer=record, accepted=self._accept)
         self.watches = {name: BucklingWatch(model, options, watch) for name, watch in self._spectra().items()}
         self.own = next(iter(self.watches.values()))

@@ -29,11 +29,10 @@ from eigen import leading_modes
 from ...case.parameters import DESIGN, PARAMETERS, Mu
 from ...case.statement import BEHIND, OF_THE_WALL, SEALS, Statement, parse_span, parse_statement
 from ...errors import CaseError, SolveError
+from ...model.closed import ClosedValve, close_valve
 from ...model.sizes import ValveSizes
 from ...observer import Observer
 from ..case import Case
-from ..closure.valve import ClosedValve
-from ..closure.walk import close_valve
 from ..inputs import Input, correlation_of, inputs_of
 from ..stability.derivatives import Neighbourhood
 from ..stability.place import design_value, key_of, redesigned, require_parameter

@@ -15,12 +15,12 @@ from ...case.parameters import Mu
 from ...case.statement import QUANTITIES, Statement
 from ...case.write import case_toml
 from ...errors import CaseError, SolveError
+from ...model.closed import close_valve
 from ...observer import Observer
 from ...record.mesh import MeshData
 from ...record.record import GrowingRecord, Record
 from ...record.table import Column, TableSpec
 from ..case import Case
-from ..closure.walk import close_valve
 from ..result import StudyResult
 from ..session import Session
 from ..stability.place import check_scan

@@ -7,8 +7,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from dbvfiv.model.closed import ClosedValve, Passage
 from dbvfiv.studies.case import Case, thesis_case
-from dbvfiv.studies.closure.valve import ClosedValve, Passage
 from dbvfiv.studies.session import Session
 from tests.observers import Stop
 from tests.small_valves import EVEN
