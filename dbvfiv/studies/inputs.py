@@ -6,6 +6,7 @@ import warnings
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -19,6 +20,11 @@ from ..materials.shipped import shipped_loss, shipped_loss_names
 from .case import Case
 from .stability.place import design_value, is_surrounding, number_of, require_parameter
 from .stability.verdict import lowered
+
+if TYPE_CHECKING:
+    from eigen import ColumnSolver
+
+    from .stability.walk import StabilityWalk
 
 #: Hardness of a compound lies within 5 Shore A of what was ordered (trade practice with ISO 48-4), a fifth of its shear
 #: modulus (Gent, Rubber Chem. Technol. 31, 1958, 896); read as 95 %.
@@ -245,6 +251,18 @@ class Plan:
         """
         keys = {one.name: float(x) for one, x in zip(self.inputs, row) if one.name not in PARAMETERS}
         return self.case.replace(keys) if keys else self.case
+
+    def walk(self, row: np.ndarray, solver: ColumnSolver) -> StabilityWalk:
+        """Walk of a sample, which keeps the symbolic factorisations of a solver.
+
+        Raises
+        ------
+        CaseError, SolveError
+            For numbers that do not go together.
+        """
+        from .stability.walk import StabilityWalk  # inputs are listed without what solves anything
+
+        return StabilityWalk(self.redescribed(row), solver=solver)
 
 
 def _input(case: Case, name: str, text: str, source: str) -> Input:

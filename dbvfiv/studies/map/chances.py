@@ -16,7 +16,6 @@ from eigen import ColumnSolver
 
 from ...case.parameters import PARAMETERS, Mu
 from ...errors import CaseError, SolveError
-from ...observer import Observer
 from ...record.record import GrowingRecord, Record
 from ..case import Case
 from ..inputs import Plan, counted, quasi_random
@@ -76,7 +75,7 @@ class Chances:
             return inputs.point(case, row, **({"storage": law} | {across: value, along.parameter: place}))
 
         def at(row: np.ndarray) -> tuple[StabilityWalk, Mu]:
-            walk = StabilityWalk(inputs.redescribed(row[:-1]), Observer(), solver=solver)
+            walk = inputs.walk(row[:-1], solver)
             return walk, point(walk.case, row[:-1], row[-1])
 
         def rows(independent: np.ndarray, places: np.ndarray) -> np.ndarray:

@@ -11,7 +11,6 @@ from eigen import ColumnSolver
 
 from ...case.parameters import Mu
 from ...errors import CaseError, SolveError
-from ...observer import Observer
 from ..inputs import Plan
 from ..stability.neighbours import At, Beside, Neighbours
 from ..stability.verdict import OUTCOMES, Verdict
@@ -73,24 +72,13 @@ class Start(NamedTuple):
     lift: float
 
 
-def walk_of(plan: Plan, row: np.ndarray, solver: ColumnSolver) -> StabilityWalk:
-    """Walk of a sample.
-
-    Raises
-    ------
-    CaseError, SolveError
-        For numbers that do not go together.
-    """
-    return StabilityWalk(plan.redescribed(row), Observer(), solver=solver)
-
-
 def walks_at(plan: Plan, value: float, start: Start, solver: ColumnSolver) -> At:
     """Function from values of the inputs to the walk of a sample and its parameter point at a value of the range, where
     the case has a steady state.
     """
 
     def at(row: np.ndarray) -> tuple[StabilityWalk, Mu]:
-        walk = walk_of(plan, row, solver)
+        walk = plan.walk(row, solver)
         return walk, walk.meet_pump(plan.point(walk.case, row, **{plan.parameter: value}), start.lift, start.q)
 
     return at
@@ -150,7 +138,7 @@ class Sampler:
             state, near = None, self._neighbours.get(i)
             apart = near is not None
             try:
-                walk = walk or walk_of(self.plan, row, self._solver)
+                walk = walk or self.plan.walk(row, self._solver)
                 lift, q = (0.0, None) if self.states[i] is None else (self.states[i].lift, self.states[i].q)
                 q = q if near is None else near.state(row)
                 place = walk.meet_pump(self.plan.point(walk.case, row, **{self.plan.parameter: value}), lift, q)
