@@ -6,9 +6,10 @@ import warnings
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING
 
 import numpy as np
+
+from eigen import ColumnSolver
 
 from ..case.damping import LARGEST_LOSS
 from ..case.describe import numeric_limits, quantity_of
@@ -20,11 +21,7 @@ from ..materials.shipped import shipped_loss, shipped_loss_names
 from .case import Case
 from .stability.place import design_value, is_surrounding, number_of, require_parameter
 from .stability.verdict import lowered
-
-if TYPE_CHECKING:
-    from eigen import ColumnSolver
-
-    from .stability.walk import StabilityWalk
+from .stability.walk import StabilityWalk
 
 #: Hardness of a compound lies within 5 Shore A of what was ordered (trade practice with ISO 48-4), a fifth of its shear
 #: modulus (Gent, Rubber Chem. Technol. 31, 1958, 896); read as 95 %.
@@ -260,8 +257,6 @@ class Plan:
         CaseError, SolveError
             For numbers that do not go together.
         """
-        from .stability.walk import StabilityWalk  # inputs are listed without what solves anything
-
         return StabilityWalk(self.redescribed(row), solver=solver)
 
 

@@ -71,7 +71,9 @@ def _bands(axes, result: StudyResult) -> None:
     if np.isfinite(value).any():
         x, y = (np.asarray(_shown(axis, np.asarray(axis.values))) for axis in (result.plan.x, result.plan.y))
         lines = axes.contour(x, y, value, BANDS, colors="black", linewidths=1.2, linestyles=(":", "-", "--"))
-        axes.clabel(lines, fmt={level: f"P = {100 * level:g} %" for level in BANDS}, fontsize=8)
+        lines.set(path_effects=HALO)
+        for label in axes.clabel(lines, fmt={level: f"P = {100 * level:g} %" for level in BANDS}, fontsize=8):
+            label.set(path_effects=HALO)
 
 
 def leading_frequency(result: StudyResult) -> Figure:
