@@ -19,7 +19,7 @@ from ..studies.case import Case
 from .ask import AskPanel
 from .processes import Run
 from .see import RunsPanel, SeePanel
-from .sheet import FORM, Checked, change, check, given, read_sheet, stay_inside, usual_value, write_sheet
+from .sheet import FORM, Checked, change, check, given, read_sheet, usual_value, write_sheet
 
 #: Valves to start from: those of the source tree, and of the folder that the server was started in.
 SHELVES = (Path(__file__).parents[2] / "cases", Path("cases").resolve())
@@ -165,9 +165,8 @@ class Page:
         """
         run = self.site.runs.keep(self.home, name, content)
         try:
-            found = await self.site.workers.drawing.ask("header", path=str(run.page))
-            if isinstance(content, bytes):
-                stay_inside(read_sheet(found["case"]))
+            inside = isinstance(content, bytes)
+            found = await self.site.workers.drawing.ask("header", path=str(run.page), inside=inside)
         except CaseError as error:
             self.site.runs.delete(self.home, run)
             raise CaseError(str(error).replace(str(run.page), name)) from None

@@ -31,11 +31,12 @@ from ..errors import CaseError, SolveError
 from ..explore import Answer, Explorer
 from ..model.equilibria import model_warnings
 from ..model.sizes import ValveSizes
+from ..record.files import reading
 from ..record.mesh import MeshData
 from ..shell.recovery import layer_fields
 from ..studies.session import load_result
 from ..studies.study import find_study
-from .sheet import shown_as
+from .sheet import shown_as, stay_inside
 
 #: Time without a question after which the reduced operator is enriched, s.
 IDLE = 0.3
@@ -65,8 +66,11 @@ class Desk:
         picture = base64.b64encode(drawn.getvalue()).decode()
         return {"picture": picture, "sizes": ValveSizes.of(model).lines(), "notes": list(model_warnings(model))}
 
-    def header(self, path: str) -> dict[str, str]:
-        """Kind of a result file, and its case as TOML."""
+    def header(self, path: str, inside: bool = False) -> dict[str, str]:
+        """Kind of a result file, and its case as TOML; one that has to stay inside its folder names no other files."""
+        if inside:
+            with reading(path) as file:
+                stay_inside(json.loads(file["case/json"].asstr()[()]))
         found = load_result(path)
         return {"kind": found.kind, "case": case_toml(found.header.case, comments=False)}
 

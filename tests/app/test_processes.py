@@ -7,10 +7,13 @@ import json
 import sys
 from pathlib import Path
 
+import h5py
 import pytest
 
+import dbvfiv
 from dbvfiv.app import processes
 from dbvfiv.app.processes import Run, Runs, Worker, Workers
+from dbvfiv.app.worker import Desk
 from dbvfiv.errors import CaseError
 
 #: A program that ignores what asks it to end.
@@ -130,3 +133,20 @@ def test_so_many_valves_are_held():
     pairs = [workers.of(Path(str(number)), number) for number in range(processes.VALVES + 1)]
     assert workers.of(Path("0"), 0) is not pairs[0]
     assert workers.of(Path("2"), 2) is pairs[2]
+
+
+@pytest.mark.slow
+def test_a_result_that_names_other_files_is_not_read(tmp_path):
+    path, secret = tmp_path / "six.h5", tmp_path / "secret.csv"
+    secret.write_text("token,open sesame")
+    dbvfiv.load(None, {"mesh.around": 6, "mesh.along": 8}).steady(pressure=5e3, output=path)
+    desk = Desk()
+    assert desk.header(str(path), inside=True)["kind"] == "steady"
+    with h5py.File(path, "r+") as file:
+        data = json.loads(file["case/json"].asstr()[()])
+        data["valve"]["key_points"] = str(secret)
+        del file["case/json"]
+        file["case/json"] = json.dumps(data)
+    with pytest.raises(CaseError, match="without their folder") as told:
+        desk.header(str(path), inside=True)
+    assert "sesame" not in str(told.value)
