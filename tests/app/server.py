@@ -133,6 +133,7 @@ class Tab:
         """Write into a field."""
         from selenium.webdriver.common.keys import Keys
 
+        self.wait(lambda: self.at(name).is_enabled() and self.at(name).is_displayed())
         box = self.at(name)
         box.send_keys(Keys.CONTROL, "a")
         box.send_keys(text or Keys.DELETE)

@@ -196,10 +196,9 @@ def test_rubbers_records_and_results_are_dropped(tmp_path):
             tab.click("Add")
             tab.wait(lambda: "kind fit" in tab.text and tab.at("fits").text == "It fits.")
             tab.unfold("Layers, inside to outside")
-            before = tab.at("layers.0.material")
             tab.fill("layers.0.material", "soft")
             tab.wait(lambda: 'material = "soft"' in tab.at("text").get_attribute("value"))
-            assert tab.at("fits").text == "It fits." and before
+            assert tab.at("fits").text == "It fits."
             tab.drop("dbv6.toml", ringing.encode())  # the rubbers of the case again
             tab.wait(lambda: 'material = "soft"' not in tab.at("text").get_attribute("value"))
             tab.go("Ask")
