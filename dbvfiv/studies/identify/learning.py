@@ -107,7 +107,7 @@ class Learning:
         logarithms of what makes its normal distribution one.
         """
         asked, d = self.plan.case.identify, len(self.plan.inputs)
-        modal = self.modal(self.places.number(self.places.of_records[line.record]))
+        modal = self.modal(self.places.of_line(line))
         frequency, damping = modal.at(coordinates(self.plan, z[:, :d]))
         off, softer = self._errors(z)
         own = np.hypot(line.frequency_error, asked.error / np.sqrt(2) * frequency) / WIDE
@@ -167,7 +167,7 @@ class Learning:
         worst = 0.0
         asked = self.plan.case.identify
         for line, share in zip(self.lines, self.matches(z)):
-            modal, mode = self.modal(self.places.number(self.places.of_records[line.record])), int(np.argmax(share))
+            modal, mode = self.modal(self.places.of_line(line)), int(np.argmax(share))
             if mode == MODES:
                 continue
             own = np.hypot(line.frequency_error / line.frequency, asked.error) / WIDE

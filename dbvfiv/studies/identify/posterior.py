@@ -148,11 +148,6 @@ class Learned:
         return self.covariance / np.outer(spread, spread)
 
     @property
-    def shares(self) -> np.ndarray:
-        """Share (d,) of the prior variance of each input that is gone."""
-        return np.clip(1.0 - np.diag(self.covariance), 0.0, 1.0)
-
-    @property
     def inflation(self) -> np.ndarray:
         """Variance (d,) of each input over that which it would have were the others known."""
         return np.diag(self.covariance) * np.diag(np.linalg.inv(self.covariance))

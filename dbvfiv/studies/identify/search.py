@@ -59,10 +59,6 @@ def prepare_valves(case: dict, known: list) -> Valves:
     return Valves(Plan(full), Places(full), known)
 
 
-def _found(valves: Valves, first: int, numbers: np.ndarray, asked: Sequence[int]) -> list[Modes | Begins]:
-    return valves.found(first, numbers, asked)
-
-
 class Search:
     """Rounds of valves; what an earlier attempt kept is not computed again."""
 
@@ -94,11 +90,11 @@ class Search:
         """The likeliest valve by the full model beside what was emulated of it."""
         value = learning.log_likelihood(z) - 0.5 * (z**2).sum(axis=1)
         best = z[[int(np.argmax(value))]]
-        self._ask(best[:, : len(self.plan.inputs)], number, list(range(len(self.places.moved))))
+        self._ask(best[:, : len(self.plan.inputs)], number, range(len(self.places.moved)))
         whole = self._learning()
         rows = []
         for line, share in zip(self.lines, learning.matches(z)):
-            place, mode = self.places.number(self.places.of_records[line.record]), int(np.argmax(share[:-1]))
+            place, mode = self.places.of_line(line), int(np.argmax(share[:-1]))
             points = learning.modal(place).at(coordinates(self.plan, best[:, : len(self.plan.inputs)]))
             full = whole.followed(place)[-1, mode]
             rows.append(
@@ -148,10 +144,9 @@ class Search:
         self.rounds = np.append(self.rounds, np.full(len(scores), number))
         numbers = self.plan.numbers(scores)
         for sample in range(max(self.written, first), len(self.scores)):
-            row = {"sample": sample, "round": number}
-            inputs = range(scores.shape[1])
-            columns = {name: [value] * len(inputs) for name, value in row.items()}
-            self.record.extend(VALVES, columns | {"input": list(inputs), "score": scores[sample - first].tolist()})
+            one = {"sample": [sample] * scores.shape[1], "round": [number] * scores.shape[1]}
+            one |= {"input": list(range(scores.shape[1])), "score": scores[sample - first].tolist()}
+            self.record.extend(VALVES, one)
         self.written = max(self.written, len(self.scores))
         tasks = [
             start
@@ -163,24 +158,22 @@ class Search:
                 for place in places
             )
         ]
-        for _, rows in self._results(tasks, first, numbers, places):
+        for rows in self._results(tasks, first, numbers, places):
             for row in rows:
                 self._keep(row)
             self.record.item(rows[-1].sample)
 
-    def _results(self, tasks, first: int, numbers: np.ndarray, places) -> Iterator[tuple[int, list[Modes | Begins]]]:
+    def _results(self, tasks, first: int, numbers: np.ndarray, places) -> Iterator[list[Modes | Begins]]:
+        def given(start: int) -> tuple[int, np.ndarray, Sequence[int]]:
+            return first + start, numbers[start : start + OWN], places
+
         if self.team.is_here:
-            for start in tasks:
-                yield start, self.valves.found(first + start, numbers[start : start + OWN], places)
+            yield from (self.valves.found(*given(start)) for start in tasks)
             return
-
-        def ask(start: int) -> Work:
-            return Work(_found, (first + start, numbers[start : start + OWN], places))
-
-        for start, rows in self.team.share(tasks, ask):
+        for start, rows in self.team.share(tasks, lambda start: Work(Valves.found, given(start))):
             if rows is Lost:
                 raise SolveError(f"Valves {first + start} and on could not be computed: {Lost.sentence}")
-            yield start, rows
+            yield rows
 
     def _keep(self, row: Modes | Begins) -> None:
         if isinstance(row, Begins):
@@ -193,16 +186,8 @@ class Search:
         if row.why:
             self.record.note(_LOST, sample=row.sample, place=row.place, reason=row.why)
         self.modes[row.sample, row.place] = row.eigenvalues, row.alike
-        self.record.append(
-            SPECTRA,
-            {
-                "sample": row.sample,
-                "place": row.place,
-                "growth_rate": row.eigenvalues.real,
-                "angular_frequency": row.eigenvalues.imag,
-                "alike": row.alike,
-            },
-        )
+        values = row.sample, row.place, row.eigenvalues.real, row.eigenvalues.imag, row.alike
+        self.record.append(SPECTRA, dict(zip((column.name for column in _SPECTRA), values)))
 
 
 def _some(z: np.ndarray, count: int) -> np.ndarray:

@@ -304,7 +304,7 @@ class IdentifyResult(StudyResult):
         found = []
         points = coordinates(self.plan, self.scores)
         for line, share in zip(self.measured, self.learning.matches(self.samples)):
-            place = self.places.number(self.places.of_records[line.record])
+            place = self.places.of_line(line)
             frequency, damping = self.learning.modal(place).at(points)
             likely = [
                 {

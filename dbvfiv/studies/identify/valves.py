@@ -170,6 +170,10 @@ class Places:
         """Number of a place."""
         return next(i for i, one in enumerate(self.moved) if self._point(one) == self._point(moved))
 
+    def of_line(self, line: Measured) -> int:
+        """Number of the place of a measured oscillation."""
+        return self.number(self.of_records[line.record])
+
     @cached_property
     def first(self) -> list[int]:
         """Places of the records, each once."""
