@@ -260,4 +260,4 @@ def test_spoiled_files_give_a_verdict_or_a_sentence(command_line, tmp_path, one_
 
 @pytest.mark.slow
 def test_many_spoiled_files(command_line, tmp_path, one_sentence):
-    survive(command_line, tmp_path, one_sentence, range(200, 2000))
+    survive(command_line, tmp_path, one_sentence, range(50, 2000))
