@@ -234,7 +234,8 @@ class DesignProblem:
         place = Mu.of(walk.case).at(pressure=pressure)
         q, model = walk.equilibrium(place), walk.built(place).model  # from rest: it depends on no other state
         modes = self._modes(walk, place) if margin else ()
-        beside = Neighbourhood(model, q, pressure, place, modes, self.case.sensitivity.step)
+        linear = walk.family(place).linear if margin else None
+        beside = Neighbourhood(model, q, pressure, place, modes, self.case.sensitivity.step, linear)
         found = {name: beside.performance[theirs] for name, theirs in _PERFORMANCE.items()}
         if not np.isfinite(found["loss coefficient"]):
             raise SolveError(f"Nothing flows at {pressure:.6g} Pa.")

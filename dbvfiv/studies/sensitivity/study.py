@@ -14,7 +14,7 @@ from eigen import Mode, leading_modes
 
 from ...case.parameters import PARAMETERS, Mu
 from ...errors import CaseError, SolveError
-from ...model.dynamics import linearise
+from ...model.dynamics import LinearisedState, linearise
 from ...model.equilibria import require_equilibrium
 from ...model.state import SteadyState
 from ...record.mesh import MeshData
@@ -71,8 +71,8 @@ def run(session: Session, record: GrowingRecord) -> None:
         record.append(STATE, state_row(model, session.equilibrium(record)))
     (state,) = read_states(record, STATE)
     mu = Mu.of(session.case)
-    mode = _find_mode(session, state, mu)
-    beside = Neighbourhood(model, state.q, state.pressure, mu, [mode], asked.step)
+    mode, linear = _find_mode(session, state, mu)
+    beside = Neighbourhood(model, state.q, state.pressure, mu, [mode], asked.step, linear)
     record.note(MODE, number=asked.mode, eigenvalue=complex(mode.eigenvalue), performance=beside.performance)
     record.begin("sensitivity", len(names))
     done = set(record.column(VALUES, "parameter"))
@@ -89,8 +89,8 @@ def run(session: Session, record: GrowingRecord) -> None:
         record.item(found)
 
 
-def _find_mode(session: Session, state: SteadyState, mu: Mu) -> Mode:
-    """The mode asked for, with its left vector."""
+def _find_mode(session: Session, state: SteadyState, mu: Mu) -> tuple[Mode, LinearisedState]:
+    """The mode asked for, with its left vector, and the linearised state."""
     model, number = session.model, session.case.sensitivity.mode
     require_equilibrium(model, state)
     if model.flow.has_fluid and state.pressure <= model.flow.back:
@@ -102,7 +102,7 @@ def _find_mode(session: Session, state: SteadyState, mu: Mu) -> Mode:
         found = leading_modes(linear.pencil(mu), number + _MARGIN, options)
     if len(found) < number:
         raise SolveError(f"The state at {state.pressure:.6g} Pa has {len(found)} leading modes, and no mode {number}.")
-    return found.mode(number - 1)
+    return found.mode(number - 1), linear
 
 
 class SensitivityResult(StudyResult):

@@ -26,6 +26,7 @@ from eigen import CoupledPencil, Mode, eigenvalue_derivative
 from ...case.parameters import DESIGN, PARAMETERS, SURROUNDINGS, Mu
 from ...errors import CaseError, SolveError
 from ...model import ValveModel, linearise
+from ...model.dynamics import LinearisedState
 from ...model.sizes import ValveSizes
 from ...model.state import describe_state
 from ..case import Case
@@ -108,6 +109,8 @@ class Neighbourhood:
         With left vectors (`SearchOptions(left=True)`).
     step : float
         Relative size of the central differences; of a parameter that is zero, its absolute size.
+    linear : LinearisedState, optional
+        Of the state, where it is known.
     """
 
     def __init__(
@@ -118,8 +121,11 @@ class Neighbourhood:
         mu: Mu,
         modes: Sequence[Mode] = (),
         step: float = 2e-5,
+        linear: LinearisedState | None = None,
     ):
         self.model, self.q, self.pressure, self.mu, self.modes, self.step = model, q, pressure, mu, tuple(modes), step
+        if linear is not None:
+            self._linear = linear
 
     @cached_property
     def performance(self) -> dict[str, float]:
@@ -133,7 +139,7 @@ class Neighbourhood:
         return factor
 
     @cached_property
-    def _linear(self):
+    def _linear(self) -> LinearisedState:
         return linearise(self.model, self.q, self.pressure)
 
     @cached_property
