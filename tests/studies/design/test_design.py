@@ -138,12 +138,12 @@ def test_the_margin_of_uncertain_valves_is_that_of_sampled_ones():
 def test_a_robust_design_keeps_its_reserve(valve):
     inputs = {"thickness": "normal(1, 0.03)"}
     robust = load_small(KEYS, {"uncertainty.inputs": inputs, "design.evaluations": 12}).design(
-        {"thickness": "0.7:1.4"}, aim="mass down", constraints=["margin at 6 kPa at least 1 %"]
+        {"thickness": "0.7:1.4"}, aim="flow at 6 kPa down", constraints=["margin at 6 kPa at least 5 %"]
     )
     problem = DesignProblem(robust.case)
     at = problem.at(robust.best[0].values, 6e3, True)
     assert robust.best[0].holds and at.reserve > 5e-4
-    assert at.values["margin"] - at.reserve == pytest.approx(0.01, abs=2e-4)
+    assert at.values["margin"] - at.reserve == pytest.approx(0.05, abs=1e-3)
 
 
 def test_seals_is_what_closure_finds():
