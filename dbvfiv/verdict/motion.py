@@ -112,7 +112,7 @@ def judge_record(
     found = find_motion(series, detrend, MAINS)
     if found.name not in _LINES:
         level = judged()
-        peaks = () if level.name == "decaying" else resonances(series)
+        peaks = () if found.returns or level.name == "decaying" else resonances(series)
         level = replace(level, lines=tuple(map(_summary, peaks)))
         if found.returns:
             return replace(level, name="irregular", decided=True, reason=found.reason)

@@ -4,7 +4,6 @@ from datetime import datetime, timedelta
 
 import numpy as np
 import pytest
-from scipy.signal import lfilter
 
 from dbvfiv.drawing.signal import signal
 from dbvfiv.verdict import judge_record
@@ -149,18 +148,3 @@ def test_the_figure_has_the_envelope_ten_cycles_labels_and_a_phase_portrait():
     for values in (np.full(len(time), 5.0), 5 - 3 * np.exp(-time / 2), noise, np.where(time > 3, 1.0, 0.0)):
         assert signal("other", time, values, judge_record(time, values)).axes[2].get_xlim()[1] > 0
     assert signal("short", time[:3], ring[:3], judge_record(time[:3], ring[:3])).axes
-
-
-@pytest.mark.parametrize("seed", range(3))
-def test_modes_whose_peaks_overlap_are_found_together(seed):
-    """Two modes of an autoregression of known poles, 3 Hz apart, and half widths of 0.6 and 1 Hz."""
-    rate, random = 250.0, np.random.default_rng([9, seed])
-    modes = np.array([[47.0, 0.0122], [50.0, 0.02]])
-    poles = np.exp((-modes[:, 1] + 1j * np.sqrt(1 - modes[:, 1] ** 2)) * 2 * np.pi * modes[:, 0] / rate)
-    motion = lfilter([1], np.poly([*poles, *poles.conj()]).real, random.standard_normal(20_000))[5000:]
-    found = judge_record(np.arange(len(motion)) / rate, motion / motion.std() + 0.05 * random.standard_normal(15_000))
-    lines = sorted(found.lines, key=lambda line: line["frequency"])
-    assert [line["called"] for line in lines] == ["resonance", "resonance"]
-    for line, (frequency, ratio) in zip(lines, modes):
-        assert abs(line["damping_ratio"] - ratio) < 1.5 * line["damping_ratio_interval"] < 0.9 * ratio
-        assert abs(line["frequency"] - frequency) < 1.5 * line["frequency_interval"] < 0.6
