@@ -65,6 +65,10 @@ class Tangent:
     pressure: np.ndarray
 
 
+#: Distance of a face from where it parts or meets, over the rounding of the contact law, below which it grazes.
+GRAZING = 0.1
+
+
 class ValveModel:
     """The coupled valve of a case.
 
@@ -248,6 +252,30 @@ class ValveModel:
         room = np.abs(plane.gap(nodal, directors) - plane.law.rounding)
         return float(np.min(room / np.maximum(moved, 1e-300), initial=np.inf))
 
+    def grazing(self, q: np.ndarray) -> tuple[int, dict[str, sp.csr_matrix]]:
+        """Number of faces that are about to part or have just met, and changes (n, n) of the stiffness in which they
+        are "parted", and "held" as by faces that press firmly; none without such faces.
+
+        Where they part the law's stiffness is none and rises over its rounding, so that smaller motions see little
+        contact and larger ones a firm one for half of the time.
+        """
+        if self.contact is None:
+            return 0, {}
+        plane, nodal = self.contact, self.nodal(q)
+        directors, first, _ = self.shell.directors(nodal)
+        gap, law = plane.gap(nodal, directors), plane.law
+        near = np.abs(gap - law.rounding) < GRAZING * law.rounding
+        if not near.any():
+            return 0, {}
+        slope, stiffness = plane.slope(first), law.respond(gap)[2]
+        found = {}
+        for name, wanted in (("parted", 0.0), ("held", law.penalty)):
+            values = np.zeros(len(self.shell.dofs.pattern[1]))
+            change = plane.area * np.where(near, wanted - stiffness, 0.0)
+            plane.add_blocks(values, change[:, None, None] * slope[:, :, None] * slope[:, None, :])
+            found[name] = self.shell.dofs.matrix(values)
+        return int(np.count_nonzero(near)), found
+
     def touching(self, q: np.ndarray) -> int:
         """Number of stops, or of nodes with their inner face, in contact."""
         return self.stops.touching(q) if self.contact is None else self.contact.touching(q)
@@ -298,6 +326,19 @@ class ValveModel:
         slots, indices, indptr = self._force_pattern
         keep = slots >= 0
         data = np.bincount(slots[keep], weights=out.ravel()[keep], minlength=len(indices))
+        return sp.csr_matrix((data, indices, indptr), shape=(self.size, self.stations), copy=False)
+
+    def forces_on_areas(self, nodal: np.ndarray, lengths: np.ndarray) -> sp.csr_matrix:
+        """Forces (n, m), stored as `station_forces`, of unit pressures that do work on the areas over lengths (m,),
+        m.
+        """
+        _, indices, indptr = self._force_pattern
+        slope = self.rows.jacobian(nodal).tocoo()
+        rows = np.repeat(np.arange(self.size), np.diff(indptr))
+        keys, wanted = rows * self.stations + indices, slope.col * self.stations + slope.row
+        at = np.minimum(np.searchsorted(keys, wanted), len(keys) - 1)
+        known = keys[at] == wanted
+        data = np.bincount(at[known], (slope.data * lengths[slope.row])[known], minlength=len(keys))
         return sp.csr_matrix((data, indices, indptr), shape=(self.size, self.stations), copy=False)
 
     @cached_property

@@ -9,6 +9,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from scipy.integrate import cumulative_trapezoid
+from scipy.optimize import brentq
 
 from dbvfiv import load
 from dbvfiv.case.parameters import Mu
@@ -241,6 +242,32 @@ def test_contact_holds_up_to_the_amplitude_at_which_the_first_face_parts_or_meet
         return any(np.any(found.touching != model.contact.state(state.q).touching) for found in both)
 
     assert not changes(0.97 * reach) and changes(1.03 * reach)
+
+
+@pytest.mark.slow
+def test_faces_that_graze_have_a_spectrum_on_either_side(model, path):
+    """Where a face just parts the state is named. Held faces raise the frequencies of the structure, and where the
+    contact law has no stiffness yet the parted side is the state's own.
+    """
+    plane, pressures = model.contact, (1.4e3, 2.2e3)
+
+    def room(pressure: float, face: int) -> float:
+        return float(model.contact.state(path.go_to(pressure).q).gap[face] - plane.law.rounding)
+
+    at_ends = [model.contact.state(path.go_to(p).q).gap > plane.law.rounding for p in pressures]
+    face = int(np.flatnonzero(~at_ends[0] & at_ends[1])[0])
+    pressure = float(brentq(room, *pressures, args=(face,), xtol=1e-3))
+    told = [
+        load(model.case.replace({"modes.in_vacuo": True, "modes.count": 4, "drive.pressure": p}))
+        for p in (pressure, 4e3)
+    ]
+    graze, away = (valve.modes().summary() for valve in told)
+    sides, own = graze["classes"][0]["grazing"], np.array([mode["frequency"] for mode in graze["modes"]])
+    assert sides["faces"] >= 1 and any(note.startswith("Grazing: ") for note in graze["notes"])
+    parted, held = (np.array([mode["frequency"] for mode in sides[name]]) for name in ("parted", "held"))
+    assert parted == pytest.approx(own, rel=1e-3) and np.all(parted <= own * (1 + 1e-9))
+    assert np.all(held >= own * (1 - 1e-9)) and np.max(held / own) > 1.001
+    assert "grazing" not in away["classes"][0]
 
 
 CASES = Path(__file__).parents[2] / "cases"

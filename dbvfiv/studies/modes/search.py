@@ -10,7 +10,15 @@ from typing import Any
 import numpy as np
 from scipy.optimize import brentq
 
-from eigen import CertifiedSpectrum, CoupledPencil, SearchOptions, Spectrum, TransferBasis, certified_spectrum
+from eigen import (
+    CertifiedSpectrum,
+    CoupledPencil,
+    SearchOptions,
+    Spectrum,
+    TransferBasis,
+    certified_spectrum,
+    leading_modes,
+)
 
 from ...case.parameters import PARAMETERS, Mu
 from ...errors import CaseError
@@ -18,6 +26,7 @@ from ...model import ValveModel
 from ...model.equilibria import require_equilibrium
 from ...model.state import SteadyState
 from ...model.symmetry import EQUILIBRIA, SYMMETRIES, Symmetry, symmetry_named
+from ...model.valve import GRAZING
 from ...observer import Observer
 from ...record.table import Column
 from ...texts import shortly
@@ -298,6 +307,9 @@ class FoundModes:
     notes : tuple of str
     spectrum : Spectrum, optional
         Eigenvalues, vectors and residuals, of a run.
+    grazing : dict
+        Where faces are about to part or have just met: how many `faces`, growth rates, 1/s, and frequencies, Hz,
+        with them `parted` and `held`. Empty elsewhere.
     """
 
     modes: tuple[ModeShape, ...]
@@ -305,6 +317,7 @@ class FoundModes:
     verdict: Verdict
     notes: tuple[str, ...] = ()
     spectrum: Spectrum | None = None
+    grazing: dict[str, Any] = field(default_factory=dict)
 
     @property
     def eigenvalues(self) -> np.ndarray:
@@ -323,7 +336,7 @@ class FoundModes:
             "unstable_count_independent": self.certificate.unstable_count_independent,
             "stable": self.stable,
             "certificate": self.certificate.summary(),
-        }
+        } | ({"grazing": self.grazing} if self.grazing else {})
 
 
 def run_modes(
@@ -392,8 +405,9 @@ def run_modes(
     searched = family.is_searched(certified.spectrum.eigenvalues, place, search.band)
     verdict = _verdict(certified, searched, search.claimed, linear.seal is not None)
     modes = _shapes(model, pencil, linear, certified.spectrum, symmetry, in_vacuo)
-    notes = (*notes, *_contact_notes(model, state, linear, modes, symmetry))
-    result = FoundModes(modes, Certificate.of(certified), verdict, notes, certified.spectrum)
+    grazing = _one_sided(model, state, pencil, asked, options.count) if symmetry.of_equilibria else {}
+    notes = (*notes, *_contact_notes(model, state, linear, modes, symmetry), *_grazing_notes(model, grazing))
+    result = FoundModes(modes, Certificate.of(certified), verdict, notes, certified.spectrum, grazing)
     if result.stable is None:
         observer.warn(result.verdict.reason)
     return result
@@ -416,6 +430,26 @@ def _contact_notes(model, state: SteadyState, linear, modes: Sequence[ModeShape]
             "mm of its largest displacement on faces part or meet."
         )
     return said
+
+
+def _one_sided(model, state: SteadyState, pencil: CoupledPencil, search: SearchOptions, count: int) -> dict[str, Any]:
+    """Spectra on both sides of faces that graze, as `FoundModes.grazing` has them."""
+    faces, changes = model.grazing(state.q)
+    found: dict[str, Any] = {"faces": faces} if changes else {}
+    for name, change in changes.items():
+        values = leading_modes(pencil.replace(K=pencil.K + change), count, search).eigenvalues
+        found[name] = [{"growth_rate": v.real, "frequency": abs(v.imag) / (2 * np.pi)} for v in values.tolist()]
+    return found
+
+
+def _grazing_notes(model, grazing: dict[str, Any]) -> list[str]:
+    if not grazing:
+        return []
+    sides = ((name, grazing[name][0]) for name in ("parted", "held"))
+    said = [f"{v['growth_rate']:+.4g} 1/s at {v['frequency']:.4g} Hz with them {name}" for name, v in sides]
+    within = 1e6 * GRAZING * model.contact.law.rounding
+    faces = "1 node whose face is" if grazing["faces"] == 1 else f"{grazing['faces']} nodes whose faces are"
+    return [f"Grazing: {faces} within {within:.2g} um of parting or meeting; the first mode has {', '.join(said)}."]
 
 
 def _verdict(found: CertifiedSpectrum, searched: np.ndarray, claimed: float, sealed: bool) -> Verdict:

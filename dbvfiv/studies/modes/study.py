@@ -89,7 +89,8 @@ def _keep(record: GrowingRecord, variant: Variant, found: FoundModes) -> None:
         if sentence not in {note["text"] for note in record.notes("remark")}:
             record.note("remark", text=sentence)
     verdict = found.verdict.summary()
-    record.note(_FOUND, variant=list(variant), certificate=found.certificate.note(), verdict=verdict)
+    certificate = found.certificate.note()
+    record.note(_FOUND, variant=list(variant), certificate=certificate, verdict=verdict, grazing=found.grazing)
 
 
 def _notes(record: Record) -> dict[Variant, dict[str, Any]]:
@@ -195,7 +196,8 @@ class ModesResult(StudyResult):
             points = _rows(self.record, COUNT, variant)
             curve = {name: self.record.column(COUNT, name)[points] for name in ("frequency", "phase")}
             certificate = Certificate(**note["certificate"], **curve)
-            found[variant] = FoundModes(tuple(shapes), certificate, Verdict.read(note["verdict"]))
+            verdict, grazing = Verdict.read(note["verdict"]), note.get("grazing", {})
+            found[variant] = FoundModes(tuple(shapes), certificate, verdict, grazing=grazing)
         return found
 
     @cached_property
