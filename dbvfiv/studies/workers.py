@@ -260,13 +260,25 @@ def _connected(address: str) -> Any:
             f"Workers are given as {address!r}, the address of a Dask scheduler, but the package distributed is not "
             "installed; `pip install dbvfiv[cluster]` brings it."
         ) from None
-    try:
-        return Client(address, timeout=PATIENCE, set_as_default=False)
-    except Exception as error:  # of whatever else answers there: lengths of a web server's words are no memory's
+    answer: list[Any] = []
+
+    def ask() -> None:
+        try:
+            answer.append(Client(address, timeout=PATIENCE, set_as_default=False))
+        except Exception as error:  # of whatever else answers there: lengths of a web server's words are no memory's
+            answer.append(error)
+
+    # a server that is no scheduler may leave the client waiting past its own limit
+    asked = threading.Thread(target=ask, daemon=True)
+    asked.start()
+    asked.join(2 * PATIENCE)
+    found = answer[0] if answer else TimeoutError()
+    if isinstance(found, Exception):
         raise CaseError(
             f"Workers are given as {address!r}, where no Dask scheduler answers within {PATIENCE} s "
-            f"({type(error).__name__}); start one by `dask scheduler`, or give a number of processes."
-        ) from None
+            f"({type(found).__name__}); start one by `dask scheduler`, or give a number of processes."
+        )
+    return found
 
 
 def _begin() -> None:
