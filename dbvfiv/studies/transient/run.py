@@ -33,6 +33,8 @@ Columns = Mapping[str, np.ndarray]
 #: Smallest area over that of the lip gap at rest up to which faces shut a valve; those of a bill that is moulded shut
 #: part at another.
 SHUT = 0.5
+#: Load on the lips, over the unit of loads, from which stops bear one: rounding is some 1e-8 of that unit.
+BORNE = 1e-3
 #: Pascal; no fluid's pressure falls further below that of the surroundings.
 ATMOSPHERE = 101_325.0
 #: Numbers of the mass flow that stand in the document of a verdict itself.
@@ -168,15 +170,18 @@ def openness(history: Columns, model: ValveModel) -> np.ndarray:
     """Distance of a valve from shut (k,), at most 1 where it is: passage and flows over those of a shut one.
 
     Faces shut it where they leave at most `shut_share` of the gap at rest. Stops hold lips where they are at rest; they
-    shut it where nothing drives fluid out and as many as a row has hold. A shut valve leaks at most what a jet through
-    that gap carries.
+    shut it where nothing drives fluid out and as many as a row has bear a load, which the rounding of a valve that
+    stands at rest is not. A shut valve leaks at most what a jet through that gap carries.
     """
     gap = lip_gap(model)
     area = history["smallest_area"] / (shut_share(model) * gap)
     drive = history["inlet_pressure"] - model.case.rest_pressure
     if model.contact is None:
         row = max(len(model.stops.unknowns) / np.count_nonzero(model.mesh.z <= model.case.valve.duckbill_length), 1.0)
-        held = (history["stops"] >= row) & (drive <= 0) & (history["smallest_area"] <= gap)
+        valve = model.case.valve
+        load = BORNE * model.load_unit * valve.bill_width * valve.duckbill_length
+        borne = history["stop_energy"] >= 0.5 * load**2 / np.max(model.stops.stiffness)
+        held = borne & (history["stops"] >= row) & (drive <= 0) & (history["smallest_area"] <= gap)
         area = np.where(held, 1.0, area)
     head = abs(drive) + 2.0 * model.load_unit  # faces that close squeeze out what is between them, and speed it up
     leak = shut_share(model) * gap * np.sqrt(2.0 * model.case.fluid.density * head)

@@ -179,7 +179,8 @@ def made_history(model, share, flow=1e-3):
     time = np.linspace(0.0, 1.0, 101)
     history = {name: np.full(101, 1e-3) for name in ("lip_displacement", "lip_opening", "lip_velocity")}
     history |= dict.fromkeys(("mass_flow", "inlet_mass_flow"), np.full(101, flow))
-    history |= {"time": time, "inlet_pressure": np.full(101, 18e3), "stops": np.zeros(101)}
+    history |= {"time": time, "inlet_pressure": np.full(101, 18e3)}
+    history |= dict.fromkeys(("stops", "stop_energy"), np.zeros(101))
     return history | {"smallest_area": np.full(101, lip_gap(model)) * share}
 
 
