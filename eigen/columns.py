@@ -106,12 +106,12 @@ class Column:
 
     @property
     def growth_rate(self) -> np.ndarray:
-        """Of the leading modes (cells,), 1/s; NaN where none was found."""
+        """Growth rates of the leading modes (cells,), 1/s; NaN where none was found."""
         return self._leading.real
 
     @property
     def frequency(self) -> np.ndarray:
-        """Of the leading modes (cells,), Hz."""
+        """Frequencies of the leading modes (cells,), Hz."""
         return self._leading.imag / (2 * np.pi)
 
     @property
@@ -131,7 +131,7 @@ class Column:
 
     @property
     def how(self) -> np.ndarray:
-        """How each cell was found."""
+        """Way (cells,) in which each cell was found, as `Cell.how` says."""
         return np.array([cell.how for cell in self.cells])
 
 

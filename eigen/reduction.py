@@ -208,7 +208,7 @@ class FamilyReduction:
         return [found[i] for i in range(len(points))]
 
     def _corrected_alike(self, several, points, relaxation) -> Iterator[tuple[np.ndarray, np.ndarray]]:
-        """The same at points of one relaxation.
+        """Right and left vectors, as `_corrected` gives them, at points of one relaxation.
 
         Far from the leading modes T is nearly (1 + lambda beta) K. Where parts relax, K is the stiffness that a typical
         motion sees, and corrections are repeated for what that differs from one mode and one part to another.

@@ -214,7 +214,7 @@ class ClosedValve(ValveModel):
 
 
 def load_steps(model: ClosedValve) -> LoadStepOptions:
-    """How equilibria are reached from one back pressure to the next."""
+    """Load steps from one back pressure to the next, as a case asks for them."""
     closure, steady = model.case.closure, model.case.steady
     jump = LARGEST_JUMP * float(np.mean(model.mesh.thickness))
     newton = NewtonOptions(steady.tolerance, steady.max_iterations)

@@ -246,7 +246,7 @@ def test_contact_holds_up_to_the_amplitude_at_which_the_first_face_parts_or_meet
 
 @pytest.mark.slow
 def test_faces_that_graze_have_a_spectrum_on_either_side(model, path):
-    """Where a face just parts the state is named. Held faces raise the frequencies of the structure, and where the
+    """A state at which a face just parts is named. Held faces raise the frequencies of the structure, and where the
     contact law has no stiffness yet the parted side is the state's own.
     """
     plane, pressures = model.contact, (1.4e3, 2.2e3)

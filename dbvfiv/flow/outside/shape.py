@@ -198,7 +198,7 @@ class ShapeDerivative:
         return complex(change + ends[1][1] - ends[0][1] + (self._back * strength).sum())
 
     def _data(self, panels: Panels, pairs: np.ndarray):
-        """What the derivatives are taken by, the sum over near pairs, and the strengths."""
+        """Data of panels that derivatives are taken by, the sum over near pairs, and the strengths of the panels."""
         gauss, shares = _gauss(panels)
         data = {"centres": panels.centres, "normals": panels.normals, "areas": panels.areas, "bend": panels.bend}
         own = panels.corners, panels.centres, panels.normals

@@ -16,7 +16,6 @@ from eigen import ColumnSolver
 from ...case.parameters import DESIGN, PARAMETERS, Mu
 from ...case.quantity import head_of
 from ...errors import CaseError, SolveError
-from ...observer import Observer
 from ...verdict.reading import Reading, judge_file
 from ..case import Case
 from ..inputs import Plan
@@ -258,36 +257,35 @@ class Valves:
     def _one(self, sample: int, row: np.ndarray, asked: Sequence[int]):
         walk = self._own
         try:
-            case = self.plan.redescribed(row)
-            walk = walk or StabilityWalk(case, Observer(), solver=self._solver)
+            walk = walk or self.plan.walk(row, self._solver)
         except (SolveError, CaseError) as error:
             yield from (Modes.none(sample, place, str(error)) for place in asked)
             return
-        rows = {place: self._modes(sample, row, walk, case, place) for place in asked}
+        rows = {place: self._modes(sample, row, walk, place) for place in asked}
         yield from rows.values()
         if set(self.places.ranged) <= set(asked):
             damping = least_damping(np.array([rows[place].eigenvalues for place in self.places.ranged]))
             known = np.isfinite(damping).all()
-            least = partial(self._least, row, walk, case)
+            least = partial(self._least, row, walk)
             yield Begins(sample, *(self._begins(damping, least) if known else (np.nan, np.nan)))
 
-    def _modes(self, sample: int, row: np.ndarray, walk: StabilityWalk, case: Case, place: int) -> Modes:
+    def _modes(self, sample: int, row: np.ndarray, walk: StabilityWalk, place: int) -> Modes:
         if self.known[place] is None:
             return Modes.none(sample, place, "The valve of the case has no state there.")
         q, shapes = self.known[place]
         try:
-            point = self.plan.point(case, row, **self.places.moved[place])
+            point = self.plan.point(walk.case, row, **self.places.moved[place])
             walk.settle(point, q)
             found = walk.spectrum(point, MODES)
             return Modes(sample, place, *_kept(found.eigenvalues, found.q, shapes))
         except (SolveError, CaseError, ValueError) as error:
             return Modes.none(sample, place, str(error))
 
-    def _least(self, row: np.ndarray, walk: StabilityWalk, case: Case, value: float) -> float:
+    def _least(self, row: np.ndarray, walk: StabilityWalk, value: float) -> float:
         """Least damping ratio of a valve at a value of the range; NaN where it is not known."""
         moved = self.places.of_records[-1] | {self.places.parameter: value}
         try:
-            point = self.plan.point(case, row, **moved)
+            point = self.plan.point(walk.case, row, **moved)
             return float(least_damping(walk.spectrum(point, MODES).eigenvalues[None])[0])
         except (SolveError, CaseError, ValueError):
             return np.nan

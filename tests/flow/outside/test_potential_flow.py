@@ -196,7 +196,7 @@ def test_varying_strengths_add_up():
 
 @pytest.mark.parametrize("lips", ["closed", "open"])
 def test_derivative_by_the_shape_is_that_of_changed_shapes(lips):
-    """Of a valve in a pipe, for complex fluxes, where the wall bends; against extrapolated differences."""
+    """Derivatives of a valve in a pipe, for complex fluxes, where the wall bends, against extrapolated differences."""
     outside = make_valve({"outside.fluid": "same", "outside.pipe_diameter": "330 mm", "outside.lips": lips}).outside
     mesh, dofs, rng = outside.shell.mesh, outside.shell.dofs, np.random.default_rng(3)
     bent = np.sin(20 * mesh.nodes[:, 2:] + 5 * mesh.nodes[:, :1]) * np.sin(np.arange(5))
