@@ -164,7 +164,8 @@ def test_what_is_done_is_kept_on_the_way(model, state, over_density, monkeypatch
     first = [[row["growth_rate"] for row in part["branches"] if row["id"] == 1] for part in kept]
     assert [len(rates) for rates in first[:-1]] == list(range(1, len(whole.values) + 1))
     assert first[6] == pytest.approx(whole.branches[0].growth_rate[:7], rel=1e-10)
-    assert np.array_equal(eigenvalues(whole), eigenvalues(over_density), equal_nan=True)
+    # two runs of one process differ by the rounding of sums whose order follows the alignment of arrays
+    assert np.allclose(eigenvalues(whole), eigenvalues(over_density), rtol=1e-9, atol=0.0, equal_nan=True)
 
 
 @pytest.mark.parametrize("over", ["density=5:50:4:log", "loss_factor=0.5:2:4:log"])
