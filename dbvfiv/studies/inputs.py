@@ -99,6 +99,13 @@ def inputs_of(case: Case, over: Sequence[str] = ()) -> list[Input]:
             key="uncertainty.inputs",
         )
     found = [one for one in found if one not in moved]
+    names = [one.name for one in found]
+    if twice := next((name for name in names if names.count(name) > 1), None):
+        raise CaseError(
+            f"uncertainty.inputs holds {twice} twice, by its name and by its key {PARAMETERS[twice].key}; one of them "
+            "has to go.",
+            key="uncertainty.inputs",
+        )
     if not found:
         raise CaseError(
             "Nothing of this case is known to be uncertain; give uncertainty.inputs, such as "
@@ -118,7 +125,8 @@ def correlation_of(case: Case, inputs: Sequence[Input]) -> np.ndarray:
     """
     names = [one.name for one in inputs]
     matrix = np.eye(len(names))
-    for first, second, value in case.uncertainty.correlation:
+    for *pair, value in case.uncertainty.correlation:
+        first, second = map(_parameter_of, pair)
         unknown = next((name for name in (first, second) if name not in names), None)
         if unknown or first == second:
             raise CaseError(
@@ -128,6 +136,11 @@ def correlation_of(case: Case, inputs: Sequence[Input]) -> np.ndarray:
                 key="uncertainty.correlation",
             )
         i, j = names.index(first), names.index(second)
+        if matrix[i, j]:
+            raise CaseError(
+                f"uncertainty.correlation holds the pair {first} and {second} twice; one of them has to go.",
+                key="uncertainty.correlation",
+            )
         matrix[i, j] = matrix[j, i] = value
     try:
         return np.linalg.cholesky(matrix)
@@ -238,6 +251,11 @@ class Plan:
         named = {one.name: x for one, x in zip(self.inputs, row) if one.name in PARAMETERS}
         return Mu.of(case).at(**(named | moved))
 
+    def place(self, case: Case, row: np.ndarray, value: float) -> Mu:
+        """Parameter point of a sample at a value of the range; without a range a pressure may be an input."""
+        is_input = any(one.name == self.parameter for one in self.inputs)
+        return self.point(case, row, **({} if is_input else {self.parameter: value}))
+
     def redescribed(self, row: np.ndarray) -> Case:
         """Case of a sample, without the parameters of the table.
 
@@ -260,8 +278,15 @@ class Plan:
         return StabilityWalk(self.redescribed(row), solver=solver)
 
 
+def _parameter_of(name: str) -> str:
+    """Parameter that a key of the case holds, so that nothing has two names; those of the design count from what the
+    case has, and their keys do not.
+    """
+    return next((row.name for row in PARAMETERS.values() if row.key == name and not row.design), name)
+
+
 def _input(case: Case, name: str, text: str, source: str) -> Input:
-    key = f"uncertainty.inputs.{name}"
+    key, name = f"uncertainty.inputs.{name}", _parameter_of(name)
     if name in PARAMETERS:
         row = PARAMETERS[name]
         try:

@@ -79,7 +79,7 @@ def walks_at(plan: Plan, value: float, start: Start, solver: ColumnSolver) -> At
 
     def at(row: np.ndarray) -> tuple[StabilityWalk, Mu]:
         walk = plan.walk(row, solver)
-        return walk, walk.meet_pump(plan.point(walk.case, row, **{plan.parameter: value}), start.lift, start.q)
+        return walk, walk.meet_pump(plan.place(walk.case, row, value), start.lift, start.q)
 
     return at
 
@@ -118,7 +118,7 @@ class Sampler:
     def _side_by_side(self, number: int, first: int, rows: np.ndarray) -> Iterator[Found]:
         """Samples that share the steady state of the case."""
         value, walk = self.plan.values[number], self._walk
-        places = [self.plan.point(self.plan.case, row, **{self.plan.parameter: value}) for row in rows]
+        places = [self.plan.place(self.plan.case, row, value) for row in rows]
         try:
             if (start := self.states[number]) is None:
                 raise SolveError("The valve of the case has no steady state there.")
@@ -141,7 +141,7 @@ class Sampler:
                 walk = walk or self.plan.walk(row, self._solver)
                 lift, q = (0.0, None) if self.states[i] is None else (self.states[i].lift, self.states[i].q)
                 q = q if near is None else near.state(row)
-                place = walk.meet_pump(self.plan.point(walk.case, row, **{self.plan.parameter: value}), lift, q)
+                place = walk.meet_pump(self.plan.place(walk.case, row, value), lift, q)
                 walk.settle(place, q)
                 state = walk.state(place)
                 verdict = self._beside(i).verdicts(walk, [place], row)[0] if near else None

@@ -3,6 +3,7 @@ run is interrupted; what cannot be used is answered by a sentence.
 """
 
 import json
+import re
 
 import numpy as np
 import pytest
@@ -94,6 +95,18 @@ def test_surroundings_are_asked_side_by_side(valve):
         assert alone.verdict.growth_rate == pytest.approx(samples["growth_rate"][3], rel=1e-5, abs=1e-5)
 
 
+@pytest.mark.parametrize("name", ["pressure", "drive.pressure"])
+def test_a_pressure_may_be_uncertain(valve, name):
+    found = valve.uncertainty(inputs={name: "normal(5 %)", "beta": "lognormal(0.002, 2)"})
+    assert [one.name for one in found.plan.inputs] == ["pressure", "beta"]
+    samples = found.at(found.plan.values[0])
+    pressure, beta = samples["inputs"][3]
+    modes = valve.modes(pressure, beta=beta)
+    assert modes.state.outlet_area == pytest.approx(samples["opening"][3], rel=1e-6)
+    assert modes.verdict.outcome == OUTCOMES[samples["outcome"][3]]
+    assert modes.verdict.growth_rate == pytest.approx(samples["growth_rate"][3], rel=1e-5)
+
+
 @pytest.mark.slow
 def test_both_flow_models_have_the_same_samples(valve, found, tmp_path):
     path = tmp_path / "both.h5"
@@ -165,40 +178,65 @@ def test_a_sealing_pressure_may_be_uncertain():
     assert one.distribution.numbers == (case.valve.sealing_pressure, 0.05 * case.valve.sealing_pressure)
 
 
-@pytest.mark.parametrize(
-    ("changes", "clause"),
-    [
-        ({"uncertainty.inputs": {"thickness": "normal(1, 0.5)"}}, "0.029 lies where thickness cannot be"),
-        ({"uncertainty.inputs": {"thicknes": "normal(5 %)"}}, "neither a parameter"),
-        ({"uncertainty.inputs": {"tail_length": "normal(5 %)"}}, "no tail_length to change"),
-        ({"uncertainty.inputs": {"thickness": "wide"}}, "no distribution; it must be such as"),
-        ({"uncertainty.inputs": {"valve.wall": "normal(5 %)"}}, "holds a number"),
-        ({"uncertainty.inputs": {"materials.CR.loss_factor": "uniform(0.1, 3)"}}, "cannot be"),
-        ({"uncertainty.correlation": [["thickness", "angle", 1.2]]}, "between -1 and 1"),
-        ({"uncertainty.correlation": [["thickness", "width", 0.5]]}, "'width', which is no input"),
-        (
-            {
-                "uncertainty.correlation": [
-                    ["thickness", "angle", 0.9],
-                    ["angle", "beta", 0.9],
-                    ["thickness", "beta", -0.9],
-                ]
-            },
-            "no numbers can be correlated so",
-        ),
-        ({"uncertainty.inputs": {"pressure": "normal(5 %)"}, "uncertainty.over": "pressure=0.1 m:1 m:3"}, "moves"),
-        (
-            {**PUMP, "uncertainty.inputs": {"pressure": "normal(5 %)"}},
-            "that at which both meet",
-        ),
-        ({"uncertainty.method": "rare", "uncertainty.over": "pressure=0.1 m:1 m:3"}, "one state"),
-        ({"uncertainty.workers": "few"}, "neither a number nor an address"),
-        ({"uncertainty.samples": 3}, "at least 16"),
-    ],
-)
-def test_what_cannot_be_used_is_answered_by_a_sentence(changes, clause):
-    with pytest.raises(CaseError, match=clause):
-        load(**changes).uncertainty()
+PUMP_KEYS = "".join(f"{key[9:]} = {value}\n" for key, value in PUMP.items() if key.startswith("upstream."))
+#: Sections, the names of inputs in front, and what is said of them.
+MALFORMED = [
+    ("inputs = 3", "inputs is given as 3"),
+    ("inputs.thickness = 3", "thickness is given as 3"),
+    ('inputs.thickness = ""', "must be a text that is not empty|no distribution"),
+    ('inputs.thickness = "wide"', "no distribution; it must be such as"),
+    ('inputs.thickness = "gamma(1, 2)"', "no distribution; it must be such as"),
+    ('inputs.thickness = "normal(1, 0.5)"', "0.029 lies where thickness cannot be"),
+    ('inputs.thickness = "normal(nan, 0.1)"', "not finite"),
+    ('inputs.thickness = "normal(1, inf)"', "not finite"),
+    ('inputs.thickness = "normal(1, -0.1)"', "deviation is not greater than 0"),
+    ('inputs.thickness = "normal(1 mm, 0.1 mm)"', "not a plain number"),
+    ('inputs.thickness = "normal(1, 0.1, 0.2)"', "3 arguments"),
+    ('inputs.thickness = "lognormal(0.8)"', "0.8 is not greater than 1"),
+    ('inputs.thickness = "uniform(1.2, 0.8)"', "bounds do not rise"),
+    ('inputs.thickness = "samples(missing.txt)"', "does not exist"),
+    ('inputs.thickness = "samples(1, -1)"', "0.5 lies where thickness cannot be"),
+    ('inputs.thicknes = "normal(5 %)"', "neither a parameter"),
+    ('inputs."materials.XR.stiffness_factor" = "normal(5 %)"', "neither a parameter"),
+    ('inputs.tail_length = "normal(5 %)"', "no tail_length to change"),
+    ('inputs."valve.wall" = "normal(5 %)"', "holds a number"),
+    ('inputs."materials.CR.loss_factor" = "uniform(0.1, 3)"', "cannot be"),
+    ('inputs.density = "normal(5 %)"\ninputs."fluid.density" = "normal(2 %)"', "density twice"),
+    ('inputs.pressure = "normal(5 %)"\nover = "pressure=0.1 m:1 m:3"', "uncertainty.over moves"),
+    ('inputs."fluid.density" = "normal(5 %)"\nover = "density=10:100:3"', "uncertainty.over moves"),
+    ('correlation = ["thickness", "angle", 0.5]', "correlation"),
+    ('correlation = [["thickness", "angle"]]', "correlation"),
+    ('correlation = [["thickness", "angle", 1.2]]', "between -1 and 1"),
+    ('correlation = [["thickness", "width", 0.5]]', "'width', which is no input"),
+    ('correlation = [["thickness", "thickness", 0.5]]', "'thickness' twice"),
+    ('correlation = [["thickness", "angle", 0.5], ["angle", "thickness", -0.5]]', "the pair angle and thickness twice"),
+    (
+        'inputs = {thickness = "normal(2 %)", angle = "normal(2 %)", density = "normal(2 %)"}\ncorrelation = '
+        '[["thickness", "angle", 0.9], ["angle", "density", 0.9], ["thickness", "density", -0.9]]',
+        "no numbers can be correlated so",
+    ),
+    ('over = "presure=0.1 m:1 m:3"', "pressure"),
+    ('over = "pressure=0.1 m:1 m:0"', "uncertainty.over"),
+    ('method = "rare"\nover = "pressure=0.1 m:1 m:3"', "one state"),
+    ('method = "best"', '"plain"'),
+    ("samples = 3", "at least 16"),
+    ("samples = 64.5", "uncertainty.samples"),
+    ("seed = -1", "uncertainty.seed"),
+    ("sample = 64", "samples"),
+    ('workers = "few"', "neither a number nor an address"),
+    ("workers = 0", "out of range"),
+    (f'inputs.pressure = "normal(5 %)"\n[upstream]\n{PUMP_KEYS}', "that at which both meet"),
+]
+
+
+@pytest.mark.parametrize(("section", "clause"), MALFORMED, ids=[f"{i}" for i in range(len(MALFORMED))])
+def test_what_cannot_be_used_is_answered_by_a_sentence(tmp_path, command_line, one_sentence, section, clause):
+    path, keys = tmp_path / "bad.toml", SMALL | {"materials.strain_level": "10 %"}
+    path.write_text(f"[uncertainty]\n{section}\n")
+    outcome = command_line("uncertainty", path, *(f"--set={key}={value}" for key, value in keys.items()))
+    assert outcome.status == 2 and not outcome.out
+    assert one_sentence(outcome.err), outcome.err
+    assert re.search(clause, outcome.err), outcome.err
 
 
 def test_a_dead_scheduler_is_said_before_anything_is_computed(monkeypatch):
