@@ -5,7 +5,9 @@ The margin at a head is the least damping ratio zeta of its modes as the smooth 
     -ln( sum_i exp(-rho zeta_i) ) / rho
 
 (Kreisselmeier and Steinhauser, IFAC Proc. 12(7), 1979, 113): all modes in reach count, so it stays smooth where they
-change places, and it is never above the least one, by at most ln(modes) / rho below it.
+change places, and it is never above the least one, by at most ln(modes) / rho below it. Where damping does not order
+the modes, as loss factors do not, those up to one frequency count in all designs, on every mesh: `modes.max_frequency`,
+or the end of the band of the first valve whose modes are asked.
 
 Where the case has uncertain inputs x with standard deviations s, 95 % of valves have at least the margin less
 
@@ -24,18 +26,20 @@ from functools import cached_property
 
 import numpy as np
 
-from eigen import leading_modes
+from eigen import Spectrum, leading_modes
 
 from ...case.parameters import DESIGN, PARAMETERS, Mu
 from ...case.statement import BEHIND, OF_THE_WALL, SEALS, Statement, parse_span, parse_statement
 from ...errors import CaseError, SolveError
 from ...model.closed import ClosedValve, close_valve
+from ...model.leading import BandOrigin
 from ...model.sizes import ValveSizes
 from ...observer import Observer
 from ..case import Case
 from ..inputs import Input, correlation_of, inputs_of
 from ..stability.derivatives import Neighbourhood
 from ..stability.place import design_value, key_of, redesigned, require_parameter
+from ..stability.verdict import oscillates
 from ..stability.walk import StabilityWalk, name_state_in_failures
 
 #: rho: four modes of equal damping take 0.14 % of critical off the margin.
@@ -132,12 +136,14 @@ def statements_of(case: Case) -> tuple[Statement, ...]:
 @dataclass(frozen=True)
 class AtHead:
     """Performance of a valve at a pressure: values by quantity, and their derivatives (n,) by the variables; how much
-    of the margin 5 % of valves with uncertain inputs lack.
+    of the margin 5 % of valves with uncertain inputs lack; the frequency, Hz, up to which modes count in it, where one
+    ends them.
     """
 
     values: dict[str, float]
     slopes: dict[str, np.ndarray]
     reserve: float = 0.0
+    band: float | None = None
 
 
 class DesignProblem:
@@ -157,6 +163,8 @@ class DesignProblem:
         self.case, self.variables = case, variables_of(case)
         self.known: dict[tuple, AtHead | str] = dict(known)
         self._keep = keep
+        bands = (found.band for found in self.known.values() if isinstance(found, AtHead))
+        self.band: float | None = next((band for band in bands if band), case.modes.max_frequency)
 
     def values_at(self, share: np.ndarray) -> tuple[float, ...]:
         """Values of the variables from their shares (n,) of the way between the bounds."""
@@ -180,6 +188,10 @@ class DesignProblem:
             if value != one.start:
                 case = redesigned(case, {one.name: value})
         return case
+
+    def walk(self, case: Case) -> StabilityWalk:
+        """Walk of a case whose modes are listed up to the frequency of the study, where there is one yet."""
+        return StabilityWalk(case.replace({"modes.max_frequency": self.band}) if self.band else case, Observer())
 
     def at(self, values: tuple[float, ...], pressure: float, margin: bool) -> AtHead:
         """Performance of the valve with these values at a pressure.
@@ -230,7 +242,7 @@ class DesignProblem:
     def _solved(self, values: tuple[float, ...], pressure: float, margin: bool) -> AtHead:
         if pressure < 0:
             return self._closed(values, -pressure)
-        walk = StabilityWalk(self.case_at(values), Observer())
+        walk = self.walk(self.case_at(values))
         place = Mu.of(walk.case).at(pressure=pressure)
         q, model = walk.equilibrium(place), walk.built(place).model  # from rest: it depends on no other state
         modes = self._modes(walk, place) if margin else ()
@@ -258,7 +270,8 @@ class DesignProblem:
         if margin and self.inputs:
             steps = [one.distribution.scale * of_margin(beside.slope(one.name)) for one in self.inputs]
             reserve = QUANTILE * float(np.linalg.norm(correlation_of(self.case, self.inputs).T @ steps))
-        return AtHead(found, {name: np.array(slope) for name, slope in slopes.items()}, reserve)
+        told = {name: np.array(slope) for name, slope in slopes.items()}
+        return AtHead(found, told, reserve, self.band if margin else None)
 
     @cached_property
     def inputs(self) -> list[Input]:
@@ -273,15 +286,37 @@ class DesignProblem:
         SolveError
             If a motion grows without oscillating.
         """
-        family = walk.family(place)
-        with name_state_in_failures(place.pressure):
-            found = leading_modes(family.at(place), walk.case.modes.count, replace(family.search(place), left=True))
+        search = walk.search(place)
+        if search.origin is not BandOrigin.NONE:
+            self.band = self.band or search.band
+        found = margin_spectrum(walk, place, left=True)
         growing = [value for value in found.eigenvalues if abs(value.imag) <= 1e-9 * abs(value) and value.real > 0]
         if growing:
             raise SolveError(f"The state at {place.pressure:.6g} Pa diverges, by {growing[0].real:.4g} 1/s.")
-        ratios = _ratios(found.eigenvalues)
+        ratios = found.damping_ratio
         near = ratios <= np.nanmin(ratios, initial=np.inf) + REACH
         return [found.mode(i) for i in np.flatnonzero(near & (ratios < 1.0))]
+
+
+def margin_spectrum(walk: StabilityWalk, place: Mu, left: bool = False) -> Spectrum:
+    """Leading modes, as many as it takes that those left out in the band have no weight in the margin.
+
+    Raises
+    ------
+    SolveError
+        If they were not found.
+    """
+    family, search, count = walk.family(place), walk.search(place), walk.case.modes.count
+    while True:
+        with name_state_in_failures(place.pressure):
+            found = leading_modes(family.at(place), count, replace(search.options, left=left))
+        if len(found) < count or np.isinf(search.band):
+            return found
+        # whatever is left out decays faster than the last one, and swings no faster than the band's end
+        last, ratios = found.growth_rate[-1], found.damping_ratio
+        if -last / np.hypot(last, 2 * np.pi * search.band) >= ratios.min() + REACH:
+            return found
+        count *= 2
 
 
 def _ratios(eigenvalues: np.ndarray) -> np.ndarray:
@@ -292,6 +327,12 @@ def _of_ratio(eigenvalues: np.ndarray, slopes: np.ndarray) -> np.ndarray:
     """Derivatives of damping ratios from those of eigenvalues."""
     rate, turn, size = eigenvalues.real, eigenvalues.imag, np.abs(eigenvalues)
     return -(turn**2 * slopes.real - rate * turn * slopes.imag) / size**3
+
+
+def least_ratio(spectrum: Spectrum) -> float:
+    """Least damping ratio of the modes that oscillate; NaN of none."""
+    ratios = spectrum.damping_ratio[oscillates(spectrum.eigenvalues)]
+    return float(ratios.min()) if len(ratios) else np.nan
 
 
 def _aggregate(eigenvalues: np.ndarray) -> tuple[float, np.ndarray]:

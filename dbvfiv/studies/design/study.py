@@ -16,7 +16,6 @@ from ...case.statement import QUANTITIES, Statement
 from ...case.write import case_toml
 from ...errors import CaseError, SolveError
 from ...model.closed import close_valve
-from ...observer import Observer
 from ...record.mesh import MeshData
 from ...record.record import GrowingRecord, Record
 from ...record.table import Column, TableSpec
@@ -25,10 +24,17 @@ from ..result import StudyResult
 from ..session import Session
 from ..stability.place import check_scan
 from ..stability.verdict import OUTCOMES, STABLE
-from ..stability.walk import StabilityWalk
 from ..study import Study
 from . import figures
-from .problem import AtHead, DesignProblem, Variable, statements_of, variables_of
+from .problem import (
+    AtHead,
+    DesignProblem,
+    Variable,
+    least_ratio,
+    margin_spectrum,
+    statements_of,
+    variables_of,
+)
 from .search import LOOK, Design, Search, best_of, starts_of
 
 DESIGNS, VERIFIED, _STATE, _DESIGN, _SHUT = "designs", "verified", "state", "design", "shut"
@@ -128,13 +134,15 @@ def _tell(tried: Design | str, record: GrowingRecord) -> None:
 
 
 def _known(record: GrowingRecord) -> dict[tuple, AtHead | str]:
-    """States of an interrupted attempt."""
+    """States of an interrupted attempt, but those of earlier versions, whose margins counted other modes."""
     found: dict[tuple, AtHead | str] = {}
     for note in record.notes(_STATE):
+        if "band" not in note:
+            continue
         key = tuple(note["values"]), note["pressure"], note["margin"]
         known = note["found"]
         slopes = {} if isinstance(known, str) else {name: np.array(slope) for name, slope in note["slopes"].items()}
-        found[key] = known if isinstance(known, str) else AtHead(known, slopes, note["reserve"])
+        found[key] = known if isinstance(known, str) else AtHead(known, slopes, note["reserve"], note["band"])
     return found
 
 
@@ -143,9 +151,9 @@ def _keep(record: GrowingRecord, key: tuple, found: AtHead | str) -> None:
     values, pressure, margin = key
     told = found if isinstance(found, str) else found.values
     slopes = {} if isinstance(found, str) else {name: list(map(float, s)) for name, s in found.slopes.items()}
-    reserve = 0.0 if isinstance(found, str) else found.reserve
+    reserve, band = (0.0, None) if isinstance(found, str) else (found.reserve, found.band)
     state = {"values": list(values), "pressure": pressure, "margin": margin, "found": told}
-    record.note(_STATE, **state, slopes=slopes, reserve=reserve)
+    record.note(_STATE, **state, slopes=slopes, reserve=reserve, band=band)
 
 
 def _write(case: Case, path: Path) -> None:
@@ -164,7 +172,7 @@ def _verify(problem: DesignProblem, case: Case, number: int, design: Design | No
     case = case if design is None else problem.case_at(design.values)
     finer, mesh = case.design.finer, case.mesh
     changes = {"mesh.around": round(finer * mesh.around), "mesh.along": round(finer * mesh.along)}
-    walk = StabilityWalk(case.replace(changes), Observer())
+    walk = problem.walk(case.replace(changes))
     for pressure in pressures:
         if pressure < 0:
             record.progress(f"back pressure of {-pressure:.6g} Pa on {finer:g} times the elements each way")
@@ -177,13 +185,19 @@ def _verify(problem: DesignProblem, case: Case, number: int, design: Design | No
         record.progress(f"verdict at {pressure:.6g} Pa on {finer:g} times the elements each way")
         place = Mu.of(case).at(pressure=pressure)
         try:
-            state, verdict = walk.state(place), walk.verdict(place)
+            state = walk.state(place)
+            spectrum = margin_spectrum(walk, place)
+            verdict = walk.verdict(place, spectrum)
         except SolveError as error:
             record.fail(f"Design {number + 1} could not be verified: {error}" if number >= 0 else str(error))
             continue
         loss = state.hydraulics.loss_coefficient if state.hydraulics else np.nan
         row = {"design": number, "pressure": pressure, "outcome": OUTCOMES.index(verdict.outcome)}
-        row |= {"margin": verdict.damping_ratio, "flow": state.volume_flow, "opening": state.outlet_area}
+        row |= {
+            "margin": least_ratio(spectrum) if verdict.holds else np.nan,
+            "flow": state.volume_flow,
+            "opening": state.outlet_area,
+        }
         record.append(VERIFIED, row | {"loss_coefficient": loss})
         sought = None if design is None else problem.opening(design.values, pressure)
         if sought is not None and abs(state.outlet_area / sought - 1) > APART:
@@ -232,6 +246,12 @@ class DesignResult(StudyResult):
         between in each span.
         """
         return sorted({p for one in self.statements for p in one.between(LOOK)})
+
+    @property
+    def band(self) -> float | None:
+        """Frequency, Hz, up to which modes count in margins; None where damping orders them."""
+        bands = (note.get("band") for note in self.record.notes(_STATE))
+        return next((band for band in bands if band), self.case.modes.max_frequency)
 
     @property
     def found(self) -> list[dict[str, Any]]:
@@ -313,6 +333,7 @@ class DesignResult(StudyResult):
             "constraints": [one.text for one in constraints],
             "designs": [told(number, design) for number, design in best.items()],
             "starts": [{k: v for k, v in note.items() if k != "what"} for note in self.found],
+            "band": self.band,
             "case": {name: column.tolist() for name, column in started.items() if name not in ("design", "outcome")}
             | {"outcome": [OUTCOMES[i] for i in started["outcome"]]},
             "states": len(self.record.notes(_STATE)),
@@ -323,6 +344,8 @@ class DesignResult(StudyResult):
         lines = [f"Aim: {aim.text}; {'; '.join(one.text for one in constraints) or 'no constraints'}."]
         if self.case.uncertainty.inputs:
             lines.append("Margins are those that 95 % of valves with the inputs of [uncertainty] have, to first order.")
+        if self.band:
+            lines.append(f"Modes up to {self.band:.4g} Hz count in margins; modes.max_frequency chooses another end.")
         for number, design in self.best.items():
             lines.append(f"Design {number + 1}{_for(self.bounds[number], self.bounds)}:")
             for one, value in zip(self.variables, design.values):

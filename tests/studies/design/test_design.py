@@ -65,6 +65,20 @@ def test_gradients_at_random_designs(number):
     check_gradients(lossy | {"fluid.continuity": ("quasi-steady", "storage")[number // 2 % 2]}, share, 2 * way - 1)
 
 
+def test_margins_count_all_modes_up_to_one_frequency():
+    """Where loss factors damp all frequencies alike, of every design, beyond the leading one that is listed."""
+    problem = DesignProblem(load_small(KEYS, ASKED, LOSSY, {"modes.count": 1}).case)
+    thin, thick = (problem.values_at(np.array([share, 0.5, 0.5])) for share in (0.0, 1.0))
+    band, leads = problem.at(thin, 200.0, True).band, []
+    for values in (thin, thick):
+        case = problem.case_at(values).replace({"modes.max_frequency": band, "modes.count": 60})
+        ratios = np.array([mode.damping_ratio for mode in dbvfiv.load(case).modes("200 Pa").modes])
+        aggregate = ratios.min() - np.log(np.exp(-1000 * (ratios - ratios.min())).sum()) / 1000
+        assert problem.at(values, 200.0, True).values["margin"] == pytest.approx(aggregate, rel=1e-6)
+        leads.append(ratios.argmin() == 0)
+    assert leads == [False, True]
+
+
 def test_the_design_is_better_and_holds(valve, found):
     design = found.best[0]
     start = DesignProblem(found.case).at(tuple(one.start for one in found.variables), 6e3, True)
