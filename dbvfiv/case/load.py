@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from pydantic import ValidationError
+from pydantic.fields import FieldInfo
 
 from ..errors import CaseError
 from .describe import allowed_words, element_model, quantity_of, synonym
@@ -149,8 +150,8 @@ def _resolve(loc: tuple[Any, ...], case: type[Section]) -> tuple[KeyPath, type[S
             model, in_named, field = None, True, None
             continue
         path += (str(part),)
-        if isinstance(part, int):  # an element of a list: keep the list's own field
-            continue
+        if isinstance(part, int) or (model is None and isinstance(field, FieldInfo)):
+            continue  # an element of a list, or an entry of a mapping of the user's own names: keep its own field
         owner, field = model, None
         if model is not None:
             field = model.model_fields.get(part)

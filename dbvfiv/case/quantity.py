@@ -41,6 +41,7 @@ DIMENSION = {
     "m/s": "velocity",
     "m^2": "area",
     "m^3/s": "volume flow",
+    "kg": "mass",
     "kg/s": "mass flow",
     "deg": "angle",
     "Pa s": "viscosity",

@@ -27,10 +27,9 @@ OF_THE_WALL = ("mass",)
 BEHIND, SEALS = ("gap left",), "seals"
 #: Heads that stand for a span until the least favourable ones are known.
 SPAN = 6
-FORM = (
-    f"it must be such as 'loss coefficient at 2 m down' or 'margin from 0.1 m to 5 m at least 5 %', of "
-    f"{', '.join(QUANTITIES)}; or 'seals at 5 m'"
-)
+#: What aims and constraints look like.
+AIM = f"such as 'loss coefficient at 2 m down', of {', '.join(QUANTITIES)}"
+CONSTRAINT = "such as 'margin from 0.1 m to 5 m at least 5 %', 'seals at 5 m' or 'mass at most 12 kg'"
 _FORM = re.compile(
     rf"\s*(?P<what>{'|'.join(QUANTITIES)})"
     r"(?:\s+at\s+(?P<at>.+?)|\s+from\s+(?P<low>.+?)\s+to\s+(?P<high>.+?))?"
@@ -91,7 +90,7 @@ def parse_statement(text: str, aim: bool, density: float | None = None) -> State
     """
     match = _FORM.fullmatch(re.sub(rf"^\s*{SEALS}\s(.*)", rf"{BEHIND[0]} \1 at most 0", text))
     if match is None or (match["sense"] in ("up", "down")) != (match["bound"] is None):
-        raise ValueError(f"which cannot be read; {FORM}")
+        raise ValueError("which cannot be read")
     if aim and match["bound"] is not None:
         raise ValueError("which is a constraint; an aim ends with 'up' or 'down'")
     if not aim and match["bound"] is None:
@@ -101,7 +100,7 @@ def parse_statement(text: str, aim: bool, density: float | None = None) -> State
     given = [match["low"], match["high"]] if span else re.split(r"\s*,\s*|\s+and\s+", match["at"] or "")
     pressures = sorted(pressure.parse(part, density) for part in given if part)
     if (what in OF_THE_WALL) == bool(pressures):
-        raise ValueError(f"which {'has no head: it is that of the wall' if pressures else 'names no head'}; {FORM}")
+        raise ValueError(f"which {'has a head, but is that of the wall' if pressures else 'names no head'}")
     if pressures and (pressures[0] <= 0 or (span and pressures[0] == pressures[-1])):
         raise ValueError("whose heads must be greater than 0, and rise")
     if what in BEHIND:
@@ -120,6 +119,8 @@ def _bounds(text: str | None, what: str) -> tuple[float, ...]:
     if len(parts) != 3 or not re.fullmatch("[0-9]{1,3}", parts[2]) or int(parts[2]) < 2:
         raise ValueError("whose bounds are not FIRST:LAST:COUNT")
     first, last = (QUANTITIES[what].parse(part) for part in parts[:2])
+    if first == last:
+        raise ValueError("whose first bound is the last")
     return tuple(first + (last - first) * i / (int(parts[2]) - 1) for i in range(int(parts[2])))
 
 

@@ -6,11 +6,11 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
-from pydantic import BeforeValidator, StrictInt, StrictStr, field_validator
+from pydantic import AfterValidator, BeforeValidator, StrictInt, StrictStr, field_validator
 
 from ...case.quantity import Number, number_or_text
-from ...case.section import Section, flattened, key
-from ...case.statement import QUANTITIES, parse_statement
+from ...case.section import Described, Section, flattened, key
+from ...case.statement import AIM, CONSTRAINT, parse_statement
 from ..request import DensityOption, Request
 
 ORDER = 32
@@ -18,41 +18,44 @@ ORDER = 32
 _ANY = 1000.0
 
 
+def _readable(aim: bool) -> AfterValidator:
+    def read(text: str) -> str:
+        if text or not aim:
+            parse_statement(text, aim, _ANY)
+        return text
+
+    return AfterValidator(read)
+
+
 class Keys(Section):
     """A better valve within bounds."""
 
-    variables: Annotated[dict[StrictStr, StrictStr], BeforeValidator(flattened)] = key(
+    variables: Annotated[
+        dict[StrictStr, StrictStr],
+        BeforeValidator(flattened),
+        Described("tables", 'names and bounds, such as { thickness = "0.7:1.4" }'),
+    ] = key(
         {},
         "Bounds of each number that may change: a parameter (thickness, angle, ...) or a key of the case "
         '("valve.saddle_length", "layers.2.angle", "materials.SBR.stiffness_factor"), as LOW:HIGH.',
     )
-    aim: StrictStr = key(
+    aim: Annotated[StrictStr, _readable(aim=True), Described("text", AIM)] = key(
         "",
-        f"What is made better: {', '.join(QUANTITIES)} at heads, 'up' or 'down', such as 'loss coefficient at 2 m "
-        "down'. The margin is the least damping ratio, that of 95 % of valves with uncertainty.inputs; the gap left is "
-        "the narrowest section under a back pressure over that of the lips at rest.",
+        "What is made better, 'up' or 'down', at heads but for the mass. The margin is the least damping ratio, that "
+        "of 95 % of valves with uncertainty.inputs; the gap left is the narrowest section under a back pressure over "
+        "that of the lips at rest.",
     )
-    constraints: tuple[StrictStr, ...] = key(
-        (),
-        "What must hold, such as 'margin from 0.1 m to 5 m at least 5 %', 'seals at 5 m' or 'mass at most 12 kg'; one "
-        "may have bounds FIRST:LAST:COUNT, for a front of designs.",
+    constraints: tuple[Annotated[StrictStr, _readable(aim=False), Described("list", CONSTRAINT)], ...] = key(
+        (), "What must hold; one may have bounds FIRST:LAST:COUNT, for a front of designs."
     )
     starts: StrictInt = key(1, "Designs to start from: the case itself, then others between the bounds.", ge=1, le=100)
     evaluations: StrictInt = key(40, "Valves that a start may try.", ge=2, le=10_000)
     finer: Number = key(1.5, "Elements each way, over those of the case, on which a design is verified.", ge=1, le=4)
 
-    @field_validator("aim")
-    @classmethod
-    def _readable_aim(cls, text: str) -> str:
-        if text:
-            parse_statement(text, True, _ANY)
-        return text
-
     @field_validator("constraints")
     @classmethod
-    def _readable_constraints(cls, texts: tuple[str, ...]) -> tuple[str, ...]:
-        found = [parse_statement(text, False, _ANY) for text in texts]
-        if sum(len(statement.bounds) > 1 for statement in found) > 1:
+    def _one_front(cls, texts: tuple[str, ...]) -> tuple[str, ...]:
+        if sum(len(parse_statement(text, False, _ANY).bounds) > 1 for text in texts) > 1:
             raise ValueError("in which more than one constraint has several bounds")
         return texts
 

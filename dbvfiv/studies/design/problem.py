@@ -22,13 +22,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
 
 import numpy as np
 
 from eigen import Spectrum, leading_modes
 
 from ...case.parameters import DESIGN, PARAMETERS, Mu
+from ...case.quantity import Quantity
 from ...case.statement import BEHIND, OF_THE_WALL, SEALS, Statement, parse_span, parse_statement
 from ...errors import CaseError, SolveError
 from ...model.closed import ClosedValve, close_valve
@@ -85,16 +85,9 @@ def variables_of(case: Case) -> tuple[Variable, ...]:
     found = []
     for name, text in case.design.variables.items():
         key = f"design.variables.{name}"
-        if name in ("pressure", "storage", "strain"):
+        if name in ("pressure", "drive.pressure", "storage", "strain"):
             raise CaseError(f"{key} is given, and {name} is no number that a designer chooses.", key=key)
-        if name in PARAMETERS:
-            require_parameter(case, name)
-            own = design_value(case, name) if name in DESIGN else Mu.of(case)[name]
-            quantity = PARAMETERS[name].quantity
-            if own is None:
-                raise CaseError(f"{key} is given, and the valve has no one value of {name}; name keys of layers.", key)
-        else:
-            quantity, own = key_of(case, name, key)
+        quantity, own = _value(case, name, key)
         try:
             low, high = parse_span(text, quantity)
         except ValueError as error:
@@ -106,7 +99,32 @@ def variables_of(case: Case) -> tuple[Variable, ...]:
                 key=key,
             )
         found.append(Variable(name, low, high, own, quantity.si))
+    for one in found:
+        for other in found:
+            if other is not one and _changes_with(case, other, one):
+                key = f"design.variables.{other.name}"
+                raise CaseError(f"{key} is given beside {one.name}, with which it changes; name one of them.", key=key)
     return tuple(found)
+
+
+def _value(case: Case, name: str, key: str) -> tuple[Quantity, float]:
+    if name not in PARAMETERS:
+        return key_of(case, name, key)
+    require_parameter(case, name)
+    own = design_value(case, name) if name in DESIGN else Mu.of(case)[name]
+    if own is None:
+        raise CaseError(f"{key} is given, and the valve has no one value of {name}; name keys of layers.", key)
+    return PARAMETERS[name].quantity, own
+
+
+def _changes_with(case: Case, one: Variable, other: Variable) -> bool:
+    """True where a number is not the same once another one changes."""
+    end = other.high if other.high > other.start else other.low
+    try:
+        changed = redesigned(case, {other.name: 0.5 * (other.start + end)})
+    except CaseError:
+        return False
+    return _value(changed, one.name, one.name)[1] != one.start
 
 
 def statements_of(case: Case) -> tuple[Statement, ...]:
@@ -162,6 +180,7 @@ class DesignProblem:
     def __init__(self, case: Case, known: Mapping[tuple, AtHead | str] = {}, keep: Callable = lambda key, found: None):
         self.case, self.variables = case, variables_of(case)
         self.known: dict[tuple, AtHead | str] = dict(known)
+        self.inputs: list[Input] = inputs_of(case) if case.uncertainty.inputs else []
         self._keep = keep
         bands = (found.band for found in self.known.values() if isinstance(found, AtHead))
         self.band: float | None = next((band for band in bands if band), case.modes.max_frequency)
@@ -272,11 +291,6 @@ class DesignProblem:
             reserve = QUANTILE * float(np.linalg.norm(correlation_of(self.case, self.inputs).T @ steps))
         told = {name: np.array(slope) for name, slope in slopes.items()}
         return AtHead(found, told, reserve, self.band if margin else None)
-
-    @cached_property
-    def inputs(self) -> list[Input]:
-        """Uncertain inputs that the case names."""
-        return inputs_of(self.case) if self.case.uncertainty.inputs else []
 
     def _modes(self, walk: StabilityWalk, place: Mu):
         """Modes that the margin depends on, with left vectors.

@@ -255,9 +255,9 @@ class Search:
 
 def starts_of(problem: DesignProblem, count: int) -> list[np.ndarray]:
     """Shares (n,) of designs to start from: the case itself, then a scrambled Sobol sequence between the bounds."""
-    from scipy.stats import qmc
-
     found = [problem.start]
     if count > 1:
+        from scipy.stats import qmc
+
         found += list(qmc.Sobol(len(problem.start), seed=1).random_base2((count - 1).bit_length())[: count - 1])
     return found

@@ -97,12 +97,13 @@ def run(session: Session, record: GrowingRecord, cases: Path | None = None) -> N
         asked = [replace(one, bounds=(bound,)) if len(one.bounds) > 1 else one for one in constraints]
         found: list[Design] = []
         for i, share in enumerate(starts):
-            search = Search(problem, aim, asked, lambda one: _tell(one, record))
+            tried: list[Design | str] = []
+            search = Search(problem, aim, asked, partial(_tell, record, tried))
             if i == 0 and best is not None:
                 share = search.share(best)
             design = search.from_start(share, case.design.evaluations)
             if design is None:
-                record.fail(f"From start {i + 1} no valve could be computed.")
+                record.fail(f"From start {i + 1} no valve could be computed. {tried[-1]}")
                 continue
             found.append(design)
             record.note(_DESIGN, design=number, start=i, **asdict(design))
@@ -125,12 +126,13 @@ def _for(bound: float, bounds) -> str:
     return f" with the bound {bound:g}" if len(bounds) > 1 else ""
 
 
-def _tell(tried: Design | str, record: GrowingRecord) -> None:
-    if isinstance(tried, str):
-        record.progress(f"a step back: {tried}")
+def _tell(record: GrowingRecord, tried: list[Design | str], one: Design | str) -> None:
+    tried.append(one)
+    if isinstance(one, str):
+        record.progress(f"a step back: {one}")
     else:
-        record.progress(f"aim {tried.aim:.4g}, constraints missed by {tried.violation:.2%}")
-        record.item(tried)
+        record.progress(f"aim {one.aim:.4g}, constraints missed by {one.violation:.2%}")
+        record.item(one)
 
 
 def _known(record: GrowingRecord) -> dict[tuple, AtHead | str]:

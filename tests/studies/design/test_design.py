@@ -198,6 +198,13 @@ def test_several_heads_of_an_aim_count_together(valve):
         ({"design.variables": {"pressure": "1 kPa:2 kPa"}}, "no number that a designer chooses"),
         ({"design.aim": "mass down", "design.constraints": ["mass at most 3 kg"]}, "name no head"),
         ({"design.aim": "drag at 2 m down"}, "cannot be read"),
+        ({"design.variables": {"drive.pressure": "1 kPa:20 kPa"}}, "no number that a designer chooses"),
+        ({"design.variables": {"thickness": 0.9}}, "must be names and bounds, such as"),
+        ({"design.variables": {"thickness": "0.7:1.4", "valve.thickness_factor": "0.7:1.4"}}, "with which it changes"),
+        ({"design.variables": {"angle": "30 deg:70 deg", "layers.2.angle": "30 deg:70 deg"}}, "with which it changes"),
+        ({"design.constraints": ["mass at most 8 kg", "mass at most 8 m"]}, "constraints.1 .* is not a mass"),
+        ({"design.constraints": ["mass at most 7 kg:7 kg:3"]}, "first bound is the last"),
+        ({"uncertainty.inputs": {"thicknes": "normal(1, 0.03)"}}, "neither a parameter"),
         ({"design.constraints": ["mass at most 3 kg:4 kg:2", "margin at 1 m at least 1 %:2 %:2"]}, "more than one"),
     ],
 )
