@@ -99,7 +99,7 @@ class Workers:
 
     def __init__(self, count: int | str, start: Callable[..., Any], data: tuple, warn: Callable[[str], None]):
         self.count, self.warn = count, warn
-        self._context = pickle.dumps((start, data))
+        self.give(start, *data)
         self._pool: Executor | None = None
         self._cluster: Any = None
 
@@ -110,6 +110,10 @@ class Workers:
         self._close()
         if self._cluster is not None:
             self._cluster.close()
+
+    def give(self, start: Callable[..., Any], *data: Any) -> None:
+        """Context of the tasks that are shared from now on."""
+        self._context = pickle.dumps((start, data))
 
     @property
     def is_here(self) -> bool:

@@ -12,6 +12,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -29,9 +30,13 @@ from .walk import StabilityWalk, ValveFamily
 
 #: From numbers (d,) to the walk and the parameter point of their valve.
 At = Callable[[np.ndarray], tuple[StabilityWalk, Mu]]
+#: From a function of an `At` and of further arguments, and rows of these, to its values in the order of the rows.
+Share = Callable[[Callable[..., Any], Sequence[tuple]], Sequence[Any]]
 #: Valves that a space is made of, and that its error is measured on, with the seed of their inputs, which no samples
 #: have.
 TAKEN, CHECKS, NEAR_SEED = 6, 4, 2**31 + 1
+#: Parts at most in which the numbers of a valve, and the valves that an error is measured on, are shared.
+PARTS = 4
 #: Step of differences over the scale of a number.
 STEP = 0.01
 #: Leading modes of each valve whose vectors the space has.
@@ -99,7 +104,13 @@ class Neighbours:
 
 
 def find_neighbours(
-    at: At, origin: np.ndarray, scales: np.ndarray, start: np.ndarray, taken: np.ndarray, checks: np.ndarray
+    at: At,
+    origin: np.ndarray,
+    scales: np.ndarray,
+    start: np.ndarray,
+    taken: np.ndarray,
+    checks: np.ndarray,
+    share: Share | None = None,
 ) -> Neighbours:
     """Find the neighbours of a valve: their first-order states and added mass, and the space that they share.
 
@@ -112,43 +123,61 @@ def find_neighbours(
         Displacements next to those of the first valve.
     taken, checks : (s, d), (c, d) arrays
         Numbers of the valves whose leading motions the space has, and of those that the error is measured on.
+    share : callable, optional
+        Where several workers find them.
 
     Raises
     ------
     SolveError, CaseError
         If one of them has no steady state or no modes, or cannot be made.
     """
-    near, first = _tangents(at, origin, scales, start)
-    vectors = [first.leading_vectors(at(origin)[1], MODES)]
-    beside = Beside(at, near)
-    for row in taken:
-        walk, place = at(row)
-        walk.settle(place, near.state(row))
-        vectors.append(FamilyReduction(beside.family(walk, place, row)).leading_vectors(place, MODES))
-    near = replace(near, space=_joint_space(first, vectors))
-    return replace(near, error=max(_errors(at, near, checks)))
-
-
-def _tangents(at: At, origin: np.ndarray, scales: np.ndarray, start: np.ndarray) -> tuple[Neighbours, FamilyReduction]:
-    """States and added mass to first order, without a space, and the reduced models of the first valve."""
+    share = share or (lambda function, rows: [function(at, *row) for row in rows])
     walk, place = at(origin)
     walk.settle(place, start)
-    q, built, added = walk.equilibrium(place), walk.built(place), walk.family(place).linear.added
-    hood = Neighbourhood(built.model, q, place.pressure, place)
-    slopes = np.zeros((len(origin), len(q)))
-    images = np.zeros((len(origin), *(() if added is None else added.motions.shape)))
-    for i, axis in enumerate(np.diag(STEP * scales)):
-        other, beside = at(origin + axis)
+    q, first = walk.equilibrium(place), FamilyReduction(walk.family(place))
+    added, d = walk.family(place).linear.added, len(origin)
+    images = np.zeros((d, *(() if added is None else added.motions.shape)))
+    near = Neighbours(origin, scales, q, np.zeros((d, len(q))), added, images, np.zeros((len(q), 0)))
+    tangents = share(_tangents, [(near, axes) for axes in np.array_split(np.arange(d), min(d, PARTS))])
+    slopes, images = (np.concatenate(parts) for parts in zip(*tangents))
+    near = replace(near, slopes=slopes, images=images)
+    others = share(_leading_vectors, [(near, row) for row in taken])
+    near = replace(near, space=_joint_space(first, [first.leading_vectors(place, MODES), *others]))
+    errors = share(_error, [(near, rows) for rows in np.array_split(checks, min(len(checks), PARTS))])
+    return replace(near, error=max(errors))
+
+
+def _tangents(at: At, near: Neighbours, axes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Changes of state (m, n) and of the forces of added mass (m, n, r) for a step of one scale in some numbers."""
+    walk, place = at(near.origin)
+    model, added = walk.built(place).model, near.added
+    hood = Neighbourhood(model, near.q, place.pressure, place)
+    slopes, images = np.zeros_like(near.slopes[axes]), np.zeros_like(near.images[axes])
+    for slope, image, axis in zip(slopes, images, axes):
+        other, beside = at(near.origin + STEP * near.scales * (np.arange(len(near.origin)) == axis))
         end = other.built(beside).model, beside.pressure
-        slope = hood.tangent([(built.model, place.pressure), end], STEP)
-        if slope is None:
+        tangent = hood.tangent([(model, place.pressure), end], STEP)
+        if tangent is None:
             continue
-        slopes[i] = slope
+        slope[:] = tangent
         if added is not None:
-            ahead = hood.resisting(end[0], q + STEP * slope, added.motions)
-            images[i] = (ahead - hood.resisting(built.model, q, added.motions)) / STEP
-    near = Neighbours(origin, scales, q, slopes, added, images, np.zeros((len(q), 0)))
-    return near, FamilyReduction(walk.family(place))
+            ahead = hood.resisting(end[0], near.q + STEP * tangent, added.motions)
+            image[:] = (ahead - hood.resisting(model, near.q, added.motions)) / STEP
+    return slopes, images
+
+
+def _family(near: Neighbours, walk: StabilityWalk, place: Mu, row: np.ndarray) -> ValveFamily:
+    """Linearised equations of a neighbour whose state its walk has."""
+    built, modes = walk.built(place), walk.case.modes
+    linear = linearise(built.model, walk.equilibrium(place), place.pressure, added=near.added_mass(row))
+    return ValveFamily(linear, modes.max_frequency, modes.count)
+
+
+def _leading_vectors(at: At, near: Neighbours, row: np.ndarray) -> np.ndarray:
+    """Leading vectors of one neighbour."""
+    walk, place = at(row)
+    walk.settle(place, near.state(row))
+    return FamilyReduction(_family(near, walk, place, row)).leading_vectors(place, MODES)
 
 
 def _joint_space(first: FamilyReduction, vectors: list[np.ndarray]) -> np.ndarray:
@@ -158,19 +187,19 @@ def _joint_space(first: FamilyReduction, vectors: list[np.ndarray]) -> np.ndarra
     return np.hstack([leading, outside(leading, mass, first.coarse.V, STATIC)])
 
 
-def _errors(at: At, near: Neighbours, checks: np.ndarray) -> Iterator[float]:
-    """Relative errors of leading oscillating eigenvalues on some valves, for a distance of one scale."""
-    beside = Beside(at, near)
+def _error(at: At, near: Neighbours, checks: np.ndarray) -> float:
+    """Largest relative error of leading oscillating eigenvalues on some valves, for a distance of one scale."""
+    beside, worst = Beside(at, near), 0.0
     for row in checks:
         walk, place = at(row)
         walk.settle(place, near.state(row))
         if walk.refusal(place):
-            yield 0.0
             continue
         exact, found = walk.cell(place).leading, next(beside.cells(walk, [place], row)[1]).leading
         exact = exact[exact.imag > 0][:WATCHED]
         apart = np.abs(exact[:, None] - found).min(axis=1) / np.abs(exact)
-        yield float(apart.max(initial=0.0)) / near.square(row)
+        worst = max(worst, float(apart.max(initial=0.0)) / near.square(row))
+    return worst
 
 
 class Beside:
@@ -188,15 +217,10 @@ class Beside:
         walk.settle(self._place, near.q)
         self._first = FamilyReduction(walk.family(self._place))
 
-    def family(self, walk: StabilityWalk, place: Mu, row: np.ndarray) -> ValveFamily:
-        """Linearised equations of a neighbour whose state its walk has."""
-        built, modes = walk.built(place), walk.case.modes
-        linear = linearise(built.model, walk.equilibrium(place), place.pressure, added=self.near.added_mass(row))
-        return ValveFamily(linear, modes.max_frequency, modes.count)
-
     def cells(self, walk: StabilityWalk, places: Sequence[Mu], row: np.ndarray) -> tuple[ValveFamily, Iterator[Cell]]:
         """Family of a neighbour whose state its walk has, and its cells at places that share the state."""
-        family, near = self.family(walk, places[0], row), self.near
+        near = self.near
+        family = _family(near, walk, places[0], row)
         reduction, error = self._first.beside(family, near.space, self._place), near.error * near.square(row)
         return family, (cell_beside(reduction, place, error, SAFETY) for place in places)
 

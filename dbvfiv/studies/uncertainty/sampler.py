@@ -72,18 +72,6 @@ class Start(NamedTuple):
     lift: float
 
 
-def walks_at(plan: Plan, value: float, start: Start, solver: ColumnSolver) -> At:
-    """Function from values of the inputs to the walk of a sample and its parameter point at a value of the range, where
-    the case has a steady state.
-    """
-
-    def at(row: np.ndarray) -> tuple[StabilityWalk, Mu]:
-        walk = plan.walk(row, solver)
-        return walk, walk.meet_pump(plan.place(walk.case, row, value), start.lift, start.q)
-
-    return at
-
-
 class Sampler:
     """Steady states of the case, and verdicts on samples that start from them.
 
@@ -151,10 +139,19 @@ class Sampler:
                 verdict = Verdict.undecided(str(error))
             yield Found.of(sample, value, verdict, state, apart)
 
-    def _walks(self, i: int) -> At:
-        return walks_at(self.plan, self.plan.values[i], self.states[i], ColumnSolver())
+    def walks(self, i: int) -> At:
+        """Function from values of the inputs to the walk of a sample and its parameter point at a value of the range,
+        where the case has a steady state.
+        """
+        plan, start, solver = self.plan, self.states[i], ColumnSolver()
+
+        def at(row: np.ndarray) -> tuple[StabilityWalk, Mu]:
+            walk = plan.walk(row, solver)
+            return walk, walk.meet_pump(plan.place(walk.case, row, plan.values[i]), start.lift, start.q)
+
+        return at
 
     def _beside(self, i: int) -> Beside:
         if i not in self._found:
-            self._found[i] = Beside(self._walks(i), self._neighbours[i])
+            self._found[i] = Beside(self.walks(i), self._neighbours[i])
         return self._found[i]

@@ -3,15 +3,12 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import suppress
-from functools import cached_property
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
-
-from eigen import ColumnSolver
 
 from ...case.parameters import PARAMETERS, Mu
 from ...errors import CaseError, SolveError
@@ -30,7 +27,7 @@ from ..stability.walk import StabilityWalk
 from ..study import Study
 from ..workers import Lost, Work, Workers, require_answer
 from . import figures
-from .sampler import Found, Sampler, Start, walks_at
+from .sampler import Found, Sampler, Start
 from .sampling import Shifted, approach, shares, subset, weighted
 
 SAMPLES, NUMBERS = "samples", "numbers"
@@ -131,8 +128,10 @@ def _under(case: Case, law: str) -> Case:
 def _sample(plan: Plan, walk: StabilityWalk, record: GrowingRecord, count: int | str) -> None:
     """Samples of a plan under the flow model of its case; `walk` is of that."""
     case, states = plan.case, _states_of_case(plan, walk, record)
-    neighbours = _neighbours(plan, states, record)
-    with Workers(count, _start, (case.to_dict(), states, neighbours), record.warn) as team:
+    with Workers(count, _start, (case.to_dict(), states), record.warn) as team:
+        neighbours = _neighbours(plan, states, record, team)
+        if neighbours:
+            team.give(_start, case.to_dict(), states, neighbours)
         sampling = _Sampling(plan, record, team, Sampler(plan, states, neighbours, walk))
         if case.uncertainty.method == "rare":
             sampling.rare()
@@ -161,27 +160,43 @@ def _states_of_case(plan: Plan, walk: StabilityWalk, record: GrowingRecord) -> l
     return states
 
 
-def _neighbours(plan: Plan, states: list[Start | None], record: GrowingRecord) -> dict[int, Neighbours]:
+def _neighbours(plan: Plan, states: list[Start | None], record: GrowingRecord, team: Workers) -> dict[int, Neighbours]:
     """Neighbours of the case at each value, whose space samples share, where that pays and can be had."""
     found: dict[int, Neighbours] = {}
     if plan.is_surrounding or plan.case.uncertainty.samples < PAYS:
         return found
     row, d = PARAMETERS[plan.parameter], len(plan.inputs)
     origin, ahead = plan.numbers(np.zeros((1, d)))[0], np.array([one.distribution.scale for one in plan.inputs])
-    near = plan.numbers(quasi_random(TAKEN + CHECKS, d, NEAR_SEED))
+    near, sampler = plan.numbers(quasi_random(TAKEN + CHECKS, d, NEAR_SEED)), Sampler(plan, states)
+
+    def shared(i: int, function: Callable[..., Any], rows: Sequence[tuple]) -> list:
+        if team.is_here:
+            return [_beside(sampler, i, function, row) for row in rows]
+        found = dict(team.share(range(len(rows)), lambda k: Work(_beside, (i, function, rows[k]))))
+        if any(value is Lost for value in found.values()):
+            raise SolveError(Lost.sentence)
+        return [found[k] for k in range(len(rows))]
+
     for i, (value, state) in enumerate(zip(plan.values, states)):
         if state is None:
             continue
         where = f"{value / row.scale:.4g} {row.shown_unit}".rstrip()
         record.progress(f"space that samples share at {where}, of {1 + len(near)} valves")
-        with suppress(SolveError, CaseError, ArithmeticError, ValueError):  # each sample is then found by itself
-            at = walks_at(plan, value, state, ColumnSolver())
-            found[i] = find_neighbours(at, origin, ahead, state.q, near[:TAKEN], near[TAKEN:])
+        try:
+            valves = origin, ahead, state.q, near[:TAKEN], near[TAKEN:]
+            found[i] = find_neighbours(sampler.walks(i), *valves, partial(shared, i))
             record.note(_SPACE, law=plan.law, value=value, error=found[i].error)
+        except (SolveError, CaseError, ArithmeticError, ValueError) as error:
+            record.progress(f"each sample is found by itself at {where}: {error}")
     return found
 
 
-def _start(case: dict, states: list[Start | None], neighbours: dict[int, Neighbours]) -> Sampler:
+def _beside(sampler: Sampler, i: int, function: Callable[..., Any], row: tuple) -> Any:
+    """A function of the valves at a value of the range, and of more."""
+    return function(sampler.walks(i), *row)
+
+
+def _start(case: dict, states: list[Start | None], neighbours: Mapping[int, Neighbours] = {}) -> Sampler:
     return Sampler(Plan(Case.from_dict(case)), states, neighbours)
 
 
