@@ -58,7 +58,7 @@ def test_cells_have_the_cycles_of_branches(found):
 @pytest.mark.slow
 @pytest.mark.parametrize(
     "law, pressure, density",
-    [("quasi-steady", "5.5 kPa:6 kPa:2", "200:250:6"), ("storage", "6 kPa:6.5 kPa:2", "15:26:6")],
+    [("quasi-steady", "5.5 kPa:6 kPa:2", "200:250:11"), ("storage", "6 kPa:6.5 kPa:2", "15:26:11")],
 )
 def test_amplitudes_of_the_reduced_manifold(law, pressure, density):
     """Within 2 % of the cycles up to half the amplitude at which lips touch, and closer than the residual."""
@@ -72,7 +72,7 @@ def test_amplitudes_of_the_reduced_manifold(law, pressure, density):
     error = np.abs(found["amplitude"] / cycle["amplitude"] - 1)
     rest = near.cycle_grid("least")[0] + found["amplitude"]  # about the displacement at rest
     half = reduced & (found["amplitude"] <= 0.5 * rest)
-    assert half.sum() >= 4
+    assert half.sum() >= 8
     assert (error[half] <= 0.02).all() and (error[reduced] <= found["residual"][reduced] + 1e-3).all()
     assert np.allclose(found["frequency"][half], cycle["frequency"][half], rtol=1e-3)
     assert (found["growing"][half] == 0).all()
