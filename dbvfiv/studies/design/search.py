@@ -97,7 +97,7 @@ class Search:
         self.reserves.clear()
         for _ in range(ROUNDS):
             self._seen.clear()
-            best = self._optimised(self._first_that_holds(tried), evaluations)
+            best = self._held(self._first_that_holds(tried), evaluations)
             if best is None or not (self._renew_reserves(best) | self._add_worst_heads(best)):
                 break
             tried = [self.share(found[4]) for found in self._by_aim()] + [share]
@@ -118,6 +118,23 @@ class Search:
 
     def share(self, design: Design) -> np.ndarray:
         return np.array([(x - one.low) / (one.high - one.low) for x, one in zip(design.values, self.problem.variables)])
+
+    def _held(self, share: np.ndarray, evaluations: int) -> Design | None:
+        """As `_optimised`; a search that ends where constraints fail begins again halfway from its start to the case,
+        and one that holds from its end, where aim and curvature have another size, until that gains nothing.
+        """
+        best = None
+        for _ in range(BACK):
+            left = evaluations - len(self._seen)
+            found = self._optimised(share, left) if left > 0 else None
+            if found is None:
+                break
+            settled = best is not None and best.holds and abs(found.aim - best.aim) <= GAIN * abs(best.aim)
+            best = found
+            if settled or (not best.holds and np.array_equal(share, self.problem.start)):
+                break
+            share = self.share(best) if best.holds else 0.5 * (share + self.problem.start)
+        return best
 
     def _optimised(self, share: np.ndarray, evaluations: int) -> Design | None:
         from scipy.optimize import minimize

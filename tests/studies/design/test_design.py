@@ -105,6 +105,19 @@ def test_the_file_says_the_same_and_draws(found):
 
 
 @pytest.mark.slow
+def test_five_starts_have_one_optimum():
+    """The third ends thick, narrow and in flutter; begun again halfway to the case it arrives too."""
+    asked = {"design.starts": 5, "design.evaluations": 30}
+    result = load_small(KEYS, asked).design(VARIABLES, aim=AIM, constraints=CONSTRAINTS)
+    assert [note["start"] for note in result.found] == [0, 1, 2, 3, 4]
+    assert max(note["violation"] for note in result.found) <= 1e-5
+    aims = [note["aim"] for note in result.found]
+    assert aims == pytest.approx([min(aims)] * 5, rel=1e-4)
+    values = np.array([note["values"] for note in result.found])
+    assert values == pytest.approx(np.array([result.best[0].values] * 5), rel=0.02)
+
+
+@pytest.mark.slow
 def test_an_interrupted_run_goes_on(valve, found, tmp_path):
     path = tmp_path / "d.h5"
     part = valve.design(VARIABLES, aim=AIM, constraints=CONSTRAINTS, output=path, observer=Stop(2))

@@ -47,6 +47,24 @@ def test_two_throats_of_a_nozzle_become_equal(start):
     assert design.aim == pytest.approx(8**0.5, rel=1e-3) and len(tried) < 60
 
 
+def two_hills(x, _pressure):
+    """A flow with a hill at x = 1 and a lower one at x = 4."""
+    hills = np.array([2.0, 0.7]) * np.exp(-((x[0] - np.array([1.0, 4.0])) ** 2))
+    return {"mass": x[0], "flow": hills.sum()}, {
+        "mass": [1.0],
+        "flow": [(-2 * (x[0] - np.array([1.0, 4.0])) * hills).sum()],
+    }
+
+
+@pytest.mark.parametrize("start", [0.0, 0.6, 0.8, 1.0])
+def test_a_start_from_which_no_constraint_can_be_held_steps_back(start):
+    """The lower hill is below the bound: up there a search ends."""
+    problem = Analytic((Variable("x", 0.0, 5.0, 1.2, "m"),), two_hills)
+    found, tried = search(problem, "mass down", f"flow at {HEAD} Pa at least 1 m^3/s")
+    design = found.from_start(np.array([start]), 60)
+    assert design.holds and design.values[0] == pytest.approx(1 - np.log(2) ** 0.5, abs=1e-3) and len(tried) < 60
+
+
 #: Squared frequencies of two modes of a panel of unit thickness, 1/s2, and their damping, 1/s.
 FIRST, SECOND, DAMPING = 100.0, 400.0, 2.0
 
