@@ -74,8 +74,8 @@ from continuation.tracer import Checkpoint, Observer
 #: Names whose modules import JAX or compiled kernels, which takes long and which not everyone needs.
 _LATE = {
     "JaxSystem": "continuation.jax_system",
-    "Orbit": "continuation.orbits",
-    "find_orbit": "continuation.orbits",
+    "Orbit": "continuation.orbit_branches",
+    "find_orbit": "continuation.orbit_branches",
     "continue_orbits": "continuation.orbit_branches",
     "orbit_at": "continuation.orbit_branches",
     "orbits_from_hopf": "continuation.orbit_branches",

@@ -19,7 +19,7 @@ _PUBLIC = {
     "Valve": "api",
     "load": "api",
     "load_result": "studies.session",
-    "resume": "resuming",
+    "resume": "api",
     "CaseError": "errors",
     "SolveError": "errors",
     "Observer": "observer",

@@ -2,10 +2,10 @@
 
 from .api import Valve as Valve
 from .api import load as load
+from .api import resume as resume
 from .errors import CaseError as CaseError
 from .errors import SolveError as SolveError
 from .observer import Observer as Observer
-from .resuming import resume as resume
 from .studies.closure.study import ClosureResult as ClosureResult
 from .studies.cycle.study import CycleResult as CycleResult
 from .studies.design.study import DesignResult as DesignResult

@@ -11,11 +11,12 @@ from .case.axis import is_single, read_pressures, write_axis
 from .case.model import Changes, change_case
 from .drawing import views
 from .drawing.style import draw_figures, write_figures
-from .errors import SolveError, as_path
+from .errors import CaseError, SolveError, as_path
 from .explore import Explorer
 from .fit.damping import DampingReport, describe_damping
 from .model import ValveModel
 from .observer import Observer, Progress, is_watched
+from .record.files import kind_of
 from .studies.case import Case, load_case
 from .studies.closure.study import ClosureResult
 from .studies.cycle.study import CycleResult
@@ -26,12 +27,13 @@ from .studies.modes.study import ModesResult
 from .studies.onset.study import OnsetResult
 from .studies.response.study import ResponseResult
 from .studies.sensitivity.study import SensitivityResult
-from .studies.session import Session, named_changes
+from .studies.session import Session, named_changes, resume_result
 from .studies.state import State, sensitivity_keys
 from .studies.steady.study import SteadyResult
 from .studies.sweep.study import SweepResult
 from .studies.transient.study import TransientResult
 from .studies.uncertainty.study import UncertaintyResult
+from .studies.workers import read_workers
 
 #: A result file to write; none without it.
 Output = str | Path | None
@@ -537,3 +539,53 @@ def load(case: str | Path | Case | None = None, changes: Changes | None = None) 
     name = "dbv12" if case is None else "case" if isinstance(case, Case) else as_path(case, "A case file").stem
     made = case if isinstance(case, Case) else load_case(case)
     return Valve(made if changes is None else change_case(made, changes), name)
+
+
+#: What a resumed study may be given anew, the studies that take it, and what it is called in a sentence.
+_OWN = {
+    "duration": (("transient",), "A new duration belongs to transient runs"),
+    "workers": (("map", "uncertainty"), "Workers belong to maps and to samples of an uncertainty"),
+}
+
+
+def resume(
+    path: str | Path,
+    *,
+    duration: float | str | None = None,
+    workers: int | str | None = None,
+    observer: Observer | None = None,
+) -> Any:
+    """Continue an interrupted or killed study in its file.
+
+    Parameters
+    ----------
+    path : path
+        Result file; its case says what is still to do.
+    duration : number (s) or text with a unit, optional
+        Of a transient run: a later end.
+    workers : int or str, optional
+        Of a map or an uncertainty: processes that share the work, or the address of a Dask scheduler.
+    observer : Observer, optional
+
+    Returns
+    -------
+    StudyResult
+        As of the study itself.
+
+    Raises
+    ------
+    CaseError
+        If the file cannot be read, or there is nothing left to do.
+
+    Examples
+    --------
+    >>> run = dbvfiv.resume("run.h5", duration="2 s")     # doctest: +SKIP
+    """
+    kind = kind_of(path)
+    given = {"duration": duration, "workers": workers}
+    for name, value in given.items():
+        owners, words = _OWN[name]
+        if value is not None and kind not in owners:
+            raise CaseError(f"{words}; {str(path)!r} is of kind {kind!r}.")
+    changes = {} if duration is None else {"transient.duration": duration}
+    return resume_result(path, observer, changes, **({} if workers is None else {"workers": read_workers(workers)}))

@@ -11,11 +11,11 @@ from .basis import (
 from .certificate import Certificate, CertifiedSpectrum, certified_spectrum, listed_unstable
 from .columns import Cell, Column, ColumnSolver, ReducedColumn
 from .count import Count, unstable_count
-from .derivative import eigenvalue_derivative
 from .factor import SingularShiftError, Workspace
 from .family import PencilFamily, ReducedFamily
 from .krylov import KrylovPairs, krylov_pairs
 from .operator import CoupledPencil, Relaxation
+from .pairs import eigenvalue_derivative
 from .reduction import FamilyReduction
 from .search import leading_modes
 from .spectrum import CLEAR, Mode, Oval, SearchedRegion, SearchOptions, Spectrum

@@ -8,9 +8,9 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from scipy.optimize import linear_sum_assignment
 
-from .derivative import coupling_of_modes
 from .factor import Workspace
 from .operator import CoupledPencil
+from .pairs import coupling_of_modes
 from .search import leading_modes
 from .spectrum import SearchOptions, Spectrum
 

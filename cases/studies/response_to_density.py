@@ -188,7 +188,7 @@ def _theory(base, path: Path) -> dict:
     from scipy.optimize import brentq
 
     from dbvfiv.case.parameters import Mu
-    from dbvfiv.studies.onset.normal_form import normal_form
+    from dbvfiv.studies.onset.search import normal_form
     from dbvfiv.studies.stability.walk import StabilityWalk
 
     walk = StabilityWalk(base)

@@ -17,7 +17,7 @@ import typer
 
 from .. import __version__
 from ..errors import CaseError, DiskFull, SolveError
-from . import app, case, materials, pages, results, studies, verdict
+from . import case, materials, pages, results, studies
 
 # Typer brings its own Click in newer versions and uses the separate package in older ones.
 _UsageProblem = typer.BadParameter.__mro__[2]
@@ -26,14 +26,14 @@ _UsageProblem = typer.BadParameter.__mro__[2]
 _BEFORE = (case.case, materials.damping, materials.fit, materials.ply, pages.report)
 _AFTER = (
     studies.resume,
-    verdict.verdict,
+    results.verdict,
     results.plot,
     results.compare,
     results.life,
     results.export,
     results.cfd,
     results.info,
-    app.app,
+    pages.app,
     case.doctor,
     pages.reproduce,
 )

@@ -23,7 +23,7 @@ _SHARED = ("case", "plots", "output")
 
 def study_commands() -> list[tuple[str, Callable[..., None]]]:
     """Names and commands of all studies, in the order of their help."""
-    modules = [(kind, import_module(f"..studies.{kind}.command", __package__)) for kind in KINDS]
+    modules = [(kind, import_module(f"..studies.{kind}", __package__)) for kind in KINDS]
     modules.sort(key=lambda found: (getattr(found[1], "ORDER", 100), found[0]))
     return [(kind, _make_command(kind, module)) for kind, module in modules]
 
@@ -123,9 +123,9 @@ def resume(
     The numbers are those of a run that was never interrupted: a transient run goes on from its last restart point, a
     map solves the columns that are missing in it, an onset run the values, steady and closure runs the pressures.
     """
+    from ..api import resume
     from ..case.quantity import Quantity, number_or_text
     from ..record.files import kind_of
-    from ..resuming import resume
     from ..studies.session import load_result
 
     kind = kind_of(file)

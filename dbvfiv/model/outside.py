@@ -37,10 +37,10 @@ from ..case.model import Case
 from ..case.part import QUARTER, Part
 from ..errors import CaseError, SolveError
 from ..flow.outside import BODY, ROOM, Impedance, Panels, PotentialFlow, ShapeDerivative, Surroundings
-from ..flow.outside.surfaces import arc, end_face, extruded, pipe, ring_face, stretched, strip
+from ..flow.outside.panels import arc, end_face, extruded, pipe, ring_face, stretched, strip
 from ..geometry import ValveMesh
 from ..shell import Shell
-from ..shell.face import OuterFace
+from ..shell.pressure import OuterFace
 from .symmetry import equilibria_of
 
 #: Motions kept of the added mass of a quarter.

@@ -18,9 +18,9 @@ from ..case.parameters import OUTSIDE, PARAMETERS
 from ..case.write import case_toml
 from ..errors import CaseError
 from ..studies.stability.place import fixed_conditions
-from . import live
 from .answers import UNKNOWN, Answer, answers, trade
 from .content import Part, Picture
+from .figures import library
 from .gather import Gathered
 from .parts import MAKERS, first_pictures
 
@@ -101,7 +101,7 @@ def write_parts(
         parts=parts,
         figures={picture.name: number for number, picture in enumerate(pictures, start=1)},
         case=case,
-        library=live.library() if any(picture.live for picture in pictures) else "",
+        library=library() if any(picture.live for picture in pictures) else "",
         version=__version__,
     )
     try:

@@ -14,10 +14,9 @@ from ..fit.damping import describe_damping
 from ..materials.stability import StableRange, stable_range
 from ..model.symmetry import symmetry_named
 from ..record.mesh import MeshData
-from . import live
 from .answers import listed, loss_range, plain
 from .content import Part, Picture, Table, picture, pictures_of
-from .figures import closure_figure, headloss_figure, pipe_figure, vibration_figure
+from .figures import closure_figure, headloss_figure, live_valve, pipe_figure, vibration_figure
 from .gather import Gathered, is_on_own_mesh
 
 
@@ -31,7 +30,7 @@ def first_pictures(found: Gathered) -> tuple[Picture, ...]:
     state, units, pictures = found.state(found.heads[-1]), found.case.units, []
     if state is not None:
         caption = f"The valve at {units.pressure(state.pressure, 3)}, true to scale."
-        pictures.append(picture("valve", caption, lambda: deformed(state), live.valve(state, units), units))
+        pictures.append(picture("valve", caption, lambda: deformed(state), live_valve(state, units), units))
         if state.hydraulics is not None:
             caption = "Head loss and opening over the flow."
             pictures.append(picture("head-loss", caption, lambda: headloss_figure(found), units=units))

@@ -2,9 +2,9 @@
 
 from .memory import Memory, WallMemory
 from .mesh import DofMap, ShellMesh, nodal_directors, tangent_frames
+from .pressure import Weight
 from .section import Layer, Section
 from .shell import Shell, StepWall
-from .weight import Weight
 
 __all__ = [
     "DofMap",

@@ -1,7 +1,7 @@
 """Studies: one package for each analysis that the program offers.
 
-A room holds the study's keys of the case file and its command (`command`, light to import), how it runs and what comes
-of it (`study`), and figures. What several rooms share lies beside them: the `session` that they ask, the `study` and
+A room holds the study's keys of the case file and its command (light to import), how it runs and what comes of it
+(`study`), and figures. What several rooms share lies beside them: the `session` that they ask, the `study` and
 `result` that they make, `measured` data beside what they compute, `stability`, and the `orbits` of limit cycles.
 """
 

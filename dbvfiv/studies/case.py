@@ -27,7 +27,7 @@ from . import KINDS
 
 def _section(kind: str) -> tuple[type[Section], Any]:
     """The section of a study, under the first line of its docstring."""
-    keys = import_module(f"{__package__}.{kind}.command").Keys
+    keys = import_module(f"{__package__}.{kind}").Keys
     return keys, key(keys(), (keys.__doc__ or "").partition("\n")[0])
 
 

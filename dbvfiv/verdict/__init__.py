@@ -4,10 +4,9 @@ record also its lines, with intervals.
 The package is independent of valves.
 """
 
-from .chatter import Shuttings
 from .judge import NAMES, RECORDED, JudgeOptions, Verdict, judge
 from .motion import judge_record
-from .series import Series, in_steps, spectrum
+from .series import Series, Shuttings, in_steps, spectrum
 
 __all__ = [
     "NAMES",

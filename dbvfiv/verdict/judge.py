@@ -10,11 +10,11 @@ from typing import Any
 
 import numpy as np
 
-from .chatter import Shuttings
 from .lines import PEAK
 from .series import (
     Cycles,
     Series,
+    Shuttings,
     check_samples,
     comes_and_goes,
     extremes,

@@ -1,9 +1,12 @@
-"""A time series: checks, gaps, even samples, spectrum; its period, and the trend from one cycle to the next."""
+"""A time series: checks, gaps, even samples, spectrum; its period, the trend from one cycle to the next, and
+the shuttings of a valve.
+"""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from scipy.fft import irfft, next_fast_len, rfft
@@ -452,3 +455,86 @@ def harmonics(series: Series, period: float, cycles: int, count: int = 8) -> np.
     angle = 2j * np.pi / period * np.arange(1, count + 1)[:, None] * (t - series.start)
     coefficients = 2.0 * np.mean(values * np.exp(-angle), axis=1)
     return np.stack([np.abs(coefficients), np.angle(coefficients)], axis=1)
+
+
+#: Level over that of a shut valve from which on it is open; between the two it is what it was.
+_OPEN = 2.0
+#: Shuttings that make chatter, and longest standstill at the end, in intervals, that is not the end of it.
+_CHATTER, _STILL = 3, 3.0
+#: Standard errors by which the mean interval may change between the two halves.
+_REGULAR = 4.0
+
+
+@dataclass(frozen=True)
+class Shuttings:
+    """Shuttings in even or uneven samples.
+
+    Attributes
+    ----------
+    shut, opened : (k,) int arrays
+        Samples at which the valve was found shut, and those at which it had last been found open again before.
+    intervals : (k - 1,) array, s
+    goes_on : bool
+        True where the series ends before a further one is overdue.
+    """
+
+    shut: np.ndarray
+    opened: np.ndarray
+    intervals: np.ndarray
+    goes_on: bool
+
+    @classmethod
+    def of(cls, time: np.ndarray, values: np.ndarray, level: float) -> Shuttings:
+        """Shuttings of a signal (k,) at times (k,): from twice a level or more to the level or less."""
+        known = np.flatnonzero((values <= level) | (values > _OPEN * level))
+        shut = values[known] <= level
+        falls, rises = (np.flatnonzero(shut[1:] & ~shut[:-1]) + 1, np.flatnonzero(~shut[1:] & shut[:-1]) + 1)
+        if len(falls) and (not len(rises) or rises[0] > falls[0]):
+            rises = np.insert(rises, 0, 0)
+        at = known[falls]
+        intervals = np.diff(time[at])
+        overdue = time[-1] - time[at[-1]] if len(at) else np.inf
+        return cls(at, known[rises[: len(falls)]], intervals, bool(overdue <= _STILL * intervals.max(initial=0.0)))
+
+    @property
+    def chatters(self) -> bool:
+        """True of several that go on."""
+        return len(self.shut) >= _CHATTER and self.goes_on
+
+    def kept(self, least: int) -> np.ndarray:
+        """The later half of the intervals (k,), s, but not fewer than some number if there are as many."""
+        return self.intervals[-max(least, len(self.intervals) // 2) :]
+
+    def is_settled(self, least: int) -> bool:
+        """True where enough intervals are known and the mean of the kept ones does not change beyond chance."""
+        first, last = np.array_split(self.kept(least), 2)
+        if len(first) + len(last) < least:
+            return False
+        error = np.sqrt(first.var() / len(first) + last.var() / len(last))
+        return bool(abs(first.mean() - last.mean()) <= max(_REGULAR * error, 0.02 * last.mean()))
+
+    def evidence(self, time: np.ndarray, opening, velocity, flow) -> dict[str, Any]:
+        """Numbers of the chatter, SI, for JSON, from opening, m, velocity of a lip, m/s, and mass flow, kg/s, (k,).
+
+        The speed of a lip is the largest inwards between its widest opening and the shutting.
+        """
+        whole = slice(self.shut[0], self.shut[-1] + 1)
+        widest, speed, shut = [], [], 0.0
+        for begin, end, before in zip(self.opened[1:], self.shut[1:], self.shut[:-1]):
+            top = begin + int(np.argmax(opening[begin : end + 1]))
+            widest.append(float(opening[top]))
+            speed.append(float(max(0.0, -np.min(velocity[top : end + 1]))))
+            shut += float(time[begin] - time[before])
+        length = float(time[self.shut[-1]] - time[self.shut[0]])
+        trapezoids = 0.5 * (flow[whole][1:] + flow[whole][:-1]) @ np.diff(time[whole])
+        return {
+            "shuttings": len(self.shut),
+            "rate": 1.0 / float(self.intervals.mean()),
+            "interval_scatter": float(self.intervals.std() / self.intervals.mean()),
+            "shut_share": shut / length,
+            "opening": float(np.mean(widest)),
+            "largest_opening": max(widest),
+            "impact_speed": float(np.mean(speed)),
+            "largest_impact_speed": max(speed),
+            "mean_flow": float(trapezoids / length),
+        }

@@ -237,7 +237,7 @@ def test_every_study_brings_its_section_and_the_physics_does_without():
     assert list(Case.model_fields) == [*PhysicsCase.model_fields, *KINDS]
     for kind in KINDS:
         keys = type(getattr(case, kind))
-        assert keys.__module__ == f"dbvfiv.studies.{kind}.command"
+        assert keys.__module__ == f"dbvfiv.studies.{kind}"
         assert Case.model_fields[kind].description == inspect.getdoc(keys).splitlines()[0]
     physics = make_case(PhysicsCase, {name: case.to_dict()[name] for name in PhysicsCase.model_fields})
     assert physics.replace({"drive.pressure": "36 kPa"}).drive.pressure == 36e3

@@ -11,7 +11,7 @@ from continuation.cycle_points import DOUBLING, FOLD, TORUS
 from continuation.cycles import CycleSolver
 from continuation.harmonics import Harmonics, Rates
 from continuation.hill import floquet_exponents
-from continuation.orbits import find_orbit
+from continuation.orbit_branches import find_orbit
 from continuation.periodic import PeriodicMotion
 from tests.systems import periodic
 from tests.systems.van_der_pol import van_der_pol as first_order_van_der_pol

@@ -8,8 +8,7 @@ import pytest
 import scipy.linalg as la
 
 from dbvfiv.flow import Channel, FlowMotion
-from dbvfiv.flow.elastic_line import ElasticLine, LineChannel, default_elements
-from dbvfiv.flow.line_elements import element
+from dbvfiv.flow.elastic_line import ElasticLine, LineChannel, default_elements, element
 from dbvfiv.flow.stepping import FluidState, MovingFluid, packed_size
 from dbvfiv.flow.terms.line import Line
 from tests.flow.test_channel import FLOOR, passage

@@ -8,8 +8,7 @@ import pytest
 from scipy.optimize import brentq
 
 from dbvfiv.flow import Channel, FlowMotion
-from dbvfiv.flow.elastic_line import ElasticLine, LineChannel
-from dbvfiv.flow.line_elements import DEGREE
+from dbvfiv.flow.elastic_line import DEGREE, ElasticLine, LineChannel
 from dbvfiv.flow.stepping import MovingFluid
 from dbvfiv.flow.terms.line import Line, PiecedLine
 from tests.flow.test_channel import FLOOR, passage

@@ -4,9 +4,8 @@ import numpy as np
 import pytest
 
 from dbvfiv.drawing.views import ValveSkin, faces, offset_line
-from dbvfiv.drawing.waves import wave_content
 from dbvfiv.shell.mesh import nodal_thickness
-from dbvfiv.studies.modes.figures import drawn_amplitude
+from dbvfiv.studies.modes.figures import drawn_amplitude, wave_content
 
 
 def test_the_faces_lie_a_wall_apart_and_a_closed_lip_shows_no_slot(coarse_run):

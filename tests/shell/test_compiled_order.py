@@ -11,7 +11,7 @@ import sys
 
 import pytest
 
-from dbvfiv.shell.kernel_memory import advance_branches, hold_resultants
+from dbvfiv.shell.memory import advance_branches, hold_resultants
 
 PROGRAM = f"""
 import sys

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from dbvfiv.shell.face import OuterFace
+from dbvfiv.shell.pressure import OuterFace
 from tests.small_valves import find_open_state, make_valve
 
 

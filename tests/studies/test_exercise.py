@@ -41,10 +41,9 @@ def copy(tmp_path):
 def test_a_study_is_a_folder_and_a_word(copy, tmp_path):
     room = tmp_path / "dbvfiv/studies/compliance"
     room.mkdir()
-    (room / "__init__.py").write_text('"""An exercise."""\n')
     text = (ROOT / "docs/developing.md").read_text()
     blocks = re.findall(r"```python\n# (\w+\.py)\n(.*?)```", text, flags=re.S)
-    assert [name for name, _ in blocks] == ["command.py", "study.py"]
+    assert [name for name, _ in blocks] == ["__init__.py", "study.py"]
     for name, code in blocks:
         (room / name).write_text(code)
     kinds = tmp_path / "dbvfiv/studies/__init__.py"

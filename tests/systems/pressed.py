@@ -8,7 +8,7 @@ import numpy as np
 
 from dbvfiv.contact import PlaneContact
 from dbvfiv.model.classes import shell_of_class
-from dbvfiv.model.pressed_shell import PressedShell
+from dbvfiv.model.preset import PressedShell
 from dbvfiv.shell.pressure import pressure_stiffness
 
 

@@ -13,8 +13,7 @@ from dbvfiv.contact import ContactLaw, ContactState, PlaneContact, tributary_are
 from dbvfiv.model.load_steps import LoadStepOptions, LoadSteps
 from dbvfiv.model.newton import NewtonOptions
 from dbvfiv.shell import Shell, ShellMesh
-from dbvfiv.studies.closure.energy import EnergyLedger
-from dbvfiv.studies.closure.valve import force_imbalance
+from dbvfiv.studies.closure.walk import EnergyLedger, force_imbalance
 from eigen.factor import DirectFactor
 from tests.shell.structures import grid, isotropic_section
 from tests.systems.pressed import ShellOnPlane

@@ -11,8 +11,7 @@ import pytest
 
 from dbvfiv.model import ValveModel
 from dbvfiv.studies.case import thesis_case
-from dbvfiv.studies.onset.normal_form import normal_form
-from dbvfiv.studies.onset.search import OnsetOptions, OnsetSearch
+from dbvfiv.studies.onset.search import OnsetOptions, OnsetSearch, normal_form
 from dbvfiv.studies.transient.run import Runner
 
 #: Relative distance from the onset density.

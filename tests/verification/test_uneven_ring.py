@@ -27,8 +27,7 @@ import numpy as np
 import pytest
 
 from dbvfiv.shell import Shell, ShellMesh
-from dbvfiv.shell.face import OuterFace
-from dbvfiv.shell.pressure import pressure_force, pressure_stiffness
+from dbvfiv.shell.pressure import OuterFace, pressure_force, pressure_stiffness
 from tests.shell.structures import grid, isotropic_section, solve_path
 
 RADIUS, STRIP, WIDTH, E, NU = 1.0, 1 / 3, 0.05, 6e6, 0.3

@@ -51,8 +51,7 @@ from .safety import (
     read_classes,
     sentences,
 )
-from .valve import film_leak, layer_maxima
-from .walk import BUCKLING, MOST_EIGENVALUES, PATH, STATES, ClosureWalk, rows_to_keep
+from .walk import BUCKLING, MOST_EIGENVALUES, PATH, STATES, ClosureWalk, film_leak, layer_maxima, rows_to_keep
 
 
 def _by_node(mesh: MeshData) -> tuple[int, ...]:

@@ -29,9 +29,8 @@ from ..stability.verdict import DIVERGES, FLUTTERS, NOT_VALID, OUTCOMES, STABLE,
 from ..stability.walk import StabilityWalk
 from ..study import Study
 from . import chances, cycles, figures
-from .column import ColumnTask, MapColumn, MapPlan, grid_of
+from .column import ColumnPool, ColumnTask, MapColumn, MapPlan, grid_of
 from .curves import OnsetCurve, Web, doubts, linked
-from .pool import ColumnPool
 
 LAWS = {0.0: "quasi-steady", 1.0: "storage"}
 #: Quantities of cells in documents, by the names of `Sample.number`.

@@ -1,1 +1,93 @@
-"""Onset study: loss and regain of stability along one parameter."""
+"""``dbvfiv onset``: where a state loses stability."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+import typer
+from pydantic import StrictBool
+
+from ...case.axis import Axis, StabilityRange, parse_stability_axis
+from ...case.model import Case
+from ...case.parameters import listed
+from ...case.quantity import Number, number_or_text
+from ...case.section import Section, key
+from ..request import ClassesOption, DensityOption, LawOption, PressureOption, Request, law_changes, refuse_moved
+
+ORDER = 28
+
+
+class Keys(Section):
+    """Onset of instability along one parameter."""
+
+    over: StabilityRange = key(
+        "density",
+        f"The parameter to move: {listed(notes=True)}; with =START:STOP:COUNT[:log] behind it for another range than "
+        "the usual one.",
+    )
+    tolerance: Number = key(1e-9, "Relative accuracy of a located onset on its mesh.", gt=0, le=1e-3)
+    normal_form: StrictBool = key(
+        True, "Also the first Lyapunov coefficient, which tells whether cycles are attracting or repelling."
+    )
+    coarse_mesh: Number = key(
+        0.5,
+        (
+            "Elements of the second mesh over those of the first, for the uncertainty by Richardson's rule; 0 "
+            "leaves it out."
+        ),
+        ge=0,
+        lt=1,
+    )
+
+    continuity: Literal["case", "both"] = key("case", "The flow model of the case, or both models side by side.")
+
+    symmetry: Literal["SS", "all"] = key(
+        "SS",
+        "Symmetry classes looked at: SS is that of the model, all adds those in which the lips sway in y (SA), the "
+        "valve sways sideways in x (AS) and twists (AA).",
+    )
+
+    @property
+    def axis(self) -> Axis:
+        """The parsed range."""
+        return parse_stability_axis(self.over)
+
+
+def command(
+    case: Case,
+    over: Annotated[
+        str | None,
+        typer.Option(
+            "--over",
+            metavar="PARAMETER",
+            help=f"{listed()}, with =START:STOP:COUNT[:log] for a range of one's own; onset.over without it.",
+        ),
+    ] = None,
+    pressure: PressureOption = None,
+    density: DensityOption = None,
+    law: LawOption = None,
+    symmetry: ClassesOption = None,
+) -> Request:
+    """Every onset along one parameter: value, frequency, super- or subcritical, uncertainty of the mesh.
+
+    All crossings of the range are looked for, also tongues of instability that close again. Each is located with the
+    full matrices, confirmed by direct eigenvalues and independent counts on both sides, described by its first Lyapunov
+    coefficient (onset.normal_form), and found again on a coarser mesh for an uncertainty (onset.coarse_mesh).
+
+    With --law both the other flow model is scanned too, and what both disagree about is said.
+
+    With --symmetry all the motions that are not symmetric about both planes are looked at too, and each onset names its
+    class.
+
+    With -o every value of the scan and every onset is kept at once: `dbvfiv resume` goes on after Ctrl-C or a crash.
+
+    dbvfiv onset cases/dbv12.toml --over density -p "6 kPa"
+    """
+    refuse_moved({"onset.over": over or case.onset.over}, pressure=pressure, density=density)
+    changes = {
+        "drive.pressure": number_or_text(pressure),
+        "fluid.density": number_or_text(density),
+        "onset.over": over,
+        "onset.symmetry": symmetry,
+    }
+    return Request(changes | law_changes(law, "onset"))

@@ -10,21 +10,22 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from continuation import ContinuationError
+from continuation.normal_form import hopf_normal_form_of
 
-from ...case.parameters import Mu
+from ...case.parameters import DESIGN, PARAMETERS, Mu
 from ...errors import SolveError
 from ...fit import outside_band
+from ...model.forms import ValveForms
 from ...observer import Observer
 from ..case import Case
 from ..stability.dimensions import Variant, own_variant
 from ..stability.line import ParameterLine
-from ..stability.place import check_scan
+from ..stability.place import check_scan, models_of
 from ..stability.samples import Sample, SampleKey
 from ..stability.scan import Crossing
 from ..stability.verdict import not_valid_at
 from ..stability.walk import StabilityWalk
 from .line import FoundOnsets, OnsetPoint, Side
-from .normal_form import normal_form
 
 #: Meshes of a run: that of the case, and the coarser one for the uncertainty.
 FINE, COARSE = 0, 1
@@ -399,3 +400,19 @@ def run_onset(
     points = tuple(sorted(points, key=lambda p: p.value))
     variant = options.variant or own_variant(case)
     return FoundOnsets(variant, tuple(search.asked), points, tuple(failures), tuple(warnings))
+
+
+def normal_form(case: Case, walk: StabilityWalk, place: Mu, mode, parameter: str | None = None):
+    """Hopf normal form at a located onset, a `continuation.HopfNormalForm`.
+
+    Raises
+    ------
+    ContinuationError
+        If the eigenvalue is not simple.
+    """
+    mu = place.for_system()
+    follows = parameter and not (parameter == "density" and case.gravity.is_there)  # whose levels it would leave out
+    name = PARAMETERS[parameter].system_name or None if follows else None
+    own = walk.built(place.only(*(name for name in place if name not in DESIGN))).model
+    forms = ValveForms(models_of(case, own)(mu), walk.equilibrium(place), mu)
+    return hopf_normal_form_of(forms, abs(complex(mode.eigenvalue).imag), np.concatenate([mode.q, mode.u]), name)

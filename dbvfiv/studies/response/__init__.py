@@ -1,1 +1,108 @@
-"""Forced response of a steady state to the pressure at its inlet."""
+"""``dbvfiv response``: forced response to pulsation and noise of the pressure at the inlet."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from pydantic import Field, StrictInt
+
+from ...case.axis import Axis, StabilityRange, parse_stability_axis
+from ...case.model import Case
+from ...case.parameters import listed
+from ...case.quantity import Frequency, Pressure, Quantity, number_or_text
+from ...case.section import Section, key
+from ...case.tables import ExistingFile, read_pairs
+from ...errors import CaseError
+from ..request import DensityOption, LawOption, PressureOption, Request, refuse_moved, with_unit
+
+ORDER = 33
+
+
+class Keys(Section):
+    """Response to the pressure at the inlet."""
+
+    over: StabilityRange | None = key(
+        None, "Values at which the response is asked: a range as in onset.over; the state of the case without it."
+    )
+    max_frequency: Annotated[Frequency, Field(gt=0, le=1e5)] = key(100.0, "Frequency up to which it is computed.")
+    count: StrictInt = key(400, "Frequencies of the curves.", ge=16, le=100_000)
+    noise: Annotated[Pressure, Field(gt=0, le=1e7)] = key(
+        100.0, "Root mean square of the pressure noise, which is white up to max_frequency."
+    )
+    spectrum: ExistingFile | None = key(
+        None,
+        "CSV of frequency, Hz, and one-sided power density of the pressure, Pa2/Hz, used instead of noise; linear "
+        "between rows, nothing beyond them.",
+    )
+
+    @property
+    def axis(self) -> Axis | None:
+        """The parsed range."""
+        return None if self.over is None else parse_stability_axis(self.over)
+
+    def density(self) -> list[tuple[float, float]]:
+        """Frequencies and power densities of the pressure.
+
+        Raises
+        ------
+        CaseError
+        """
+        if self.spectrum is None:
+            level = self.noise**2 / self.max_frequency
+            return [(0.0, level), (self.max_frequency, level)]
+        try:
+            rows = read_pairs(self.spectrum, (Quantity("Hz"), Quantity("")), "a frequency and a power density")
+            for (before, _), (after, _) in zip(rows, rows[1:]):
+                if not after > before:
+                    raise ValueError(f"whose frequencies do not increase at {after:g} Hz")
+            if len(rows) < 2 or min(min(row) for row in rows) < 0:
+                raise ValueError("which needs two rows at least, and no number below 0")
+        except ValueError as error:
+            raise CaseError(
+                f"response.spectrum is given as {str(self.spectrum)!r}, {error}.", key="response.spectrum"
+            ) from None
+        return rows
+
+
+def command(
+    case: Case,
+    pressure: PressureOption = None,
+    density: DensityOption = None,
+    law: LawOption = None,
+    over: Annotated[
+        str | None,
+        typer.Option("--over", metavar="RANGE", help=f"PARAMETER=START:STOP:COUNT of {listed()}; how an onset nears."),
+    ] = None,
+    noise: Annotated[
+        str | None,
+        typer.Option("--noise", metavar="P", callback=with_unit, help="Root mean square of white pressure noise."),
+    ] = None,
+    spectrum: Annotated[
+        Path | None, typer.Option("--spectrum", metavar="CSV", help="Power density of the pressure over frequency.")
+    ] = None,
+    max_frequency: Annotated[
+        str | None, typer.Option("--max-frequency", metavar="F", help="Frequency up to which it is computed, '80 Hz'.")
+    ] = None,
+) -> Request:
+    """Lip motion, flow and pressure per pressure at the inlet over frequency (pump pulsation, vane passing), with the
+    damping of their peaks, and their root mean squares under pressure noise.
+
+    On a reduced operator that is checked on the full one; loss factors are exact in frequency. Over a range the
+    variance and the correlation time rise towards the onset: what a record of the installed valve shows before it
+    flutters.
+
+    dbvfiv response cases/dbv12-in-line.toml -p "2 m" --noise "200 Pa" --plots figures
+    """
+    refuse_moved({"response.over": over or case.response.over or ""}, pressure=pressure, density=density)
+    changes = {
+        "drive.pressure": number_or_text(pressure),
+        "fluid.density": number_or_text(density),
+        "fluid.continuity": law,
+        "response.over": over,
+        "response.noise": number_or_text(noise),
+        "response.spectrum": None if spectrum is None else str(spectrum),
+        "response.max_frequency": number_or_text(max_frequency),
+    }
+    return Request(changes)

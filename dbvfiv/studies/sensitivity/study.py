@@ -13,6 +13,7 @@ from matplotlib.figure import Figure
 from eigen import Mode, leading_modes
 
 from ...case.parameters import PARAMETERS, Mu
+from ...drawing.style import STABLE, UNSTABLE, headline, new_figure
 from ...errors import CaseError, SolveError
 from ...model.dynamics import LinearisedState, linearise
 from ...model.equilibria import require_equilibrium
@@ -28,7 +29,6 @@ from ..stability.place import describe_fixed
 from ..stability.walk import ValveFamily, name_state_in_failures
 from ..state import State, states_of
 from ..study import Study
-from . import figures
 
 #: Modes searched for beyond the one asked for, so that its rank is certain.
 _MARGIN = 3
@@ -198,7 +198,7 @@ class SensitivityResult(StudyResult):
 
     def drawers(self) -> Iterator[tuple[str, Callable[[], Figure]]]:
         if any(found.value for found in self.sensitivities):
-            yield "sensitivity", lambda: figures.draw_bars(self)
+            yield "sensitivity", lambda: draw_bars(self)
 
     def lines(self) -> list[str]:
         if not self.record.notes(MODE):
@@ -223,6 +223,38 @@ def _line(result: SensitivityResult, found: Sensitivity) -> str:
         f"{found.parameter:<24}{value:>12.6g} {unit:<8}{found.growth_rate * scale:>12.4g}"
         f"{found.frequency * scale:>13.4g}{relative}{further}"
     )
+
+
+#: Bars drawn at most, those that move the mode most.
+MOST = 24
+
+
+def draw_bars(result: StudyResult) -> Figure:
+    """Change of growth rate and frequency of the mode for one percent more of each parameter, the largest on top."""
+    known = [found for found in result.sensitivities if found.value]
+    shown = sorted(known, key=lambda found: abs(found.relative), reverse=True)[:MOST]
+    change = np.array([found.per_percent for found in shown])
+    place = np.arange(len(shown))
+    figure = new_figure(8.4, 1.9 + 0.27 * len(shown))
+    growth, frequency = figure.subplots(1, 2, sharey=True)
+    growth.barh(place, change.real, color=[UNSTABLE if c > 0 else STABLE for c in change.real], height=0.7)
+    frequency.barh(place, change.imag / (2 * np.pi), color="#5f6a72", height=0.7)
+    growth.set_yticks(place, [found.parameter for found in shown])
+    growth.invert_yaxis()
+    growth.set_xlabel("Change of growth rate, 1/s per percent")
+    frequency.set_xlabel("Change of frequency, Hz per percent")
+    for axes in (growth, frequency):
+        axes.axvline(0.0, color="0.25", lw=1.0)
+        axes.grid(axis="y", visible=False)
+    mode = f"mode {result.number}, {result.growth_rate:.4g} 1/s at {result.frequency:.4g} Hz"
+    headline(figure, f"{result.header.name}, {mode}")
+    words = [describe_fixed(result.case)]
+    if len(shown) < len(known):
+        words.append(f"the {len(shown)} largest of {len(known)}")
+    if len(known) < len(result.sensitivities):
+        words.append("parameters that are zero have no percent")
+    figure.supxlabel(" · ".join(words), x=0.01, ha="left", fontsize=8.5, color="0.35")
+    return figure
 
 
 STUDY = Study("sensitivity", tables_of, run, SensitivityResult)

@@ -1,1 +1,151 @@
-"""Equilibria over a list of pressures."""
+"""``dbvfiv steady``: equilibria over a list of pressures."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+from pydantic import StrictInt, ValidationInfo, field_validator
+
+from ...case.axis import parse_axis
+from ...case.measured import AREA, DISCHARGE, MEASURED_FILES, SHAPE, TAPS, find_measured
+from ...case.model import Case
+from ...case.physics import LoadPressure
+from ...case.quantity import Number, Quantity, number_or_text
+from ...case.section import Section, key
+from ...errors import CaseError
+from ..request import Request, is_sheet, with_unit
+from .sheet import require_sheet, write_sheet
+
+ORDER = 20
+
+
+class Keys(Section):
+    """Equilibria over a list of pressures."""
+
+    pressures: tuple[LoadPressure, ...] = key(
+        (2e3, 6e3, 12e3, 18e3, 24e3, 29e3, 36e3, 50e3),
+        "Static inlet pressures of the head-discharge curve.",
+        min_length=1,
+    )
+    cracking_area: Number = key(
+        2.0,
+        "Where the valve counts as cracked: the passage at the lips over that at rest, which is a gap and not nothing.",
+        gt=1,
+        le=100,
+    )
+    measured: Annotated[tuple[Path, ...], MEASURED_FILES] = key(
+        (),
+        "CSV of measured points that figures and tables show beside the computed ones, one file or several, "
+        "relative to the case file. The first line names the columns with units: a pressure as drive.pressure has "
+        "it, or a head of the fluid, with a flow, the area at the lip or both (pressure [kPa], flow [L/s], area "
+        "[cm2]); with points of sections of the wall (pressure [kPa], z [mm], face, x [mm], y [mm]; without z at "
+        "the lip, without face on the inner one); or with static pressures along the axis (pressure [kPa], z [mm], "
+        "tap [kPa]).",
+    )
+    tolerance: Number = key(1e-8, "Residual, relative to the load, at which Newton stops.", gt=0, le=1e-2)
+    max_iterations: StrictInt = key(30, "Newton iterations of one load step.", ge=1, le=10000)
+    min_step: Number = key(1e-4, "Smallest load step, relative to the target, before giving up.", gt=0, le=1)
+
+    @field_validator("measured", mode="before")
+    @classmethod
+    def _find_measured(cls, given: Any, info: ValidationInfo) -> Any:
+        return find_measured(given, info, (DISCHARGE, AREA, SHAPE, TAPS))
+
+
+Pressures = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--pressure",
+        "-p",
+        metavar="P",
+        callback=with_unit,
+        help="Static inlet pressure, '36 kPa', '2 m' or '6 ft' (head of the fluid), '2 mH2O', or a range "
+        "'2 kPa:50 kPa:12'; may be repeated.",
+    ),
+]
+
+
+Sizes = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--scale",
+        metavar="S",
+        help="Of a sheet: one size, valve.scale as a number or the bore, '100 mm' or '4 in'; repeated for several.",
+    ),
+]
+Units = Annotated[
+    str | None,
+    typer.Option(
+        "--units", metavar="U,U", help="Units of tables and sheet, 'ft, gpm, ft/s, in'; else m, L/s, m/s, mm."
+    ),
+]
+
+
+def command(
+    case: Case, pressures: Pressures = None, sizes: Sizes = None, units: Units = None, output: Path | None = None
+) -> Request:
+    """Equilibria of the coupled valve: flow, lip area, jet velocity, deflections, layer stresses.
+
+    The pressures are those of --pressure; else steady.pressures of the case, or its drive.pressure where only that is
+    given, with --set for instance; else, with a pump, the operating point. Each state is found from the one before.
+
+    Nothing is written unless asked for: -o keeps states, stations and layer stresses in a result file (an earlier
+    result of that name is replaced), state by state, so that Ctrl-C keeps what is done and `dbvfiv resume` goes on.
+    `dbvfiv plot`, `export` and `info` read it.
+
+    dbvfiv steady cases/dbv12.toml -p "18 kPa" -p "36 kPa" -o dbv12.h5
+
+    A file in .csv or .xlsx takes the catalogue sheet in its place: head, flow, velocities, loss, K, Kv and opening, of
+    one size or several.
+
+    dbvfiv steady cases/dbv12.toml -p "0.2 m:5 m:9:log" --scale 0.5 --scale 1 --units "ft, gpm, in" -o catalogue.csv
+    """
+    changes: dict[str, Any] = {"project.units": units}
+    if pressures or not case.meets_pump("steady"):
+        asked = _read(pressures, case.fluid.density) if pressures else case.steady_pressures()
+        changes["steady.pressures"] = list(asked)
+    if not is_sheet(output):
+        if sizes:
+            raise CaseError("--scale goes with a sheet; name one with -o, such as catalogue.csv.")
+        return Request(changes)
+    first, *others = [_scale(text, case) for text in sizes] if sizes else [None]
+    require_sheet(output)
+    return Request(
+        changes | {"valve.scale": first},
+        sheet=lambda results: write_sheet(output, [state for result in results for state in result.states]),
+        variants=tuple({"valve.scale": scale} for scale in others),
+    )
+
+
+def _scale(text: str, case: Case) -> float:
+    """Factor valve.scale of a size that is given as a factor or as the bore of its flange."""
+    given, valve = number_or_text(text), case.valve.as_given
+    try:
+        bore = 2 * (valve.inlet_radius - valve.flange_wall_deduction)
+        scale = given if isinstance(given, float) else Quantity("m", "mm").parse(given) / bore
+    except ValueError as error:
+        raise CaseError(f"--scale is given as {text!r}, {error}; it must be a factor or a bore.") from None
+    if not 1e-3 <= scale <= 1e3:
+        raise CaseError(f"--scale is given as {text!r}, {scale:.3g} times the valve; it must be within 0.001 and 1000.")
+    return scale
+
+
+def _read(texts: Iterable[str], density: float) -> Iterable[float | str]:
+    for text in texts:
+        if ":" in text:
+            yield from _range(text, density)
+        else:
+            yield number_or_text(text)
+
+
+def _range(text: str, density: float) -> tuple[float, ...]:
+    try:
+        return parse_axis(f"pressure={text}", density=density).values
+    except ValueError as error:
+        raise CaseError(
+            f"--pressure is given as {text!r}, {error}; a range is START:STOP:COUNT, with ':log' behind it for "
+            f"logarithmic steps."
+        ) from None

@@ -12,10 +12,9 @@ import time
 import numpy as np
 import pytest
 
-from dbvfiv.api import load
+from dbvfiv.api import load, resume
 from dbvfiv.errors import CaseError
 from dbvfiv.observer import Observer
-from dbvfiv.resuming import resume
 from dbvfiv.studies.case import THESIS, thesis_case
 from dbvfiv.studies.session import load_result
 from tests.small_valves import FORMER

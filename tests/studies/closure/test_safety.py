@@ -10,7 +10,7 @@ import pytest
 import dbvfiv
 from dbvfiv.studies.case import thesis_case
 from dbvfiv.studies.closure.safety import find_safety
-from dbvfiv.studies.closure.valve import film_leak
+from dbvfiv.studies.closure.walk import film_leak
 from dbvfiv.studies.session import load_result
 from tests.small_valves import FORMER
 
