@@ -15,9 +15,10 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from eigen import CoupledPencil, Relaxation, SingularShiftError, Workspace
+from eigen import SingularShiftError, Workspace
 from eigen.basis import orthonormal
-from eigen.operator import FLUID_PARTS, real_apply
+from eigen.family import DenseOperator
+from eigen.operator import real_apply
 from eigen.pairs import all_eigenvalues
 
 from ...case.parameters import PIPES, Mu
@@ -173,37 +174,18 @@ class Transfer:
 
     def _project(self, vectors: np.ndarray) -> None:
         pencil = self.pencil
-        V = orthonormal(pencil.M, vectors, WEAK)[0]
-        self._images = [matrix @ V for matrix in (pencil.M, pencil.C, pencil.K, *pencil.relaxing)]
-        self._motion = pencil.J @ V
-        M, C, K, *relaxing = (V.T @ image for image in self._images)
-        own = pencil.relaxation
-        parts = {name: getattr(pencil, name) for name in FLUID_PARTS}
-        self.reduced = CoupledPencil(
-            M,
-            C,
-            K,
-            V.T @ pencil.G.toarray(),
-            self._motion,
-            relaxation=None if own is None else Relaxation(relaxing, own.strengths, own.times),
-            **parts,
-        )
-        self._V, self._dense = V, (M, C, K, *relaxing)
-        self._small_force, self._small_lip = V.T @ self.force, self._lip @ V
-        self._small_forces = V.T @ pencil.G.toarray()
+        self._V = orthonormal(pencil.M, vectors, WEAK)[0]
+        self._images = [matrix @ self._V for matrix in (pencil.M, pencil.C, pencil.K, *pencil.relaxing)]
+        self.reduced = pencil.projected(self._V)
+        self._operator, self._motion = DenseOperator(self.reduced), self.reduced.J.toarray()
+        self._small_force, self._small_lip = self._V.T @ self.force, self._lip @ self._V
 
     def _solved(self, s: complex) -> tuple[np.ndarray, np.ndarray]:
         """Coordinates (k,) and inner unknowns (b,) of the reduced response."""
-        (M, C, K, *relaxing), own = self._dense, self.pencil.relaxation
-        A, B, R, S = self.pencil.fluid_at(s)
-        D = s * s * M + s * C + K
-        if own is not None:
-            D = D + sum(x * part for x, part in zip(own.factors(s), relaxing))
-        J, G = self._motion, self._small_forces
-        whole = np.block([[D - G @ A @ J, -G @ B], [R @ J, S]])
+        whole = self._operator(s)[0]
         scale = np.abs(whole).max(axis=1)
         x = np.linalg.solve(whole / scale[:, None], np.concatenate([self._small_force, -self.balance]) / scale)
-        return x[: len(D)], x[len(D) :]
+        return x[: self.size], x[self.size :]
 
     def _residuals(self) -> np.ndarray:
         """Norm of what the reduced response leaves of the full force, over its own, at each frequency asked."""
