@@ -31,33 +31,6 @@ class Observer:
         """The study is over."""
 
 
-class Observers(Observer):
-    """Several observers as one, told in order."""
-
-    def __init__(self, *members: Observer):
-        self.members = members
-
-    def begin(self, study, total):
-        for member in self.members:
-            member.begin(study, total)
-
-    def progress(self, text):
-        for member in self.members:
-            member.progress(text)
-
-    def item(self, result):
-        for member in self.members:
-            member.item(result)
-
-    def warn(self, sentence):
-        for member in self.members:
-            member.warn(sentence)
-
-    def end(self, interrupted):
-        for member in self.members:
-            member.end(interrupted)
-
-
 def is_watched() -> bool:
     """True where standard error is a terminal or a notebook, or read by a program that sets ``DBVFIV_BAR``."""
     return sys.stderr.isatty() or "ipykernel" in sys.modules or bool(os.environ.get("DBVFIV_BAR"))

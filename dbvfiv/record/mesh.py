@@ -92,11 +92,6 @@ class MeshData:
         """(m,) nodes in the middle of the lips and behind it, from the lip on."""
         return self.rows[:, self.part.centre(self.rows.shape[1])]
 
-    def extent(self, row: int, axis: int) -> float:
-        """Extent of the whole valve's mid-surface at rest, m, along x (0) or y (1), at a row."""
-        places = self.nodes[self.rows[row], axis]
-        return float(np.ptp([signs[axis] * places for signs in self.part.images]))
-
     @property
     def shape(self) -> tuple[int, int]:
         """Elements around and along."""

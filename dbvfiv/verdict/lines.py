@@ -114,12 +114,6 @@ def density(values: np.ndarray, step: float) -> tuple[np.ndarray, np.ndarray]:
     return power, floor
 
 
-def noise_of(values: np.ndarray, step: float) -> float:
-    """Root mean square of the noise in samples, whatever lines stand in it."""
-    _, floor = density(values, step)
-    return float(np.sqrt(floor.sum() / (len(values) * step)))
-
-
 def strongest(values: np.ndarray, step: float, low: float = 0.0, high: float = np.inf, parts: bool = True):
     """The cell of spectra of the whole and of its parts that stands highest over the noise.
 
