@@ -12,6 +12,7 @@ import types
 import typing
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from functools import cache
 from pathlib import Path
 from typing import Any, Literal
 
@@ -203,8 +204,13 @@ def describe_field(key: str, field: FieldInfo) -> KeyInfo:
     )
 
 
-def walk(model: type[Section], prefix: str = "") -> Iterator[KeyInfo]:
+@cache
+def walk(model: type[Section], prefix: str = "") -> tuple[KeyInfo, ...]:
     """Every key that a case file of this model may hold, in order; list elements and material kinds included."""
+    return tuple(_walk(model, prefix))
+
+
+def _walk(model: type[Section], prefix: str) -> Iterator[KeyInfo]:
     for name, field in model.model_fields.items():
         key = f"{prefix}{name}"
         if model is Materials and name == "named":
@@ -274,9 +280,9 @@ def explain(model: type[Section], key: str | None = None) -> list[KeyInfo]:
     CaseError
         For a key there is not, naming the nearest.
     """
-    infos = list(walk(model))
+    infos = walk(model)
     if key is None:
-        return infos
+        return list(infos)
     plain = _plain(key)
     found = [i for i in infos if _plain(i.key) == plain] or [i for i in infos if _plain(i.key).endswith("." + plain)]
     if found:
@@ -292,6 +298,7 @@ def explain(model: type[Section], key: str | None = None) -> list[KeyInfo]:
     return _unique(found)
 
 
+@cache
 def _plain(key: str) -> str:
     """Drop indices, and write ``materials.NAME(kind)`` as ``materials.kind``."""
     key = re.sub(r"\[\d*\]|\.\d+(?=\.|$)", "", key.strip())
