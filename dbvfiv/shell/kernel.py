@@ -132,7 +132,7 @@ def shell_force(
         The undeformed elements, as `dbvfiv.shell.shell.Shell` holds them.
     wall : tuple of arrays
         Linear stiffness, points, constants and shear scales, see `dbvfiv.shell.section.Section.wall`.
-    held : (ne, 4, 8) array or None
+    held : (ne, 4, 8) array, or (0, 4, 8) for none
         Resultants at each Gauss point on top of those of the layers.
     """
     inplane, across, area, thickness = reference[2:]
@@ -148,7 +148,7 @@ def shell_force(
         for point in range(4):
             strains_at(el, point, reference, z, strain)
             section_stress(stiffness, points, constants, scales, thickness[el], strain, stress, e, s)
-            if held is not None:
+            if len(held):
                 for i in range(8):
                     stress[i] += held[el, point, i]
             _add_stress(inplane[el, point], across[el, point], area[el, point], stress, w)
@@ -283,7 +283,7 @@ def shell_tangent(
 
     Parameters
     ----------
-    held : (ne, 4, 8) array or None
+    held : (ne, 4, 8) array, or (0, 4, 8) for none
         Resultants at each Gauss point on top of those of the layers; they do not change with the strains.
     geometric : bool
         False leaves out what the resultants by themselves add to the tangent: the material part remains.
@@ -314,7 +314,7 @@ def shell_tangent(
         for point in range(4):
             strains_at(el, point, reference, z, strain)
             section_tangent(stiffness, points, constants, scales, thickness[el], strain, stress, tangent, e, s, t5)
-            if held is not None:
+            if len(held):
                 for i in range(8):
                     stress[i] += held[el, point, i]
             _add_stress(inplane[el, point], across[el, point], area[el, point], stress, w)

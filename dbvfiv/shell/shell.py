@@ -27,6 +27,9 @@ from .reference import reference_geometry, shear_map, thickness_over_radius
 from .rotation import director_derivatives
 from .section import Section, WallParts, Zones
 
+#: Resultants on top of those of the layers where there are none.
+_NONE_HELD = np.zeros((0, 4, 8))
+
 
 @dataclass(frozen=True)
 class _Part:
@@ -107,7 +110,9 @@ class Shell:
         self.at_rest = section if zones is None else WallParts(section, zones)
         unstrained = mesh if self.stress_free is None else self.stress_free
         self._assumed = a = assumed_strains(unstrained, g, self.at_rest, self.element)
-        reference = (a.products, g.shear0, local_map(g) @ a.inplane, shear_map(g), g.area, g.thickness)
+        # in one order: loops are compiled for each that they meet
+        arrays = a.products, g.shear0, local_map(g) @ a.inplane, shear_map(g), g.area, g.thickness
+        reference = tuple(map(np.ascontiguousarray, arrays))
         if zones is None:
             self.parts = (_Part(slice(None), mesh.quads, reference),)
         else:
@@ -177,7 +182,7 @@ class Shell:
         """Parts of the shell, the laws of their layers and the resultants on top of those."""
         walls, held = (self.wall, None) if step is None else (step.wall, step.held)
         for part, wall in zip(self.parts, walls):
-            yield part, wall, None if held is None else held[part.elements]
+            yield part, wall, _NONE_HELD if held is None else held[part.elements]
 
     def _add_tangent(self, nodal, part, wall, held, geometric, out, data) -> None:
         fixed = (part.quads, self.mesh.nodes, nodal, *self.directors(nodal), part.reference)
@@ -216,7 +221,7 @@ class Shell:
             if self.metric == FIRST_ORDER:
                 unused = np.zeros_like(nodal)
                 for part, wall in zip(self.parts, self.wall_of(share)):
-                    self._add_tangent(nodal, part, wall, None, False, unused, data)
+                    self._add_tangent(nodal, part, wall, _NONE_HELD, False, unused, data)
             else:
                 self._scatter_matrix(np.asarray(self.energies.material_tangent(self._element_unknowns(q), share)), data)
             found.append(data)
