@@ -373,14 +373,15 @@ class LineChannel(AroundChannel):
         """Steady flow of the rigid column of fluid, with a uniform velocity in the line; with the line's own head at
         the flange where the fluid is compressed.
         """
-        p, own = self.rigid.steady(area, parameters)
         source, _ = self.channel.supply(parameters)
         if self.compressed:
 
             def drive(velocity, kinetic, driven):
                 return self.line.steady_head(velocity, self.channel.supply(driven)[0], area[-1], driven) - kinetic
 
-            p, own = self.channel.steady_from(area, parameters, own, drive, 4)
+            p, own = self.channel.steady_from(area, parameters, self.rigid.settled(area, parameters), drive, 4)
+        else:
+            p, own = self.rigid.steady(area, parameters)
         velocity = self.channel.flange(own, parameters)[0]
         pressure = self.line.steady_pressure(velocity, source, area[-1], parameters)
         return p, jnp.concatenate([own, jnp.full(self.line.size // 2, velocity), pressure])

@@ -259,10 +259,16 @@ class GasChannel(AroundChannel):
 
     def steady(self, area, parameters):
         """Searched for; nothing flows where no pressure drives it."""
+        return self.steady_from(area, parameters, self.settled(area, parameters))
+
+    def settled(self, area, parameters):
+        """Unknowns (l,) that the flow settles in; traceable, without derivatives."""
+        return _settled(*jax.lax.stop_gradient((self.without_drives(), area, self._driven_at_all(parameters))))
+
+    def _driven_at_all(self, parameters):
+        """Parameters with a pressure that drives the flow where there is none."""
         still = parameters["inlet"] == self.channel.back
-        driven = {**parameters, "inlet": jnp.where(still, self.channel.back + 1.0, parameters["inlet"])}
-        inner = _settled(*jax.lax.stop_gradient((self.without_drives(), area, driven)))
-        return self.steady_from(area, parameters, inner)
+        return {**parameters, "inlet": jnp.where(still, self.channel.back + 1.0, parameters["inlet"])}
 
     def steady_from(self, area, parameters, inner, drive=None, more: int = 0):
         """Pressures (m,) and unknowns (l,) of the steady flow next to given ones, none where no pressure drives it;
@@ -278,9 +284,10 @@ class GasChannel(AroundChannel):
             and the parameters.
         """
         own, still = self.without_drives(), parameters["inlet"] == self.channel.back
-        driven = {**parameters, "inlet": jnp.where(still, self.channel.back + 1.0, parameters["inlet"])}
-        for _ in range(more):
-            inner = jax.lax.stop_gradient(inner + _newton_step(own, area, driven, inner, drive))
+        driven = self._driven_at_all(parameters)
+        if more:  # one place of the code, which takes long to compile
+            further = lambda _, x: x + _newton_step(own, area, driven, x, drive)  # noqa: E731
+            inner = jax.lax.stop_gradient(jax.lax.fori_loop(0, more, further, inner))
         for _ in range(2):
             inner = inner + _newton_step(own, area, driven, inner, drive)
         _, sigma = self.split(inner, parameters)

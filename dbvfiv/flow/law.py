@@ -309,11 +309,11 @@ class FlowLaw(Traceable, ABC):
         """Pressures (m,), Pa, of steady flow driven by the inlet pressure, Pa; independent of the density of a fluid
         without viscosity.
         """
-        return np.asarray(_steady_pressure(self, area, self._driven(inlet)))
+        return np.asarray(_steady(self, area, self._driven(inlet))[0])
 
     def steady_operator(self, area: np.ndarray, inlet: float) -> tuple[np.ndarray, np.ndarray]:
         """Steady pressures (m,) and their derivative (m, m) with respect to the areas."""
-        pressure, slope = _steady_operator(self, area, self._driven(inlet))
+        slope, pressure = _steady_operator(self, area, self._driven(inlet))
         return np.asarray(pressure), np.asarray(slope)
 
     def steady_slope(self, area: np.ndarray, inlet: float) -> np.ndarray:
@@ -332,7 +332,7 @@ class FlowLaw(Traceable, ABC):
 
     def steady_inner(self, area: np.ndarray, given: Mapping[str, float]) -> np.ndarray:
         """Inner unknowns (l,) of the steady flow under given parameters."""
-        return np.asarray(_steady_inner(self, area, self.values(given)))
+        return np.asarray(_steady(self, area, self.values(given))[1])
 
     def inlet_velocity(self, area: np.ndarray, inlet: float, density: float) -> float:
         """Steady inlet velocity, m/s: the first inner unknown of every law with a fluid."""
@@ -424,22 +424,15 @@ def _linearised(law, motion, parameters):
 
 
 @jax.jit
-def _steady_pressure(law, area, parameters):
-    """Steady pressures (m,)."""
-    return law.steady(area, parameters)[0]
-
-
-@jax.jit
-def _steady_inner(law, area, parameters):
-    """Steady inner unknowns (l,)."""
-    return law.steady(area, parameters)[1]
+def _steady(law, area, parameters):
+    """Steady pressures (m,) and inner unknowns (l,)."""
+    return law.steady(area, parameters)
 
 
 @jax.jit
 def _steady_operator(law, area, parameters):
-    """Steady pressures (m,) and their derivative (m, m) by the areas."""
-    pressure = lambda x: law.steady(x, parameters)[0]  # noqa: E731
-    return pressure(area), jax.jacfwd(pressure)(area)
+    """Derivative (m, m) of the steady pressures by the areas, and they (m,)."""
+    return jax.jacfwd(lambda x: (law.steady(x, parameters)[0],) * 2, has_aux=True)(area)
 
 
 @jax.jit
@@ -471,23 +464,21 @@ def _newton_step(law, area, parameters, inner):
 
 def _root(law, area, parameters):
     """Inner unknowns (l,) by Newton's method, a step halved as long as it makes the next one longer."""
-    step_at = partial(_newton_step, law, area, parameters)
 
-    def better(inner, step, fraction):
-        return jnp.linalg.norm(step_at(inner + fraction * step)) <= jnp.linalg.norm(step)
-
-    def advance(carried):
-        inner, step, count = carried
-        fraction = jax.lax.while_loop(lambda f: (f > 1e-3) & ~better(inner, step, f), lambda f: 0.5 * f, jnp.ones(()))
-        inner = inner + fraction * step
-        return inner, step_at(inner), count + 1
+    def advance(carried):  # a step is evaluated at one place of the code, which takes long to compile
+        inner, step, fraction, count = carried
+        there = inner + fraction * step
+        new = _newton_step(law, area, parameters, there)
+        taken = (count < 0) | (fraction <= 1e-3) | (jnp.linalg.norm(new) <= jnp.linalg.norm(step))
+        inner, step = jnp.where(taken, there, inner), jnp.where(taken, new, step)
+        return inner, step, jnp.where(taken, 1.0, 0.5 * fraction), count + taken
 
     def goes_on(carried):
-        inner, step, count = carried
-        return (count < _STEPS) & (jnp.linalg.norm(step) > _TOLERANCE * jnp.linalg.norm(inner))
+        inner, step, _, count = carried
+        return (count < 0) | ((count < _STEPS) & (jnp.linalg.norm(step) > _TOLERANCE * jnp.linalg.norm(inner)))
 
     start = law.steady_start(area, parameters)
-    inner, step, _ = jax.lax.while_loop(goes_on, advance, (start, step_at(start), 0))
+    inner, step, *_ = jax.lax.while_loop(goes_on, advance, (start, jnp.zeros_like(start), jnp.ones(()), -1))
     found = jnp.linalg.norm(step) <= _TOLERANCE * jnp.linalg.norm(inner)
     return jnp.where(found, inner, jnp.nan)
 
