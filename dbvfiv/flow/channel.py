@@ -8,6 +8,10 @@ program (App. A). U is the inlet velocity. Continuity is blended between two law
 moving walls. Terms add losses and inertances: see `dbvfiv.flow.term`. The thesis leaves gravity out; here `levels` has
 what it does to a valve that stands upright.
 
+Where faces in contact shut the passage, nothing leaves: the fluid in front of the seal is still but for what the wall
+displaces there, which comes from the inlet; see `Channel.shut`. Its pressures at rest are those of equilibria, which fall
+to nothing where the faces lie on each other and follow them.
+
 Equations (T.9), (T.10), (T.11) and (T.31) of docs/theory.md.
 """
 
@@ -60,9 +64,11 @@ class Channel(FlowLaw):
         without viscosity do not go with the square of the speeds and the speeds.
     """
 
-    DATA = ("step", "floor", "terms", "back", "static", "perimeter")
-    STATIC = ("unsteady", "reversible", "bowed")
+    DATA = ("step", "floor", "terms", "back", "static", "perimeter", "front")
+    STATIC = ("unsteady", "reversible", "bowed", "sealed")
     inner_names = ("inlet velocity",)
+    front = 1.0
+    sealed = False
 
     def __init__(
         self,
@@ -147,13 +153,15 @@ class Channel(FlowLaw):
     def speeds(self, area, area_rate, velocity, storage):
         """Speeds (m,) at the stations; traceable."""
         open_, opening = jax.jvp(lambda a: above_floor(a, self.floor), (area,), (area_rate,))
-        discharge = open_[-1] * velocity - storage * upstream_integral(self.step, opening)
-        return discharge / open_
+        if self.sealed:
+            velocity = self.displaced(area, area_rate, storage)
+        speeds = (open_[-1] * velocity - storage * upstream_integral(self.step, opening)) / open_
+        return jnp.where(self._spans[0] > 0, speeds, 0.0) if self.sealed else speeds
 
     def heads(self, area, area_rate, inner, parameters):
         """Heads (m,) from the inlet to each station, m2/s2: Bernoulli's and those of the terms; traceable."""
         speed = self.speeds(area, area_rate, inner[0], self._blend(parameters))
-        head = (reversible_head if self.reversible else outward_head)(speed, inner[0])
+        head = (reversible_head if self.reversible and not self.sealed else outward_head)(speed, inner[0])
         if self.terms:
             head = head + self.term_heads(self.stream(area, area_rate, speed, inner), parameters)
         return head
@@ -163,8 +171,12 @@ class Channel(FlowLaw):
         inlet, and what the terms add; traceable.
         """
         speed = self.speeds(area, area_rate, inner[0], self._blend(parameters))
-        psi = upstream_integral(self.step, speed)
-        if self.bowed:
+        if self.sealed:
+            before, spans = self._spans
+            psi = jnp.cumsum((spans * speed)[::-1])[::-1] - (spans - before) * speed
+        else:
+            psi = upstream_integral(self.step, speed)
+        if self.bowed and not self.sealed:
             psi = psi + wall_share(self.step, speed)
         if self.terms:
             psi = psi + self.term_momenta(self.stream(area, area_rate, speed, inner), parameters)
@@ -185,14 +197,19 @@ class Channel(FlowLaw):
 
     def sources(self, area, area_rate, inner, parameters, drive=None):
         """Heads (m + 1,), m2/s2, as `FlowLaw.sources` has them; `drive` is the static one at the flange over `back`."""
-        if drive is None:
-            source, back = self.supply(parameters)
-            drive = source - back
-        head = drive - self.heads(area, area_rate, inner, parameters)
+        source, back = self.supply(parameters)
+        head = (source - back if drive is None else drive) - self.heads(area, area_rate, inner, parameters)
+        if self.sealed:
+            still = self.steady(area, parameters)[0] / parameters["density"]
+            return jnp.append(still + self.front * (head - source + back), 0.0)
         return self._outlet_behind(head + self.static / parameters["density"])
 
     def held(self, area, area_rate, inner, parameters):
-        return -self._outlet_behind(self.psi(area, area_rate, inner, parameters))
+        psi = self.psi(area, area_rate, inner, parameters)
+        if self.sealed:
+            past = inner[0] - self.displaced(area, area_rate, self._blend(parameters))
+            return -jnp.append(self.front * psi, past)
+        return -self._outlet_behind(psi)
 
     def scales(self, area, parameters):
         return jnp.full(self.count + 1, parameters["density"])
@@ -218,7 +235,7 @@ class Channel(FlowLaw):
     @property
     def drive_share(self):
         """Derivative (m + 1,) of `sources` by the enthalpy at the flange."""
-        return self._outlet_behind(jnp.ones(self.count))
+        return jnp.append(self.front, 0.0) if self.sealed else self._outlet_behind(jnp.ones(self.count))
 
     def speeds_of(self, area, area_rate, inner, parameters):
         return self.speeds(area, area_rate, inner[0], self._blend(parameters))
@@ -255,39 +272,44 @@ class Channel(FlowLaw):
         speed = jnp.sqrt(2.0 * inlet / (parameters["density"] * jnp.where(ratio > 0, ratio, 1.0)))
         return pressure, jnp.where(ratio > 0, speed, jnp.inf)[None]
 
-    def shut_pressures(self, area: np.ndarray, given, seal: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Derivatives (m, m) of the pressures by rates and accelerations of the areas about still fluid that ends at a
-        shut station, and the lengths (m,), m, over which pressures do work on areas.
+    # -- still fluid in front of a seal
+    # ----
 
-        Nothing leaves there, so what the wall displaces between it and a station comes from the inlet; in the sections
-        from there to the outlet the faces lie on each other. With the discharges Q_k = sum_j S_kj dA_j/dt by trapezoids
-        the kinetic energy is rho/2 sum_k l_k Q_k^2/A_k, and pressures follow from it, so that they feed no motion.
+    def shut(self, seal: int | None) -> Channel:
+        if seal is None:
+            return self
+        return self.changed(sealed=True, front=(np.arange(self.count) >= seal).astype(float))
+
+    @property
+    def _spans(self):
+        """Halves (m,) of the lengths before the stations, from the seal on, and what stands at each, m."""
+        half = 0.5 * self.step * self.front[:-1]
+        before = jnp.append(0.0, half)
+        return before, jnp.append(half, 0.0) + before
+
+    def displaced(self, area, area_rate, storage):
+        """Inlet velocity, m/s, of what the wall displaces in front of the seal; traceable."""
+        open_, opening = jax.jvp(lambda a: above_floor(a, self.floor), (area,), (area_rate,))
+        return storage * jnp.sum(self._spans[1] * opening) / open_[-1]
+
+    def work_lengths(self, area: np.ndarray) -> np.ndarray:
+        """Lengths (m,), m, over which pressures of moving fluid in front of the seal do work on areas (m,).
+
+        With the discharges Q_k that the wall displaces, by trapezoids, the kinetic energy is rho/2 sum_k l_k Q_k^2/A_k,
+        and pressures follow from it, so that they feed no motion.
         """
-        parameters, count, blend = self.values(given), self.count, float(self._blend(self.values(given)))
-        half = 0.5 * self.step * (np.arange(count - 1) >= seal)
-        before = np.insert(half, 0, 0.0)
-        spans = np.append(half, 0.0) + before
-        opening = jax.jvp(lambda a: above_floor(a, self.floor), (jnp.asarray(area),), (jnp.ones(count),))
-        open_, slope = (np.asarray(part) for part in opening)
-        lengths = spans * slope
-        sums = np.tril(np.tile(lengths, (count, 1)), -1) + np.diag(before * slope)
+        return np.asarray(self._spans[1]) * np.asarray(jax.grad(lambda a: above_floor(a, self.floor).sum())(area))
 
-        def stream(rate):
-            speed = blend * jnp.asarray(sums) @ rate / open_
-            return self.stream(area, rate, speed, speed[-1:])
-
-        def work(function, *of):
-            found = jax.jacfwd(lambda rate: function(stream(rate), parameters, *of))(jnp.zeros(count))
-            return lengths[:, None] * np.asarray(found)
-
-        momenta = work(self.term_momenta)
-        inertia = blend * sums.T @ ((spans / open_)[:, None] * sums) + 0.5 * (momenta + momenta.T)
-        over = -parameters["density"] / np.where(lengths > 0, lengths, np.inf)[:, None]
-        return over * work(self.term_heads, self.losses), over * inertia, lengths
+    def with_displaced(self, area, area_rate, inner):
+        if not self.sealed:
+            return inner
+        found = np.array(inner, float)
+        found[0] = self.displaced(jnp.asarray(area), jnp.asarray(area_rate), self.storage if self.unsteady else 0.0)
+        return found
 
     def without_drives(self) -> Channel:
         """Copy of the channel with only those terms that act on steady flow."""
-        return self.changed(terms=self.losses)
+        return self.changed(terms=self.losses, sealed=False)
 
     def with_velocity(self, inner, velocity):
         return np.array([velocity])

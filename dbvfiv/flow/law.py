@@ -168,6 +168,8 @@ class FlowLaw(Traceable, ABC):
         Distances of the stations, m, where the fluid between them has momentum.
     book_names, energy_names : tuples of str
         What time steps keep of the fluid's energy: what became of it, and what it holds; see `step_books`.
+    sealed : bool
+        Whether this is the law of still fluid in front of a seal; see `shut`.
     """
 
     inner_names: ClassVar[tuple[str, ...]] = ()
@@ -182,6 +184,7 @@ class FlowLaw(Traceable, ABC):
     step: Any = 0.0
     book_names: tuple[str, ...] = ()
     energy_names: tuple[str, ...] = ()
+    sealed: bool = False
 
     @property
     @abstractmethod
@@ -236,6 +239,27 @@ class FlowLaw(Traceable, ABC):
     def steady(self, area, parameters: Mapping[str, Any]) -> tuple[Any, Any]:
         """Pressures (m,) and inner unknowns (l,) of the steady flow; traceable. Not numbers where there is none."""
         return solve_steady(self, area, parameters)
+
+    # -- a passage that faces in contact shut
+    # ----
+
+    def shut(self, seal: int | None) -> FlowLaw:
+        """The law of fluid that is still but for what the wall displaces in front of a seal, the last of the stations
+        from the outlet on that faces shut; the law itself where there is none, or where it knows no such fluid.
+
+        Its last balance is the discharge past the seal, whose rate vanishes.
+        """
+        return self
+
+    def work_lengths(self, area: np.ndarray) -> np.ndarray:
+        """Lengths (m,), m, over which pressures that moving fluid adds to those at rest in front of a seal do work on
+        areas (m,), m2.
+        """
+        raise NotImplementedError(f"{type(self).__name__} has no still fluid in front of a seal.")
+
+    def with_displaced(self, area: np.ndarray, area_rate: np.ndarray, inner: np.ndarray) -> np.ndarray:
+        """Unknowns (l,) with the inlet velocity of what the wall displaces in front of a seal."""
+        return inner
 
     # -- steps in time, see `dbvfiv.flow.stepping`
     # ----

@@ -18,12 +18,27 @@ The law's unknowns are eliminated in each evaluation: the wall sees pressures an
 inlet velocity is the only one, the root taken is that next to the last one in the direction in which it misses the
 outlet's pressure; a flow drawn in loses the head of its jets, see `dbvfiv.flow.channel.reversible_head`.
 
+A passage that faces shut at the start of a step has the law of still fluid in front of a seal in that step. Where they
+part in it, the fluid begins to flow from rest: its pressure, in the film between the faces that of equilibria before,
+then falls evenly along the film until it flows. Where they meet, the film passes what has momentum until it is no more
+than a steady flow would be, which ends there, as it carries nothing in equilibria.
+
+The law's unknowns are eliminated in each evaluation: the wall sees pressures and their derivatives by areas. Where the
+inlet velocity is the only one, the root taken is that next to the last one in the direction in which it misses the
+outlet's pressure; a flow drawn in loses the head of its jets, see `dbvfiv.flow.channel.reversible_head`.
+
+A passage that faces shut at the start of a step has the law of still fluid in front of a seal in that step. Where they
+part in it, the next one begins with the film that rough faces leave in steady flow, as equilibria have it; where they
+meet, that flow ends. Pressures change little by either, and what a fluid of that momentum would push with is left out.
+
 Equations (T.9), (T.13), (T.23) and (T.24) of docs/theory.md.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from collections.abc import Callable
+from copy import copy
+from dataclasses import dataclass, fields, replace
 from functools import partial
 
 import jax
@@ -129,6 +144,9 @@ class Flow:
         That found it; without one the state is that of the flow, all rates zero.
     passage : pair of (m,) arrays, optional
         Areas and their rates where the equations are met.
+    still : pair of (m,) arrays, optional
+        Pressures of fluid at rest in front of a seal, and the lengths, m, over which what moves there adds to them does
+        work on the areas.
     force : (n,) array
         G p, the wall's part to find.
     """
@@ -142,6 +160,7 @@ class Flow:
     held: np.ndarray
     step: FluidStep | None = None
     passage: tuple | None = None
+    still: tuple | None = None
     force: np.ndarray | None = None
 
     def slopes(self, velocity: float) -> np.ndarray:
@@ -160,6 +179,8 @@ class MovingFluid:
     ----------
     law : FlowLaw
     density : float, kg/m3
+    seal : callable, optional
+        Last station, from the outlet on, that faces shut in a passage of areas (m,), or None.
 
     Attributes
     ----------
@@ -169,9 +190,39 @@ class MovingFluid:
 
     moves = True
 
-    def __init__(self, law: FlowLaw, density: float):
-        self.law, self.density = law, float(density)
+    def __init__(self, law: FlowLaw, density: float, seal: Callable[[np.ndarray], int | None] = lambda area: None):
+        self.law, self.density, self._seal = law, float(density), seal
         self.traced = jax.device_put(law.reversed())
+        self._behind: dict[int | None, MovingFluid] = {None: self}
+
+    def facing(self, area: np.ndarray, speed: np.ndarray, inlet: float) -> MovingFluid:
+        """The fluid of a step from areas and speeds (m,) under an inlet pressure, Pa: this one, or still in front of a
+        seal.
+        """
+        seal, open_ = self._seal(area), self._behind[None]
+        if seal not in self._behind:
+            law = open_.law.shut(seal)
+            self._behind[seal] = open_ if law is open_.law else open_._with(law)
+        if self._behind[seal] is open_ or speed[seal] == 0.0:
+            return self._behind[seal]
+        passing = abs(speed) * open_.law.open_area(area)
+        film = open_.steady_inner(area, inlet)[0] * open_.law.open_area(area)[-1]
+        return self._behind[seal if passing[seal] <= film else None]
+
+    def _with(self, law: FlowLaw) -> MovingFluid:
+        made = copy(self)
+        made.law, made.traced = law, jax.device_put(law.reversed())
+        return made
+
+    @staticmethod
+    def jets(at: FluidState | Flow) -> np.ndarray:
+        """Speeds (m,) of a flow through the passage; none in front of a seal, where nothing leaves."""
+        return at.speed if at.speed[0] else np.zeros_like(at.speed)
+
+    def still(self, area: np.ndarray, inlet: float) -> tuple | None:
+        """See `Flow.still`."""
+        law = self.law
+        return (law.steady_pressure(area, inlet), law.work_lengths(area)) if law.sealed else None
 
     @property
     def compressed(self) -> bool:
@@ -188,18 +239,18 @@ class MovingFluid:
         return self.law.values({"inlet": inlet, "density": self.density})
 
     def momenta(self, speed: np.ndarray) -> np.ndarray:
-        """Momentum per density and area of the fluid between stations (m - 1,), m2/s."""
-        return 0.5 * self.law.step * (speed[1:] + speed[:-1])
+        """Momentum per density and area of a flow between stations (m - 1,), m2/s."""
+        return np.zeros(len(speed) - 1) if self.law.sealed else 0.5 * self.law.step * (speed[1:] + speed[:-1])
 
     def step(self, old: FluidState, passage: tuple, h: float, theta: float, rate: float, inlet: float) -> FluidStep:
         """A step of length h, s, from a state in a passage of areas and rates, with the inlet pressure, Pa, at its
         share theta, and the weight of new rates there.
         """
-        return FluidStep(self, old, h, theta, rate, inlet)
+        return FluidStep(self.facing(old.area, old.speed, inlet), old, h, theta, rate, inlet)
 
     def instant(self, state: FluidState, inlet: float) -> FluidInstant:
         """A step of no length at a state."""
-        return FluidInstant(self, state, inlet)
+        return FluidInstant(self.facing(state.area, state.speed, inlet), state, inlet)
 
     def steady_inner(self, area: np.ndarray, inlet: float) -> np.ndarray:
         """Unknowns (l,) of a steady flow; those of a fluid at rest without pressure where there is none."""
@@ -221,7 +272,7 @@ class MovingFluid:
         """State with unknowns (l,) in a passage of areas and rates (m,) that accelerates so (m,), m2/s2, with the rates
         that the equations ask for.
         """
-        inner, m = np.asarray(inner, float), self.law.count
+        inner, m = self.law.with_displaced(*passage, np.asarray(inner, float)), self.law.count
         sources, by_area, by_rate, by_inner = self.operators(*passage, inner, inlet)
         known = sources + by_area @ passage[1] + by_rate @ acceleration
         inner_rate = np.linalg.lstsq(by_inner[m:], -known[m:], rcond=None)[0]
@@ -266,7 +317,7 @@ class FluidStep:
             inner, pressure, held, speed = map(np.array, _advanced(law, *given, self.old.inner))
         if np.isfinite(inner[0]):
             self._start = inner
-        return Flow(self.inlet, pressure, *new, speed, inner, held, self, mid)
+        return Flow(self.inlet, pressure, *new, speed, inner, held, self, mid, self.fluid.still(mid[0], self.inlet))
 
     def slopes(self, flow: Flow, velocity: float) -> np.ndarray:
         """See `Flow.slopes`."""
@@ -274,16 +325,21 @@ class FluidStep:
         return np.array(_slopes(self.fluid.traced, *given, flow.inner, velocity))
 
     def state(self, flow: Flow) -> FluidState:
-        """State that the step ends with."""
-        old, rate = self.old, (flow.held - self.old.held) / self.h
-        turning = self.fluid.momenta(flow.speed - old.speed) / self.h
+        """State that the step ends with, for the fluid that the new passage has."""
+        old, fluid, rate = self.old, self.fluid, (flow.held - self.old.held) / self.h
+        turning = fluid.momenta(fluid.jets(flow) - fluid.jets(old)) / self.h
         new = flow.inner, flow.held, rate, flow.area, flow.area_rate, flow.speed, turning
-        if not self.fluid.law.book_names:
-            return FluidState(*new, old.carried, old.books)
-        end = Instant(flow.area, flow.area_rate, flow.inner, flow.held, rate, old.carried)
-        step = BookStep(old.instant, end, self.h, self.theta, self.rate)
-        books, carried = _books(self.fluid.traced, self.parameters, step)
-        return FluidState(*new, np.asarray(carried), old.books + np.asarray(books))
+        carried, books = old.carried, old.books
+        if fluid.law.book_names:
+            end = Instant(flow.area, flow.area_rate, flow.inner, flow.held, rate, old.carried)
+            step = BookStep(old.instant, end, self.h, self.theta, self.rate)
+            gained, carried = map(np.asarray, _books(fluid.traced, self.parameters, step))
+            books = books + gained
+        after = fluid.facing(flow.area, flow.speed, self.inlet)
+        if after is fluid:
+            return FluidState(*new, carried, books)
+        passage, acceleration = (flow.area, flow.area_rate), (flow.area_rate - old.area_rate) / self.h
+        return replace(after.moving(passage, acceleration, flow.inner, self.inlet), books=books)
 
 
 class FluidInstant:
@@ -296,7 +352,8 @@ class FluidInstant:
         """The flow in the passage (areas, rates) of the state."""
         state, given = self._state, (self.parameters, mid, new, self._state.inner, 1.0, 0.0, self._state.rate)
         pressure = np.array(_pressures(self.fluid.traced, *given, state.inner))
-        return Flow(self.inlet, pressure, *new, state.speed, state.inner, state.held, self, mid)
+        still = self.fluid.still(mid[0], self.inlet)
+        return Flow(self.inlet, pressure, *new, state.speed, state.inner, state.held, self, mid, still)
 
     def state(self, flow: Flow) -> FluidState:
         """The state."""
@@ -309,7 +366,7 @@ class SteadyFluid(MovingFluid):
     moves = False
 
     def __init__(self, law: FlowLaw, density: float):
-        self.law, self.density = law, float(density)
+        self.law, self.density, self._seal, self._behind = law, float(density), lambda area: None, {None: self}
 
     compressed = False
 
@@ -359,7 +416,7 @@ class FrozenFluid(MovingFluid):
     moves = False
 
     def step(self, old, passage, h, theta, rate, inlet) -> FrozenStep:
-        return FrozenStep(FluidStep(self, old, h, 1.0, 1.0, inlet), passage)
+        return FrozenStep(FluidStep(self.facing(old.area, old.speed, inlet), old, h, 1.0, 1.0, inlet), passage)
 
 
 class FrozenStep:
@@ -371,7 +428,7 @@ class FrozenStep:
     def at(self, mid: tuple, new: tuple) -> Flow:
         """The flow, whatever the passage."""
         found = self._flow
-        return Flow(found.inlet, found.pressure, *new, found.speed, found.inner, found.held, self, mid)
+        return replace(found, area=new[0], area_rate=new[1], step=self, passage=mid)
 
     def slopes(self, flow: Flow, velocity: float) -> np.ndarray:
         """None."""

@@ -78,13 +78,16 @@ class LinearisedState:
         return self.model.seal(self.area)
 
     def shut_parts(self, density: float, storage: float | None, line: Mapping[str, float]) -> dict[str, np.ndarray]:
-        """A0 to S1 of the still fluid in front of a seal, whose front and pressures stay where they are."""
-        flow = self.model.flow
+        """A0 to S1 of the still fluid in front of a seal, behind the rigid column of a line."""
         given = {"inlet": self.inlet, "density": density, **line} | ({} if storage is None else {"storage": storage})
-        parts = self.no_flow(flow.inner)
-        if flow.unsteady:
-            parts["A1"], parts["A2"], _ = still_channel(flow).shut_pressures(self.area, given, self.seal)
-        parts["S0"] = np.eye(flow.inner)
+        law = still_channel(self.model.flow).shut(self.seal)
+        found = law.linearise(FlowMotion.still(self.area, np.zeros(law.inner)), given)
+        own = found.parts() | {"R0": found.R1, "R1": found.R2, "S0": found.S1}  # nothing passes the seal at any time
+        parts = self.no_flow(self.model.flow.inner)
+        parts["S0"] = np.eye(self.model.flow.inner)
+        for name in ("A0", "A1", "A2", "B0", "B1", "R0", "R1", "S0"):
+            rows, columns = own[name].shape
+            parts[name][:rows, :columns] = own[name]
         return parts
 
     def fluid_parts(self, density: float, storage: float | None = None, line: Mapping[str, float] = {}):
@@ -165,9 +168,9 @@ class LinearisedState:
 
     def flow_parts(self, density: float, storage: float | None = None, line: dict | None = None) -> dict:
         """A0 to S1 of the flow alone at a density; of a steady flow A0 is all."""
-        if self.seal is not None:
-            return self.shut_parts(density, storage, line or {})
         moving = self.model.flow.unsteady
+        if self.seal is not None and moving:
+            return self.shut_parts(density, storage, line or {})
         return self.no_flow() | (self.fluid_parts(density, storage, line or {}) if moving else self.steady_parts())
 
     def no_flow(self, inner: int = 0) -> dict:
@@ -228,7 +231,7 @@ def linearise(
     if seal is not None:
         stiffness = without_circulation(model, area, stiffness)
         if model.flow.unsteady:  # pressures do work on the areas
-            *_, lengths = still_channel(model.flow).shut_pressures(area, {"inlet": inlet, "density": 1.0}, seal)
+            lengths = still_channel(model.flow).shut(seal).work_lengths(area)
             forces = (slope.T @ sp.diags(lengths)).tocsr()
     if added is None and model.outside is not None:
         added = model.outside.added_mass(q, structure)

@@ -54,8 +54,10 @@ class ValveMotion:
         branches = model.relaxation.branches(self.mu.loss_factor)
         self.wall = WallMemory(model.shell, branches.strengths, branches.times) if branches else None
         density = self.mu.density
-        kind = SteadyFluid if not model.flow.unsteady else FrozenFluid if staggered else MovingFluid
-        self.fluid = kind(model.flow, density)
+        if not model.flow.unsteady:
+            self.fluid = SteadyFluid(model.flow, density)
+        else:
+            self.fluid = (FrozenFluid if staggered else MovingFluid)(model.flow, density, model.seal)
         self.size = model.size
         self.resolution = float(np.finfo(float).eps * np.abs(model.shell.mesh.nodes).max())
         self.stations = model.stations
@@ -109,8 +111,21 @@ class ValveMotion:
         new = self._passage(nodal if q_new is q else self.model.nodal(q_new), v_new)
         mid = new if q_new is q else self._passage(nodal, v)
         load = step.at(mid, new)
-        load.force = self.model.pressure_force(nodal, load.pressure)
+        load.force = self._force(nodal, load.pressure, load.still)
         return load
+
+    def _force(self, nodal: np.ndarray, pressure: np.ndarray, still: tuple | None) -> np.ndarray:
+        """Force (n,) of pressures (m,) on the wall; what moving fluid adds in front of a seal acts on the areas."""
+        if still is None:
+            return self.model.pressure_force(nodal, pressure)
+        at_rest, lengths = still
+        added = self.model.rows.jacobian(nodal).T @ (lengths * (pressure - at_rest))
+        return self.model.pressure_force(nodal, at_rest) + added
+
+    def _forces(self, nodal: np.ndarray, still: tuple | None) -> np.ndarray:
+        """Derivatives of that force by the pressures, as values of G."""
+        model = self.model
+        return (model.station_forces(nodal) if still is None else model.forces_on_areas(nodal, still[1])).data
 
     def _passage(self, nodal: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Areas (m,) and their rates (m,)."""
@@ -168,8 +183,9 @@ class ValveMotion:
         values += weights.inertia * model.mass(q)
         if contact is not None:
             contact[0].add_tangent(q_new, values, contact[1])
-        values = model.follower_stiffness(nodal, weights.load * weights.theta * load.pressure, values)
-        forces = weights.load * model.station_forces(nodal).data
+        pressure = load.pressure if load.still is None else load.still[0]
+        values = model.follower_stiffness(nodal, weights.load * weights.theta * pressure, values)
+        forces = weights.load * self._forces(nodal, load.still)
         slope = model.rows.jacobian(nodal).data
         by_area = load.slopes(weights.velocity)
         self._solver(0).refactor(values, forces, slope, by_area)
@@ -246,24 +262,29 @@ class ValveMotion:
         forces = self.internal_force(q, wall) + beta * self.force_rate(q, v) + self.inertia(q, v, alpha * v)
         forces += model.contact_force(q)
         inner = self.still_fluid() if inner is None else np.asarray(inner, float)
-        coupled = model.mass(q), model.station_forces(nodal).data, model.rows.jacobian(nodal).data
         passage, m = self._passage(nodal, v), self.stations
+        fluid = self.fluid
+        if self.model.flow.unsteady:
+            fluid = fluid.facing(passage[0], fluid.speeds(*passage, inner), inlet)
+        still = fluid.still(passage[0], inlet)
+        coupled = model.mass(q), self._forces(nodal, still), model.rows.jacobian(nodal).data
         if not self.model.flow.unsteady:
-            load = self.load(q, v, q, v, self.fluid.instant(None, inlet))
+            load = self.load(q, v, q, v, fluid.instant(None, inlet))
             self._solver(0).refactor(*coupled, np.zeros((m, m)))
             self._add_outside(1.0)
             return self.solve(load.force - forces), load
-        sources, by_area, by_rate, by_inner = self.fluid.operators(*passage, inner, inlet)
+        inner = fluid.law.with_displaced(*passage, inner)
+        sources, by_area, by_rate, by_inner = fluid.operators(*passage, inner, inlet)
         bend = model.rows.second(model.nodal(v), model.nodal(v))
         known = sources + by_area @ passage[1] + by_rate @ bend
         apart = (np.zeros((m, m)),) if self.fluid.compressed else _blocks(by_rate, by_inner)
         self._solver(0 if self.fluid.compressed else len(inner)).refactor(*coupled, *apart)
         self._add_outside(1.0)
-        pressure = model.pressure_force(nodal, known[:m])
+        pressure = self._force(nodal, known[:m], still)
         a, _ = self._solve(pressure - forces, -known[m:][: self._factor.inner])
         acceleration = bend + model.rows.second(self._position(nodal), model.nodal(a))
-        state = self.fluid.moving(passage, acceleration, inner, inlet)
-        return a, self.load(q, v, q, v, self.fluid.instant(state, inlet))
+        state = fluid.moving(passage, acceleration, inner, inlet)
+        return a, self.load(q, v, q, v, fluid.instant(state, inlet))
 
     def _position(self, nodal):
         out = nodal.copy()

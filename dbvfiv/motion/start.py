@@ -74,7 +74,10 @@ def steady_fluid(motion: ValveMotion, q: np.ndarray, inlet: float, velocity: flo
     model = motion.model
     if inlet <= model.flow.back if velocity is None else not velocity:
         return None
-    inner = motion.fluid.steady_inner(model.rows.areas(model.nodal(q)), inlet)
+    area = model.rows.areas(model.nodal(q))
+    inner = motion.fluid.steady_inner(area, inlet)
+    if velocity is None and model.seal(area) is not None:
+        velocity = 0.0
     return inner if velocity is None else model.flow.with_velocity(inner, velocity)
 
 

@@ -140,7 +140,7 @@ class Stepper:
         StepFailure
         """
         before = (self.residuals, self.solves, self.factorisations)
-        speeds = state.fluid.speed
+        speeds = self.motion.fluid.jets(state.fluid)
         outward, momenta = _outward(speeds), self.motion.fluid.momenta(speeds)
         scheme = self.scheme if outward else self._inward
         for robust in (not (outward and self._smooth(state, momenta, h)), True):
@@ -180,8 +180,9 @@ class Stepper:
 
         Otherwise the fluid's equations are better met at the end of the step.
         """
-        new = self.motion.fluid.momenta(trial.load.speed)
-        return bool(np.clip(old - new, 0.0, old).sum() <= 0.5 * old.sum()) and _outward(trial.load.speed)
+        speeds = self.motion.fluid.jets(trial.load)
+        new = self.motion.fluid.momenta(speeds)
+        return bool(np.clip(old - new, 0.0, old).sum() <= 0.5 * old.sum()) and _outward(speeds)
 
     def _works(self, trial: Trial) -> tuple[float, float]:
         """Work of the pressure and dissipation of a step, by the scheme's own weights."""

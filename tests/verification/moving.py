@@ -27,6 +27,9 @@ class Drive:
     def momenta(self, speed):
         return NONE
 
+    def jets(self, at):
+        return at.speed
+
     def state(self, flow) -> FluidState:
         return FluidState(*9 * (NONE,))
 
