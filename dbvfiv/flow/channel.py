@@ -9,8 +9,8 @@ moving walls. Terms add losses and inertances: see `dbvfiv.flow.term`. The thesi
 what it does to a valve that stands upright.
 
 Where faces in contact shut the passage, nothing leaves: the fluid in front of the seal is still but for what the wall
-displaces there, which comes from the inlet; see `Channel.shut`. Its pressures at rest are those of equilibria, which fall
-to nothing where the faces lie on each other and follow them.
+displaces there, which comes from the inlet; see `Channel.shut`. Its pressures at rest are those of equilibria, which
+fall to nothing where the faces lie on each other, and follow them.
 
 Equations (T.9), (T.10), (T.11) and (T.31) of docs/theory.md.
 """
@@ -163,7 +163,8 @@ class Channel(FlowLaw):
         speed = self.speeds(area, area_rate, inner[0], self._blend(parameters))
         head = (reversible_head if self.reversible and not self.sealed else outward_head)(speed, inner[0])
         if self.terms:
-            head = head + self.term_heads(self.stream(area, area_rate, speed, inner), parameters)
+            terms = [term for term in self.terms if not (self.sealed and term.behind_throat)]
+            head = head + self.term_heads(self.stream(area, area_rate, speed, inner), parameters, terms)
         return head
 
     def psi(self, area, area_rate, inner, parameters):

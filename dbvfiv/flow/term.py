@@ -55,10 +55,13 @@ class FlowTerm(Traceable):
         pump: it vanishes in steady flow, then, and need not go with the square of the speeds.
     viscous : bool
         Whether its head depends on the Reynolds number; equilibria depend on the density of the fluid then.
+    behind_throat : bool
+        Whether its head is lost behind the narrowest section, where nothing flows if that is shut.
     """
 
     drives: ClassVar[bool] = False
     viscous: ClassVar[bool] = False
+    behind_throat: ClassVar[bool] = False
 
     @property
     def parameters(self) -> tuple[FlowParameter, ...]:

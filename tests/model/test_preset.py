@@ -412,12 +412,14 @@ def test_energy_closes_on_a_smooth_run_through_cracking(tmp_path):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("rise", [0.4, 1e-4])
-def test_a_bill_opens_by_a_slow_and_a_sudden_head_and_is_closed_after_it(tmp_path, rise):
-    """It opens above its cracking pressure and not before, further by a blow, and shuts again without chatter."""
+@pytest.mark.parametrize("rise, step, duration", [(0.4, 2.5e-3, 4.0), (1e-4, 5e-4, 1.6)])
+def test_a_bill_opens_by_a_slow_and_a_sudden_head_and_is_closed_after_it(tmp_path, rise, step, duration):
+    """It opens above its cracking pressure and not before, and shuts again without chatter. A blow fills the bill first
+    and throws its lips apart then, which steps of 2.5 ms do not resolve: 14 mm in place of 4.
+    """
     table = tmp_path / "head.csv"
     table.write_text(f"time [s], pressure [Pa]\n0, 300\n{rise}, 2200\n0.6, 2200\n{0.6 + 0.5 * rise}, 300\n")
-    keys = {"transient.start": "steady", "transient.duration": 4.0, "transient.step": 2.5e-3, "damping.alpha": 5.0}
+    keys = {"transient.start": "steady", "transient.duration": duration, "transient.step": step, "damping.alpha": 5.0}
     keys |= {"damping.beta": 1e-3, "transient.drive_table": str(table), "valve.sealing_pressure": PRESSURE}
     run = Runner(ValveModel(thesis_case(COARSE | keys))).start()
     h = run.history
@@ -441,9 +443,13 @@ def test_a_sealed_bill_is_closed_in_time_and_moves_no_further(law):
     assert np.ptp(result.history["lip_displacement"]) < 1e-7
 
 
-def test_a_sealed_bill_opens_behind_a_pump_and_chatters_quasi_steady():
-    """A pump that gives less than the smallest opening takes."""
-    keys = {"upstream.length": "20 m", "upstream.pump": [[0.0, 0.5], [5e-4, 0.3], [4e-3, 0.0]]}
-    keys |= {"fluid.continuity": "quasi-steady", "transient.duration": 0.2, "valve.sealing_pressure": 1.5e3}
-    found = load(thesis_case(COARSE | keys)).transient()
-    assert found.summary()["verdict"] == "chatters", found.summary()
+@pytest.mark.slow
+def test_a_bill_chatters_behind_a_pump_that_gives_less_than_the_smallest_opening_takes():
+    """From rest: the fluid in front of the seal is still until the faces part, which then meet again and again."""
+    keys = {"upstream.pump": [[0.0, 0.5], [5e-4, 0.3], [4e-3, 0.0]], "fluid.continuity": "quasi-steady"}
+    keys |= {"outside.fluid": "none", "outside.pipe_diameter": None, "transient.duration": 0.2}
+    run = load(load_case(CASES / "dbv12-moulded.toml").replace(COARSE | keys)).transient()
+    found, flow = run.summary(), run.history["mass_flow"]
+    assert found["verdict"] == "chatters" and found["decided"]
+    assert found["chatter"]["shuttings"] > 10 and found["chatter"]["impact_speed"] > 0.1
+    assert not flow[:3].any() and flow.max() > 0.3

@@ -28,6 +28,7 @@ class Separation(FlowTerm):
     """
 
     DATA = ("share",)
+    behind_throat = True
 
     def __init__(self, share: float):
         self.share = float(share)
