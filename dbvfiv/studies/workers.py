@@ -176,7 +176,7 @@ class Workers:
                     yield task, work
                     continue
                 try:
-                    running[self._pool.submit(_do, self._context, work)] = task
+                    running[self._pool.submit(_do, self._sent, work)] = task
                 except BrokenExecutor:
                     queue.insert(0, task)
                     break
@@ -205,6 +205,11 @@ class Workers:
             return len(self._cluster.scheduler_info(n_workers=-1)["workers"]) + 1
         return max(self.count if isinstance(self.count, int) else 1, mpi_size() - 1) + 1
 
+    @property
+    def _sent(self) -> bytes | None:
+        """Context that goes with a task; None where processes were started with it."""
+        return None if isinstance(self._pool, ProcessPoolExecutor) else self._context
+
     def _started(self) -> Executor:
         if isinstance(self.count, str):
             self._cluster = self._cluster or _connected(self.count)
@@ -218,7 +223,8 @@ class Workers:
                 return MPIPoolExecutor(initializer=prepare)
         os.environ.setdefault("OMP_NUM_THREADS", "1")
         os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-        return ProcessPoolExecutor(self.count, multiprocessing.get_context("spawn"), _begin)
+        # a context in every task fills the pipe to the processes, and who writes there hangs when they die (gh-94777)
+        return ProcessPoolExecutor(self.count, multiprocessing.get_context("spawn"), _begin, (self._context,))
 
     def _close(self) -> None:
         if self._pool is None:
@@ -285,8 +291,12 @@ def _connected(address: str) -> Any:
     return found
 
 
-def _begin() -> None:
-    """Prepare a process of this machine; the one that shares the tasks hears Ctrl-C and SIGTERM, and ends this one."""
+def _begin(context: bytes) -> None:
+    """Prepare a process of this machine for tasks with a context; the one that shares them hears Ctrl-C and SIGTERM,
+    and ends this one.
+    """
+    global _given
+    _given = context
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, signal.SIG_IGN)
     threading.Thread(target=_end_with_parent, daemon=True).start()
@@ -302,11 +312,15 @@ def _end_with_parent() -> None:
 #: One task at a time in a process, whatever threads a cluster has there; what they share is made once.
 _one = threading.Lock()
 _known: tuple[bytes, Any] | None = None
+_given = b""
 
 
-def _do(context: bytes, work: Work) -> Any:
-    """Do a task in a worker, with the context that is made of its pickled start and data."""
+def _do(context: bytes | None, work: Work) -> Any:
+    """Do a task in a worker, with the context that is made of its pickled start and data; None for that of the
+    process.
+    """
     global _known
+    context = _given if context is None else context
     with _one:
         if _known is None or _known[0] != context:
             start, data = pickle.loads(context)
