@@ -134,12 +134,17 @@ def test_samples_behind_a_pump_have_operating_points_of_their_own():
 
 @pytest.mark.slow
 def test_a_bill_that_is_moulded_shut_may_be_sealed_or_not():
-    """Below the heads that crack its samples none lets flow pass, between them some do."""
+    """Below the heads that crack its samples none lets flow pass; next to that of the case those do that are pressed
+    less.
+    """
     keys = {**SMALL, "uncertainty.samples": 16, "uncertainty.inputs": {"sealing": "lognormal(1.5)"}}
     moulded = dbvfiv.load("cases/dbv12-moulded.toml", keys)
-    found = moulded.uncertainty(over="pressure=0.02 m,0.09 m")
+    found = moulded.uncertainty(over="pressure=0.02 m,0.24 m")
     shares = [point["outcomes"]["not sealed"]["probability"] for point in found.points]
     assert shares[0] == 0.0 < shares[1] < 1.0
+    samples = found.at(found.plan.values[1])
+    flows, pressed = samples["flow"] > 0, samples["inputs"][:, 0]
+    assert pressed[flows].max() < pressed[~flows].min()
 
 
 @pytest.mark.slow
