@@ -10,6 +10,8 @@ import threading
 from collections.abc import Callable, Hashable, Iterable, Iterator
 from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Executor, ProcessPoolExecutor, wait
 from dataclasses import dataclass
+from pathlib import Path
+from tempfile import TemporaryDirectory, mkstemp
 from typing import Annotated, Any
 
 from pydantic import BeforeValidator
@@ -99,6 +101,8 @@ class Workers:
 
     def __init__(self, count: int | str, start: Callable[..., Any], data: tuple, warn: Callable[[str], None]):
         self.count, self.warn = count, warn
+        self._folder: TemporaryDirectory | None = None
+        self._file: Path | None = None
         self.give(start, *data)
         self._pool: Executor | None = None
         self._cluster: Any = None
@@ -110,10 +114,12 @@ class Workers:
         self._close()
         if self._cluster is not None:
             self._cluster.close()
+        if self._folder is not None:
+            self._folder.cleanup()
 
     def give(self, start: Callable[..., Any], *data: Any) -> None:
         """Context of the tasks that are shared from now on."""
-        self._context = pickle.dumps((start, data))
+        self._context, self._file = pickle.dumps((start, data)), None
 
     @property
     def is_here(self) -> bool:
@@ -206,9 +212,17 @@ class Workers:
         return max(self.count if isinstance(self.count, int) else 1, mpi_size() - 1) + 1
 
     @property
-    def _sent(self) -> bytes | None:
-        """Context that goes with a task; None where processes were started with it."""
-        return None if isinstance(self._pool, ProcessPoolExecutor) else self._context
+    def _sent(self) -> bytes | Path:
+        """What tells a worker the context. Processes of this machine read it from a file: megabytes fill the pipe to
+        them, and who writes there hangs when they die (gh-94777 of CPython).
+        """
+        if not isinstance(self._pool, ProcessPoolExecutor):
+            return self._context
+        if self._file is None:
+            self._folder = self._folder or TemporaryDirectory(prefix="dbvfiv-")
+            self._file = Path(mkstemp(dir=self._folder.name)[1])
+            self._file.write_bytes(self._context)
+        return self._file
 
     def _started(self) -> Executor:
         if isinstance(self.count, str):
@@ -223,8 +237,7 @@ class Workers:
                 return MPIPoolExecutor(initializer=prepare)
         os.environ.setdefault("OMP_NUM_THREADS", "1")
         os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-        # a context in every task fills the pipe to the processes, and who writes there hangs when they die (gh-94777)
-        return ProcessPoolExecutor(self.count, multiprocessing.get_context("spawn"), _begin, (self._context,))
+        return ProcessPoolExecutor(self.count, multiprocessing.get_context("spawn"), _begin)
 
     def _close(self) -> None:
         if self._pool is None:
@@ -291,12 +304,8 @@ def _connected(address: str) -> Any:
     return found
 
 
-def _begin(context: bytes) -> None:
-    """Prepare a process of this machine for tasks with a context; the one that shares them hears Ctrl-C and SIGTERM,
-    and ends this one.
-    """
-    global _given
-    _given = context
+def _begin() -> None:
+    """Prepare a process of this machine; the one that shares the tasks hears Ctrl-C and SIGTERM, and ends this one."""
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, signal.SIG_IGN)
     threading.Thread(target=_end_with_parent, daemon=True).start()
@@ -311,18 +320,14 @@ def _end_with_parent() -> None:
 
 #: One task at a time in a process, whatever threads a cluster has there; what they share is made once.
 _one = threading.Lock()
-_known: tuple[bytes, Any] | None = None
-_given = b""
+_known: tuple[bytes | Path, Any] | None = None
 
 
-def _do(context: bytes | None, work: Work) -> Any:
-    """Do a task in a worker, with the context that is made of its pickled start and data; None for that of the
-    process.
-    """
+def _do(context: bytes | Path, work: Work) -> Any:
+    """Do a task in a worker, with the context that is made of its pickled start and data, or those of a file."""
     global _known
-    context = _given if context is None else context
     with _one:
         if _known is None or _known[0] != context:
-            start, data = pickle.loads(context)
+            start, data = pickle.loads(context.read_bytes() if isinstance(context, Path) else context)
             _known = context, start(*data)
         return work.function(_known[1], *work.arguments)

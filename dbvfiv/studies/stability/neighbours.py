@@ -30,8 +30,9 @@ from .walk import StabilityWalk, ValveFamily
 
 #: From numbers (d,) to the walk and the parameter point of their valve.
 At = Callable[[np.ndarray], tuple[StabilityWalk, Mu]]
-#: From a function of an `At` and of further arguments, and rows of these, to its values in the order of the rows.
-Share = Callable[[Callable[..., Any], Sequence[tuple]], Sequence[Any]]
+#: From a function of an `At`, of neighbours and of numbers, the neighbours and rows of numbers to its values in their
+#: order.
+Share = Callable[[Callable[..., Any], "Neighbours", Sequence[np.ndarray]], Sequence[Any]]
 #: Valves that a space is made of, and that its error is measured on, with the seed of their inputs, which no samples
 #: have.
 TAKEN, CHECKS, NEAR_SEED = 6, 4, 2**31 + 1
@@ -131,19 +132,19 @@ def find_neighbours(
     SolveError, CaseError
         If one of them has no steady state or no modes, or cannot be made.
     """
-    share = share or (lambda function, rows: [function(at, *row) for row in rows])
+    share = share or (lambda function, near, rows: [function(at, near, row) for row in rows])
     walk, place = at(origin)
     walk.settle(place, start)
     q, first = walk.equilibrium(place), FamilyReduction(walk.family(place))
     added, d = walk.family(place).linear.added, len(origin)
     images = np.zeros((d, *(() if added is None else added.motions.shape)))
     near = Neighbours(origin, scales, q, np.zeros((d, len(q))), added, images, np.zeros((len(q), 0)))
-    tangents = share(_tangents, [(near, axes) for axes in np.array_split(np.arange(d), min(d, PARTS))])
+    tangents = share(_tangents, near, np.array_split(np.arange(d), min(d, PARTS)))
     slopes, images = (np.concatenate(parts) for parts in zip(*tangents))
     near = replace(near, slopes=slopes, images=images)
-    others = share(_leading_vectors, [(near, row) for row in taken])
+    others = share(_leading_vectors, near, taken)
     near = replace(near, space=_joint_space(first, [first.leading_vectors(place, MODES), *others]))
-    errors = share(_error, [(near, rows) for rows in np.array_split(checks, min(len(checks), PARTS))])
+    errors = share(_error, near, np.array_split(checks, min(len(checks), PARTS)))
     return replace(near, error=max(errors))
 
 

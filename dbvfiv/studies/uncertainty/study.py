@@ -130,8 +130,7 @@ def _sample(plan: Plan, walk: StabilityWalk, record: GrowingRecord, count: int |
     case, states = plan.case, _states_of_case(plan, walk, record)
     with Workers(count, _start, (case.to_dict(), states), record.warn) as team:
         neighbours = _neighbours(plan, states, record, team)
-        if neighbours:
-            team.give(_start, case.to_dict(), states, neighbours)
+        team.give(_start, case.to_dict(), states, neighbours)
         sampling = _Sampling(plan, record, team, Sampler(plan, states, neighbours, walk))
         if case.uncertainty.method == "rare":
             sampling.rare()
@@ -169,10 +168,11 @@ def _neighbours(plan: Plan, states: list[Start | None], record: GrowingRecord, t
     origin, ahead = plan.numbers(np.zeros((1, d)))[0], np.array([one.distribution.scale for one in plan.inputs])
     near, sampler = plan.numbers(quasi_random(TAKEN + CHECKS, d, NEAR_SEED)), Sampler(plan, states)
 
-    def shared(i: int, function: Callable[..., Any], rows: Sequence[tuple]) -> list:
+    def shared(i: int, function: Callable[..., Any], beside: Neighbours, rows: Sequence[np.ndarray]) -> list:
         if team.is_here:
-            return [_beside(sampler, i, function, row) for row in rows]
-        found = dict(team.share(range(len(rows)), lambda k: Work(_beside, (i, function, rows[k]))))
+            return [function(sampler.walks(i), beside, row) for row in rows]
+        team.give(_start_beside, plan.case.to_dict(), states, i, beside)
+        found = dict(team.share(range(len(rows)), lambda k: Work(_beside, (function, rows[k]))))
         if any(value is Lost for value in found.values()):
             raise SolveError(Lost.sentence)
         return [found[k] for k in range(len(rows))]
@@ -191,9 +191,14 @@ def _neighbours(plan: Plan, states: list[Start | None], record: GrowingRecord, t
     return found
 
 
-def _beside(sampler: Sampler, i: int, function: Callable[..., Any], row: tuple) -> Any:
-    """A function of the valves at a value of the range, and of more."""
-    return function(sampler.walks(i), *row)
+def _start_beside(case: dict, states: list[Start | None], i: int, beside: Neighbours) -> tuple:
+    return _start(case, states), i, beside
+
+
+def _beside(context: tuple, function: Callable[..., Any], row: np.ndarray) -> Any:
+    """A function of the valves at a value of the range, of neighbours and of numbers."""
+    sampler, i, beside = context
+    return function(sampler.walks(i), beside, row)
 
 
 def _start(case: dict, states: list[Start | None], neighbours: Mapping[int, Neighbours] = {}) -> Sampler:
