@@ -16,7 +16,7 @@ test: export JAX_PERSISTENT_CACHE_MIN_COMPILE_TIME_SECS ?= 0
 # modules too, of which each worker, and each command that a test starts, imports hundreds
 test: export PYTHONDONTWRITEBYTECODE =
 test: setup
-	@$(PYTHON) -m pytest -n $(JOBS) --dist worksteal -m "not slow"
+	@$(PYTHON) -m pytest -n $(JOBS) --dist loadscope -m "not slow"
 
 # all that is slow but the third dimension, with the tables that its tests print
 verify: setup

@@ -172,7 +172,10 @@ def with_full_names(text: str, folder: Path | None) -> str:
     if match is None or match[1] != "samples" or folder is None:
         return text
     path = folder / match[2].strip()
-    return f"samples({path.resolve()})" if path.is_file() else text
+    try:
+        return f"samples({path.resolve()})" if path.is_file() else text
+    except OSError:  # many values are no name of a file
+        return text
 
 
 def _number(text: str) -> Any:

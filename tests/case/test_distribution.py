@@ -41,6 +41,8 @@ def test_samples_come_from_a_list_or_a_file(tmp_path):
     listed = Distribution.parse("samples(3, 1, 2, 2)", PLAIN)
     assert listed.at(ndtri(np.array([0.1, 0.3, 0.6, 0.9]))).tolist() == [1, 2, 2, 3]
     (tmp_path / "gaps.txt").write_text("# mm\n1 mm\n3 mm\n")
+    many = f"samples({', '.join(f'{0.1 + number / 1000:.8g}' for number in range(64))})"
+    assert with_full_names(many, tmp_path) == many
     text = with_full_names("samples(gaps.txt)", tmp_path)
     assert Distribution.parse(text, LENGTH).numbers == (1e-3, 3e-3)
     assert listed.share_outside(1.5, 3.0) == 0.25

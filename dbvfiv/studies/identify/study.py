@@ -379,13 +379,13 @@ class IdentifyResult(StudyResult):
             said.append(f"  record {row['record'] + 1} {row['file']}: {row['says']}, modes measured: {row['modes']}")
         for match in self.matches:
             said.append(f"  {_oscillation(match)} at {match['place']} is {_modes_said(match)}")
-        said += ["", f"{'input':<34}{'before (95 %)':>26}{'after (95 %)':>26}{'learned':>9}"]
+        said += ["", f"{'input':<34}{'before (95 %)':>28}{'after (95 %)':>28}{'learned':>9}"]
         for row, one in zip(self.inputs, self.plan.inputs):
             before, after = (
                 f"{d['median']:.4g} ({d['interval'][0]:.4g} to {d['interval'][1]:.4g})" for d in (row["prior"], row)
             )
             unit = f", {one.quantity.si}" if one.quantity.si else ""
-            said.append(f"{row['parameter'] + unit:<34}{before:>26}{after:>26}{100 * row['learned']:>8.0f}%")
+            said.append(f"{row['parameter'] + unit:<34}{before:>28}{after:>28}{100 * row['learned']:>8.0f}%")
         said += ["", *self.confounded, *map(self._further_said, self.further)]
         check = [
             f"{mode['full'][0]:.5g} Hz, {100 * mode['full'][1]:.3g} % ({mode['emulated'][0]:.5g} Hz, "
