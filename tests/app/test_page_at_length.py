@@ -254,8 +254,8 @@ def test_malformed_cases_are_told(tmp_path):
                 tab.drop("bad.toml", text.encode())
                 tab.wait(lambda said=said: said in tab.at("wrong").text, 20)
                 tab.click("Add a row")
-                time.sleep(0.5)
-                assert tab.at("wrong").text or "layers" not in text
+                if "layers" in text:
+                    tab.wait(lambda: tab.at("wrong").text, 20)
             tab.drop("dbv6.toml", COARSE.encode())
             tab.wait(lambda: tab.at("fits").text == "It fits.", 20)
             tab.drop("picture.exe", b"MZ")
