@@ -362,7 +362,7 @@ class LineChannel(AroundChannel):
 
     @property
     def sealed(self) -> bool:
-        """Whether the passage is shut."""
+        """State of the passage: True where it is shut."""
         return self.channel.sealed
 
     def shut(self, seal: int | None) -> LineChannel:

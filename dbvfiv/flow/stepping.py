@@ -19,17 +19,9 @@ inlet velocity is the only one, the root taken is that next to the last one in t
 outlet's pressure; a flow drawn in loses the head of its jets, see `dbvfiv.flow.channel.reversible_head`.
 
 A passage that faces shut at the start of a step has the law of still fluid in front of a seal in that step. Where they
-part in it, the fluid begins to flow from rest: its pressure, in the film between the faces that of equilibria before,
-then falls evenly along the film until it flows. Where they meet, the film passes what has momentum until it is no more
-than a steady flow would be, which ends there, as it carries nothing in equilibria.
-
-The law's unknowns are eliminated in each evaluation: the wall sees pressures and their derivatives by areas. Where the
-inlet velocity is the only one, the root taken is that next to the last one in the direction in which it misses the
-outlet's pressure; a flow drawn in loses the head of its jets, see `dbvfiv.flow.channel.reversible_head`.
-
-A passage that faces shut at the start of a step has the law of still fluid in front of a seal in that step. Where they
-part in it, the next one begins with the film that rough faces leave in steady flow, as equilibria have it; where they
-meet, that flow ends. Pressures change little by either, and what a fluid of that momentum would push with is left out.
+part in it, the flow of the next one begins with the inlet velocity as it is. Where they meet, the film that rough faces
+leave passes what has momentum until it is no more than a steady flow would be; that rest ends there, as the film
+carries nothing in equilibria.
 
 Equations (T.9), (T.13), (T.23) and (T.24) of docs/theory.md.
 """

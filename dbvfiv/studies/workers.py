@@ -213,8 +213,8 @@ class Workers:
 
     @property
     def _sent(self) -> bytes | Path:
-        """What tells a worker the context. Processes of this machine read it from a file: megabytes fill the pipe to
-        them, and who writes there hangs when they die (gh-94777 of CPython).
+        """Context as a task brings it. Processes of this machine read it from a file: megabytes fill the pipe to them,
+        and who writes there hangs when they die (gh-94777 of CPython).
         """
         if not isinstance(self._pool, ProcessPoolExecutor):
             return self._context

@@ -210,7 +210,7 @@ def shut_channel(count: int):
 
 
 def test_moving_fluid_in_front_of_a_seal_keeps_its_energy():
-    """What its pressures do on areas in any motion is what comes in at the inlet less the kinetic energy gained."""
+    """Work of its pressures on areas in any motion is what comes in at the inlet less the kinetic energy gained."""
     random, z = np.random.default_rng(3), np.cumsum(np.append(0.0, np.random.default_rng(2).uniform(0.02, 0.08, 9)))
     area, rate, acceleration = random.uniform(1e-3, 3e-3, 10), *random.normal(0.0, 1e-2, (2, 10))
     law, density = Channel(z, 1e-3, storage=1.0).shut(3), 900.0

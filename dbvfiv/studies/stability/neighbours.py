@@ -154,6 +154,7 @@ def _tangents(at: At, near: Neighbours, axes: np.ndarray) -> tuple[np.ndarray, n
     model, added = walk.built(place).model, near.added
     hood = Neighbourhood(model, near.q, place.pressure, place)
     slopes, images = np.zeros_like(near.slopes[axes]), np.zeros_like(near.images[axes])
+    here = None if added is None else hood.resisting(model, near.q, added.motions)
     for slope, image, axis in zip(slopes, images, axes):
         other, beside = at(near.origin + STEP * near.scales * (np.arange(len(near.origin)) == axis))
         end = other.built(beside).model, beside.pressure
@@ -163,7 +164,7 @@ def _tangents(at: At, near: Neighbours, axes: np.ndarray) -> tuple[np.ndarray, n
         slope[:] = tangent
         if added is not None:
             ahead = hood.resisting(end[0], near.q + STEP * tangent, added.motions)
-            image[:] = (ahead - hood.resisting(model, near.q, added.motions)) / STEP
+            image[:] = (ahead - here) / STEP
     return slopes, images
 
 

@@ -66,7 +66,7 @@ def test_gradients_at_random_designs(number):
 
 
 def test_margins_count_all_modes_up_to_one_frequency():
-    """Where loss factors damp all frequencies alike, of every design, beyond the leading one that is listed."""
+    """Margins count modes of every design beyond the leading one that is listed, where loss factors damp all alike."""
     problem = DesignProblem(load_small(KEYS, ASKED, LOSSY, {"modes.count": 1}).case)
     thin, thick = (problem.values_at(np.array([share, 0.5, 0.5])) for share in (0.0, 1.0))
     band, leads = problem.at(thin, 200.0, True).band, []
