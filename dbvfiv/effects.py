@@ -12,7 +12,10 @@ EFFECTS = {
     "too few for a column on every edge": ("unknown", "mesh.around"),
     "inner face starts beyond the closing plane": ("unknown", "valve.lip_radius"),
     "outside damping.band": ("3 to 8 % less damping just outside, half of it far outside", "damping.band"),
-    "constants are unstable": ("no verdict on vibration there", "materials.constants"),
+    "constants are unstable": (
+        "no verdict on vibration there with loss factors; with Rayleigh damping one on the fit, not on the rubber",
+        "materials.constants",
+    ),
     "settled at the largest pressures": ("10 to 16 % in flow between 10 and 20 %", "materials.strain_level"),
     "growth rates do not order the modes": ("none below that frequency", "modes.max_frequency"),
     "Verdicts hold for modes up to": ("none below that frequency", "-"),

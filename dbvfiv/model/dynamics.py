@@ -231,8 +231,7 @@ def linearise(
     if seal is not None:
         stiffness = without_circulation(model, area, stiffness)
         if model.flow.unsteady:  # pressures do work on the areas
-            lengths = still_channel(model.flow).shut(seal).work_lengths(area)
-            forces = (slope.T @ sp.diags(lengths)).tocsr()
+            forces = model.forces_on_areas(nodal, still_channel(model.flow).shut(seal).work_lengths(area))
     if added is None and model.outside is not None:
         added = model.outside.added_mass(q, structure)
     coupled = forces, slope, area, added, inner

@@ -330,15 +330,14 @@ class ValveModel:
 
     def forces_on_areas(self, nodal: np.ndarray, lengths: np.ndarray) -> sp.csr_matrix:
         """Forces (n, m), stored as `station_forces`, of unit pressures that do work on the areas over lengths (m,),
-        m.
+        m, of a bill that is moulded shut.
         """
         _, indices, indptr = self._force_pattern
         slope = self.rows.jacobian(nodal).tocoo()
         rows = np.repeat(np.arange(self.size), np.diff(indptr))
         keys, wanted = rows * self.stations + indices, slope.col * self.stations + slope.row
-        at = np.minimum(np.searchsorted(keys, wanted), len(keys) - 1)
-        known = keys[at] == wanted
-        data = np.bincount(at[known], (slope.data * lengths[slope.row])[known], minlength=len(keys))
+        at = np.searchsorted(keys, wanted)
+        data = np.bincount(at, slope.data * lengths[slope.row], minlength=len(keys))
         return sp.csr_matrix((data, indices, indptr), shape=(self.size, self.stations), copy=False)
 
     @cached_property
@@ -349,9 +348,13 @@ class ValveModel:
         carried = np.repeat(self.loaded > 0, 48)
         keep = (rows >= 0) & carried
         keys = rows[keep] * self.stations + columns[keep]
-        unique, inverse = np.unique(keys, return_inverse=True)
+        if self.shell.stress_free is None:
+            unique = np.unique(keys)
+        else:  # of `forces_on_areas` too: nodes of a row that carry no pressure
+            areas = self.rows.jacobian(self.nodal(np.zeros(self.size))).tocoo()
+            unique = np.union1d(keys, areas.col.astype(np.int64) * self.stations + areas.row)
         slots = np.full(rows.shape, -1, np.int64)
-        slots[keep] = inverse
+        slots[keep] = np.searchsorted(unique, keys)
         indptr = np.searchsorted(unique // self.stations, np.arange(self.size + 1)).astype(np.int32)
         return slots, (unique % self.stations).astype(np.int32), indptr
 

@@ -119,8 +119,8 @@ class ValveMotion:
         if still is None:
             return self.model.pressure_force(nodal, pressure)
         at_rest, lengths = still
-        added = self.model.rows.jacobian(nodal).T @ (lengths * (pressure - at_rest))
-        return self.model.pressure_force(nodal, at_rest) + added
+        added = self.model.forces_on_areas(nodal, lengths)
+        return self.model.pressure_force(nodal, at_rest) + added @ (pressure - at_rest)
 
     def _forces(self, nodal: np.ndarray, still: tuple | None) -> np.ndarray:
         """Derivatives of that force by the pressures, as values of G."""

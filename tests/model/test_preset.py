@@ -252,6 +252,15 @@ def test_still_fluid_behind_a_seal_is_the_mass_of_what_the_wall_displaces():
     assert abs(errors[0]) < 5e-3 and errors[0] / errors[1] == pytest.approx(4.0, rel=0.05)
 
 
+def test_forces_in_front_of_a_seal_do_work_on_the_areas(model):
+    """Nodes of a row that carry no pressure have their part: without it forces of 0.3 % were missing."""
+    random = np.random.default_rng(5)
+    nodal = model.nodal(1e-3 * random.standard_normal(model.size))
+    lengths = random.uniform(0.01, 0.1, model.stations)
+    wanted = model.rows.jacobian(nodal).T.toarray() * lengths
+    np.testing.assert_allclose(model.forces_on_areas(nodal, lengths).toarray(), wanted, rtol=1e-14, atol=0.0)
+
+
 @pytest.mark.parametrize("storage", [0.0, 1.0])
 @pytest.mark.parametrize("symmetry", SYMMETRIES)
 def test_a_sealed_bill_is_stable_in_every_class_and_flow_model(model, path, storage, symmetry):
