@@ -159,8 +159,8 @@ def _factor(verdicts: dict) -> str:
 
 
 def _sure(found: Gathered, verdicts: dict) -> tuple[str, ...]:
-    """Uncertainty of the verdict: second mesh, range of the loss factors, strain levels."""
-    said, worst = [], found.worst
+    """Uncertainty of the verdict: constants of the rubber, second mesh, range of the loss factors, strain levels."""
+    said, worst = list(_fits(found)), found.worst
     own = verdicts[worst]
     other = found.get("mesh-modes")
     if other is None:
@@ -183,6 +183,18 @@ def _sure(found: Gathered, verdicts: dict) -> tuple[str, ...]:
     if (chance := _chance(found)) is not None:
         said.append(chance)
     return tuple(said)
+
+
+def _fits(found: Gathered) -> Iterable[str]:
+    """Heads with a verdict although the constants of a rubber are unstable there, as under Rayleigh damping."""
+    heads = [
+        pressure
+        for pressure, result in found.modes.items()
+        if result.verdict.stable is not None and any("constants are unstable" in text for text in result.warnings)
+    ]
+    if heads:
+        at = listed(found.case.units.pressure(pressure, 3) for pressure in heads)
+        yield f"the rubber's constants are unstable at {at}: the verdict there is one on their fit, not on the rubber"
 
 
 def _chance(found: Gathered) -> str | None:

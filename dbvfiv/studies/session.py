@@ -11,7 +11,14 @@ from ..case.materials import HIGHEST_LEVEL
 from ..case.parameters import PARAMETERS
 from ..errors import CaseError
 from ..model import ValveModel
-from ..model.equilibria import find_equilibrium, operating_pressure, redescribe, rest_state, sealing_for_cracking
+from ..model.equilibria import (
+    find_equilibrium,
+    operating_pressure,
+    redescribe,
+    rest_state,
+    sealing_for_cracking,
+    state_warnings,
+)
 from ..model.sizes import hoop_strain
 from ..model.state import SteadyState
 from ..model.strain_level import SettledLevels, settle_levels
@@ -184,6 +191,8 @@ class Session:
         """
         model, pressure = self.model, self.case.drive.pressure
         if self.start is not None and self.start.pressure == pressure:
+            for sentence in state_warnings(model, [self.start]):
+                observer.warn(sentence)
             return redescribe(model, self.start)  # flow and jet follow the density of this case
         if pressure == model.flow.back:
             return rest_state(model)

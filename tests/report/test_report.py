@@ -20,6 +20,8 @@ from PIL import Image
 from dbvfiv.api import Valve
 from dbvfiv.case.units import UNITS
 from dbvfiv.errors import CaseError
+from dbvfiv.model import ValveModel
+from dbvfiv.model.material_stability import material_stability
 from dbvfiv.report import gather, write_page, write_pdf
 from dbvfiv.report.answers import UNKNOWN, answers
 from dbvfiv.report.gather import following, heads_of, planned
@@ -102,6 +104,16 @@ def test_chatter_holds_while_one_head_chatters_at_the_most_damping(made, monkeyp
     monkeypatch.setattr("dbvfiv.report.answers.loss_range", lambda _: (0.01, end * factor))
     told = next(one.uncertainty for one in answers(found) if "chatter" in one.question)
     assert any(word in line for line in told)
+
+
+def test_heads_at_which_a_verdict_is_one_on_the_fit_of_the_rubber_are_named(tmp_path):
+    case = load_case(None, [*KEYS, 'report.heads=["2 kPa", "36 kPa"]'])
+    found = gather(case, "valve", tmp_path, (*LEFT_OUT, "closure", "law"), quiet=True)
+    model = ValveModel(case)
+    sound = [material_stability(model, found.state(p, "steady").q, p).holds for p in found.heads]
+    told = next(one.uncertainty for one in answers(found) if "chatter" in one.question)
+    assert sound == [True, False]
+    assert [line.split(" at ")[1].split(":")[0] for line in told if "not on the rubber" in line] == ["36 kPa"]
 
 
 def test_nothing_asked_is_missing(made):
