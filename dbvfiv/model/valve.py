@@ -334,11 +334,16 @@ class ValveModel:
         """
         _, indices, indptr = self._force_pattern
         slope = self.rows.jacobian(nodal).tocoo()
-        rows = np.repeat(np.arange(self.size), np.diff(indptr))
-        keys, wanted = rows * self.stations + indices, slope.col * self.stations + slope.row
-        at = np.searchsorted(keys, wanted)
-        data = np.bincount(at, slope.data * lengths[slope.row], minlength=len(keys))
+        data = np.bincount(self._area_slots, slope.data * lengths[slope.row], minlength=len(indices))
         return sp.csr_matrix((data, indices, indptr), shape=(self.size, self.stations), copy=False)
+
+    @cached_property
+    def _area_slots(self) -> np.ndarray:
+        """Places of the entries of the areas' Jacobian among those of `station_forces`."""
+        _, indices, indptr = self._force_pattern
+        slope = self.rows.jacobian(self.nodal(np.zeros(self.size))).tocoo()
+        keys = np.repeat(np.arange(self.size), np.diff(indptr)) * self.stations + indices
+        return np.searchsorted(keys, slope.col * self.stations + slope.row)
 
     @cached_property
     def _force_pattern(self):
