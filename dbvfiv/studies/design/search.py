@@ -126,28 +126,36 @@ class Search:
         best = None
         for _ in range(BACK):
             left = evaluations - len(self._seen)
-            found = self._optimised(share, left) if left > 0 else None
+            ends = np.array_equal(share, self.problem.start)
+            found = self._optimised(share, left, left if ends else (left + 1) // 2) if left > 0 else None
             if found is None:
                 break
             settled = best is not None and best.holds and abs(found.aim - best.aim) <= GAIN * abs(best.aim)
             best = found
-            if settled or (not best.holds and np.array_equal(share, self.problem.start)):
+            if settled or (not best.holds and ends):
                 break
             share = self.share(best) if best.holds else 0.5 * (share + self.problem.start)
         return best
 
-    def _optimised(self, share: np.ndarray, evaluations: int) -> Design | None:
+    def _optimised(self, share: np.ndarray, evaluations: int, failing: int) -> Design | None:
+        """Best design of all that were tried, after a run from a start that may try so many valves, or so many where
+        none of all holds (a run on a hill too low for the constraints may never end by itself).
+        """
         from scipy.optimize import minimize
 
         try:
             share, scale = self._begin(share)
         except _Enough:
             return None
-        limit = len(self._seen) + evaluations
+        begun = len(self._seen)
+
+        def spent() -> bool:
+            holds = any(found is not None and found[4].holds for found in self._seen.values())
+            return len(self._seen) - begun >= (evaluations if holds else failing)
 
         def part(number: int, x: np.ndarray):
             """One of what `_evaluated` gives; of a valve that is none, what makes any step to it too long."""
-            if len(self._seen) >= limit and self.problem.values_at(x) not in self._seen:
+            if self.problem.values_at(x) not in self._seen and spent():
                 raise _Enough
             found = self._evaluated(np.clip(x, 0.0, 1.0))
             if found is not None:

@@ -56,13 +56,9 @@ def two_hills(x, _pressure):
     }
 
 
-#: A start from which the search stays on the hill for all its valves, by the rounding of some processors.
-STAYS = pytest.param(0.6, marks=pytest.mark.xfail(reason="ends on the lower hill by rounding", strict=False))
-
-
-@pytest.mark.parametrize("start", [0.0, STAYS, 0.8, 1.0])
+@pytest.mark.parametrize("start", [0.0, 0.5, 0.55, 0.6, 0.7, 0.8, 1.0])
 def test_a_start_from_which_no_constraint_can_be_held_steps_back(start):
-    """The lower hill is below the bound: up there a search ends."""
+    """The lower hill is below the bound: up there a run ends, or by rounding does not and is given half the valves."""
     problem = Analytic((Variable("x", 0.0, 5.0, 1.2, "m"),), two_hills)
     found, tried = search(problem, "mass down", f"flow at {HEAD} Pa at least 1 m^3/s")
     design = found.from_start(np.array([start]), 60)
