@@ -239,7 +239,12 @@ class ColumnSolver:
         family, first, cells = reduction.family, reduction.first(points), []
         for i, mu in enumerate(points):
             spectrum = _modes_of(family, mu, spectra[i]) if spectra else self.direct(family, mu)
-            cells.append(_direct(spectrum, _counted(first, mu, spectrum.eigenvalues)))
+            cell = _direct(spectrum, _counted(first, mu, spectrum.eigenvalues))
+            if not cell.certificate.agrees and len(spectrum):  # see `_joint`
+                vectors = np.hstack([spectrum.q.real, spectrum.q.imag])
+                joint = ReducedFamily(family, vectors, OPTIONS.joint, base=first)
+                cell = _direct(spectrum, _counted(joint, mu, spectrum.eigenvalues))
+            cells.append(cell)
         return self._recounted(cells, family, points, range(len(points)))
 
     def _uncoupled(self, family: PencilFamily, points) -> list[Cell]:

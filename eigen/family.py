@@ -6,6 +6,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Hashable
 from functools import cached_property
 from typing import Any, NamedTuple
+from warnings import catch_warnings
 
 import numpy as np
 import scipy.linalg as la
@@ -276,7 +277,8 @@ class ReducedFamily(PencilFamily):
             x, y = rng.standard_normal((2, k + dense.inner)) + 0j
             for step in range(steps + 1):
                 T, slope = dense(s if step else s * (1.0 + 1e-7) or 1e-7)
-                lu = la.lu_factor(T, check_finite=False)
+                with catch_warnings(action="ignore", category=la.LinAlgWarning):
+                    lu = la.lu_factor(T, check_finite=False)
                 new = la.lu_solve(lu, slope @ x, check_finite=False)
                 back = la.lu_solve(lu, slope.conj().T @ y, 2, check_finite=False)
                 if not (np.isfinite(new).all() and np.isfinite(back).all()):
