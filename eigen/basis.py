@@ -35,11 +35,15 @@ def _unit(mass, X: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return X[:, size > 0] / size[size > 0], MX[:, size > 0] / size[size > 0]
 
 
-def orthonormal(mass, X: np.ndarray, compression: float, passes: int = 2) -> tuple[np.ndarray, np.ndarray]:
-    """Basis of the span of columns, and mass times it; directions weaker than `compression` left out, each column
-    counts alike.
+def orthonormal(
+    mass, X: np.ndarray, compression: float, passes: int = 2, alike: bool = True
+) -> tuple[np.ndarray, np.ndarray]:
+    """Basis of the span of columns, and mass times it; directions weaker than `compression` left out.
+
+    Each column counts alike, or as long as it is: then real and imaginary parts of a vector count for the same whatever
+    its phase.
     """
-    X, MX = _unit(mass, X)
+    X, MX = _unit(mass, X) if alike else (X, mass @ X)
     # a second pass removes what rounding left in the first; the mass goes along, which spares a product
     for threshold in (max(compression**2, 1e-14), 1e-14)[:passes]:
         gram = X.T @ MX

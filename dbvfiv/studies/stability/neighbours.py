@@ -185,7 +185,7 @@ def _leading_vectors(at: At, near: Neighbours, row: np.ndarray) -> np.ndarray:
 def _joint_space(first: FamilyReduction, vectors: list[np.ndarray]) -> np.ndarray:
     """Space (n, k) of leading vectors of several valves, and of static responses of one, without weak directions."""
     mass = first.family.mass
-    leading = orthonormal(mass, np.hstack(vectors), WEAK, passes=1)[0]
+    leading = orthonormal(mass, np.hstack(vectors), WEAK, passes=1, alike=False)[0]
     return np.hstack([leading, outside(leading, mass, first.coarse.V, STATIC)])
 
 
