@@ -11,10 +11,12 @@ import numpy as np
 
 from ..case.model import Case
 from ..contact import PlaneContact
+from ..errors import SolveError
 from ..geometry import ValveMesh
 from ..shell import Shell
 from ..shell.mesh import nodal_thickness
 from ..texts import shortly
+from .load_curve import LoadCurve
 from .load_steps import LARGEST_JUMP, LoadStepOptions, LoadSteps
 from .newton import NewtonOptions
 from .supports import CONTACT, HELD_LIPS, face_contact, held_rows
@@ -223,14 +225,21 @@ def load_steps(model: ClosedValve) -> LoadStepOptions:
 
 
 def close_valve(case: Case, pressure: float) -> tuple[ClosedValve, np.ndarray]:
-    """Valve under a back pressure, Pa, and its displacements (n,), from rest.
+    """Valve under a back pressure, Pa, and its displacements (n,), from rest; past limit points by arclength where
+    closure.arclength is true.
 
     Raises
     ------
     SolveError
-        If they are not reached, because a limit point comes before them for one.
+        If they are not reached.
     """
     model = ClosedValve(case)
     steps = LoadSteps(model, load_steps(model))
-    steps.reach(pressure)
+    try:
+        steps.reach(pressure)
+    except SolveError:
+        if not case.closure.arclength:
+            raise
+        curve = LoadCurve(model, steps.options.newton, steps.observer, (steps.pressure, steps.q))
+        return model, curve.reach(pressure)[0].q
     return model, steps.q

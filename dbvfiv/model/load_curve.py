@@ -280,7 +280,8 @@ class LoadCurve:
 
     def _tracer(self, limits: tuple[float, float]):
         if self._system is None:
-            self._system = LoadSystem(self.model, self._unit)
+            # residuals against the load at the start, where there is one: rounding of forces is of their size
+            self._system = LoadSystem(self.model, max(self._unit, abs(self._start - self.model.flow.back)))
         options = ContinuationOptions(
             step=_STEP,
             min_step=_SMALLEST,
@@ -310,7 +311,7 @@ class LoadCurve:
             if angle != self._angle:
                 self._angle, self._branch = angle, None
             if self._branch is None:
-                self._unit = max(1e-3 * abs(target - start), self.model.load_unit)
+                self._unit = max(1e-3 * abs(target - start), 1e-3 * abs(start - back), self.model.load_unit)
             tracer = self._tracer((back - self._unit, target))
             try:
                 if self._branch is None:
