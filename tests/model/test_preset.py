@@ -403,13 +403,14 @@ def test_a_pump_whose_curve_meets_a_jump_of_the_flow_has_no_operating_point(monk
 @pytest.mark.slow
 def test_energy_closes_on_a_smooth_run_through_cracking(tmp_path):
     """Half a second from a sealed bill to one that is open, in water that the wall displaces; the faces keep some. The
-    step in which the lips part still has the law of the seal, so that halving it divides the error by 3.4 and not by 4.
+    step in which faces part or meet has the law before it, so that one halving does not tell an order: steps of 10, 5,
+    2.5 and 1.25 ms leave 6.5e-6, 2.0e-6, 8.9e-7 and 1.8e-7 of the work.
     """
     share, off = np.linspace(0.0, 1.0, 101), []
     table = tmp_path / "rise.csv"
     rows = zip(0.5 * share, 1e3 + 600.0 * (1.0 - np.cos(np.pi * share)))
     table.write_text("time [s], pressure [Pa]\n" + "".join(f"{t:.9g}, {p:.12g}\n" for t, p in rows))
-    for count in (100, 200):
+    for count in (100, 400):
         keys = {"transient.start": "steady", "transient.duration": 0.6, "transient.drive_table": str(table)}
         keys |= {"transient.step": 0.5 / count, "damping.alpha": 5.0, "damping.beta": 1e-3}
         model = ValveModel(thesis_case(COARSE | keys | {"valve.sealing_pressure": PRESSURE}))
@@ -417,7 +418,7 @@ def test_energy_closes_on_a_smooth_run_through_cracking(tmp_path):
         h = Runner(model, options).start().history
         assert h["stops"][0] == 10 and h["stops"][-1] == 0 and h["contact_loss"][-1] > 0
         off.append(np.abs(h["balance"]).max() / h["pressure_work"].max())
-    assert off[1] < 1e-6 and 3.0 < off[0] / off[1] < 4.2
+    assert off[1] < 3e-7 and 8.0 < off[0] / off[1] < 16.0
 
 
 @pytest.mark.slow
