@@ -175,7 +175,7 @@ def test_three_routes_of_a_bill_that_is_moulded_shut(law, pressure, touching):
     assert growth < 1e-3 and frequency < 1e-3
 
 
-@pytest.mark.parametrize("law", [QUASI, STORAGE])
+@pytest.mark.parametrize("law", [QUASI, pytest.param(STORAGE, marks=pytest.mark.slow)])
 def test_a_sealed_bill_rings_as_its_spectrum_says(law):
     """At 0.6 of the sealing pressure, in water that is still but for what the wall displaces. The lips are held, so the
     push is measured where the line through their middle moves most: 1 um, a hundredth of what parts or meets a face.

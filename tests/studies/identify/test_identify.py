@@ -183,6 +183,7 @@ def says_confounded(result):
     return {row["target"] for row in result.further}
 
 
+@pytest.mark.slow
 def test_two_inputs_that_act_alike_are_said_to_be_confounded():
     assert set(INPUTS) - {"beta"} < says_confounded(two_that_act_alike(0))
 

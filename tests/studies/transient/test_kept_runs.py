@@ -92,7 +92,7 @@ AIR = {"fluid.density": 1.2, "fluid.continuity": "storage", "fluid.sound_speed":
     [
         pytest.param(SLAMS, 66, "stops", id="slams"),
         pytest.param(SLAMS | {"transient.adaptive": True}, 1, "stops", id="slams, adaptive"),
-        pytest.param(LOSSY, 40, "line_supply", id="line and relaxing wall"),
+        pytest.param(LOSSY, 40, "line_supply", id="line and relaxing wall", marks=pytest.mark.slow),
         pytest.param(
             LOSSY | {"transient.adaptive": True}, 40, "branch_loss", id="both, adaptive", marks=pytest.mark.slow
         ),
