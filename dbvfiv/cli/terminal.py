@@ -17,11 +17,19 @@ from ..case.units import Units
 from ..errors import CaseError, SolveError
 from ..studies.request import is_sheet
 
+#: Suffixes that promise another format than that of result files.
+OTHER_FORMATS = (".json", ".toml", ".html", ".pdf", ".png", ".svg")
+
 
 def _writable(path: Path | None) -> Path | None:
-    """Refuse a name that cannot be written before anything is computed."""
+    """Refuse a name that cannot be written, or promises another format, before anything is computed."""
     from ..record.files import check_writable
 
+    if path is not None and path.suffix.lower() in OTHER_FORMATS:
+        raise CaseError(
+            f"--output {str(path)!r} would be an HDF5 file; name it '{path.stem}.h5', and ask for JSON by --json, for "
+            "figures by --plots."
+        )
     if path is not None and not is_sheet(path):
         check_writable(path)
     return path

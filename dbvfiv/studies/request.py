@@ -59,6 +59,26 @@ def law_changes(law: str | None, study: str) -> dict[str, str | None]:
     return {"fluid.continuity": law, f"{study}.continuity": "case" if law else None}
 
 
+def ranged_changes(
+    study: str, known: str | None, over: str | None, pressure: str | None, density: str | None
+) -> dict[str, Any]:
+    """Keys of the case that options --over, --pressure and --density of a study over a range change.
+
+    Parameters
+    ----------
+    known : str or None
+        Range of the case.
+
+    Raises
+    ------
+    CaseError
+        For a value of the parameter that the range moves.
+    """
+    refuse_moved({f"{study}.over": over or known or ""}, pressure=pressure, density=density)
+    values = {"drive.pressure": number_or_text(pressure), "fluid.density": number_or_text(density)}
+    return values | {f"{study}.over": over}
+
+
 def refuse_moved(ranges: Mapping[str, str], **given: str | None) -> None:
     """Refuse a value for a parameter that a range moves.
 

@@ -50,6 +50,7 @@ def test_a_sheet_of_two_sizes_in_units_of_choice(command_line, tmp_path):
         (("steady", "--scale", "2", "-o", "s.h5"), "goes with a sheet"),
         (("steady", "--scale", "4 kPa", "-o", "s.csv"), "not a length"),
         (("modes", "-o", "s.csv"), "names a sheet"),
+        (("modes", "-o", "m.json"), "would be an HDF5 file"),
     ],
 )
 def test_what_is_no_sheet(command_line, one_sentence, arguments, part):

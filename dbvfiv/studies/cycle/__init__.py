@@ -11,10 +11,10 @@ from pydantic import StrictInt, ValidationInfo, field_validator, model_validator
 from ...case.axis import Axis, StabilityRange, parse_stability_axis
 from ...case.model import Case
 from ...case.parameters import listed
-from ...case.quantity import Length, Number, number_or_text
+from ...case.quantity import Length, Number
 from ...case.section import BrokenRule, Section, key
 from ...case.tables import existing_file
-from ..request import DensityOption, PressureOption, Request, refuse_moved
+from ..request import DensityOption, PressureOption, Request, ranged_changes
 
 ORDER = 42
 
@@ -102,10 +102,4 @@ def command(
 
     dbvfiv cycle cases/light-fluid.toml --over density=25:60:8 -o cycle.h5 --plots figures
     """
-    refuse_moved({"cycle.over": over or case.cycle.over}, pressure=pressure, density=density)
-    changes = {
-        "drive.pressure": number_or_text(pressure),
-        "fluid.density": number_or_text(density),
-        "cycle.over": over,
-    }
-    return Request(changes)
+    return Request(ranged_changes("cycle", case.cycle.over, over, pressure, density))

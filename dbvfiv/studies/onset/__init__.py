@@ -10,9 +10,9 @@ from pydantic import StrictBool
 from ...case.axis import Axis, StabilityRange, parse_stability_axis
 from ...case.model import Case
 from ...case.parameters import listed
-from ...case.quantity import Number, number_or_text
+from ...case.quantity import Number
 from ...case.section import Section, key
-from ..request import ClassesOption, DensityOption, LawOption, PressureOption, Request, law_changes, refuse_moved
+from ..request import ClassesOption, DensityOption, LawOption, PressureOption, Request, law_changes, ranged_changes
 
 ORDER = 28
 
@@ -83,11 +83,5 @@ def command(
 
     dbvfiv onset cases/dbv12.toml --over density -p "6 kPa"
     """
-    refuse_moved({"onset.over": over or case.onset.over}, pressure=pressure, density=density)
-    changes = {
-        "drive.pressure": number_or_text(pressure),
-        "fluid.density": number_or_text(density),
-        "onset.over": over,
-        "onset.symmetry": symmetry,
-    }
+    changes = ranged_changes("onset", case.onset.over, over, pressure, density) | {"onset.symmetry": symmetry}
     return Request(changes | law_changes(law, "onset"))

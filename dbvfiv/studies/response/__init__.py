@@ -15,7 +15,7 @@ from ...case.quantity import Frequency, Pressure, Quantity, number_or_text
 from ...case.section import Section, key
 from ...case.tables import ExistingFile, read_pairs
 from ...errors import CaseError
-from ..request import DensityOption, LawOption, PressureOption, Request, refuse_moved, with_unit
+from ..request import DensityOption, LawOption, PressureOption, Request, ranged_changes, with_unit
 
 ORDER = 33
 
@@ -95,12 +95,9 @@ def command(
 
     dbvfiv response cases/dbv12-in-line.toml -p "2 m" --noise "200 Pa" --plots figures
     """
-    refuse_moved({"response.over": over or case.response.over or ""}, pressure=pressure, density=density)
     changes = {
-        "drive.pressure": number_or_text(pressure),
-        "fluid.density": number_or_text(density),
+        **ranged_changes("response", case.response.over, over, pressure, density),
         "fluid.continuity": law,
-        "response.over": over,
         "response.noise": number_or_text(noise),
         "response.spectrum": None if spectrum is None else str(spectrum),
         "response.max_frequency": number_or_text(max_frequency),

@@ -11,9 +11,9 @@ from ...case.axis import Axis, StabilityRange, parse_stability_axis
 from ...case.distribution import with_full_names
 from ...case.model import Case
 from ...case.parameters import listed
-from ...case.quantity import Number, number_or_text
+from ...case.quantity import Number
 from ...case.section import Described, Section, flattened, key
-from ..request import DensityOption, LawOption, PressureOption, Request, WorkersOption, law_changes, refuse_moved
+from ..request import DensityOption, LawOption, PressureOption, Request, WorkersOption, law_changes, ranged_changes
 from ..workers import WORKERS_HELP, WorkersKey
 
 ORDER = 31
@@ -95,11 +95,8 @@ def command(
     dbvfiv uncertainty cases/dbv12-in-line.toml --over "pressure=0.5 m:4 m:3" --workers 2 -o probability.h5 --plots
     figures
     """
-    refuse_moved({"uncertainty.over": over or case.uncertainty.over or ""}, pressure=pressure, density=density)
     changes = {
-        "drive.pressure": number_or_text(pressure),
-        "fluid.density": number_or_text(density),
-        "uncertainty.over": over,
+        **ranged_changes("uncertainty", case.uncertainty.over, over, pressure, density),
         "uncertainty.samples": samples,
         "uncertainty.method": "rare" if rare else None,
         "uncertainty.workers": workers,
