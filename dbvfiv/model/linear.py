@@ -94,7 +94,7 @@ class CoupledFactor:
         solution = self._factor.solve(self._padded)
         return solution[: self.size], solution[len(solution) - self.inner :]
 
-    def solve_transpose(self, rhs: np.ndarray) -> np.ndarray:
+    def solve_transposed(self, rhs: np.ndarray) -> np.ndarray:
         self._padded[:] = 0.0
         self._padded[: self.size] = rhs
         return self._factor.solve_transposed(self._padded)[: self.size]

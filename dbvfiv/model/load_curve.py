@@ -91,7 +91,7 @@ class _Linearisation:
         return -self._factor().solve(rhs)
 
     def solve_transpose(self, rhs):
-        return -self._factor().solve_transpose(rhs)
+        return -self._factor().solve_transposed(rhs)
 
     def _factor(self):
         system = self.system

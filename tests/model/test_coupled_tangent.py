@@ -86,7 +86,7 @@ def test_bordered_solve_is_the_solve_with_the_full_matrix(model, make_state, nam
     factor = model.factor()
     model.refactor(factor, tangent)
     rhs = np.random.default_rng(6).standard_normal(model.size)
-    for solve, matrix in ((factor.solve, full), (factor.solve_transpose, full.T)):
+    for solve, matrix in ((factor.solve, full), (factor.solve_transposed, full.T)):
         x = solve(rhs)
         exact = np.linalg.solve(matrix, rhs)
         assert np.linalg.norm(x - exact) < 1e-8 * np.linalg.norm(exact)
