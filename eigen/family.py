@@ -6,7 +6,6 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Hashable
 from functools import cached_property
 from typing import Any, NamedTuple
-from warnings import catch_warnings
 
 import numpy as np
 import scipy.linalg as la
@@ -273,16 +272,17 @@ class ReducedFamily(PencilFamily):
         """Eigenpairs nearest to places close to them, by two-sided Rayleigh quotient iteration (Schreiber 2008)."""
         dense, k, rng = DenseOperator(self.at(mu)), self.size, np.random.default_rng(7)
         values, right, left = np.array(places, complex), [], []
+        factor, solve = la.get_lapack_funcs(("getrf", "getrs"), dtype=complex)
         for i, s in enumerate(values):
             x, y = rng.standard_normal((2, k + dense.inner)) + 0j
             for step in range(steps + 1):
                 T, slope = dense(s if step else s * (1.0 + 1e-7) or 1e-7)
-                with catch_warnings(action="ignore", category=la.LinAlgWarning):
-                    lu = la.lu_factor(T, check_finite=False)
-                new = la.lu_solve(lu, slope @ x, check_finite=False)
-                back = la.lu_solve(lu, slope.conj().T @ y, 2, check_finite=False)
-                if not (np.isfinite(new).all() and np.isfinite(back).all()):
+                lu, pivots, singular = factor(T)
+                if singular > 0:
                     break  # an eigenvalue to the last bit
+                new, back = solve(lu, pivots, slope @ x)[0], solve(lu, pivots, slope.conj().T @ y, trans=2)[0]
+                if not (np.isfinite(new).all() and np.isfinite(back).all()):
+                    break  # nearly so
                 x, y = new / np.linalg.norm(new), back / np.linalg.norm(back)
                 T, slope = dense(s)
                 change = (y.conj() @ T @ x) / (y.conj() @ slope @ x)

@@ -160,9 +160,9 @@ class LoadCurve:
             self.extend(target)
             found = self._bracket(target)
         if found is None:
-            last = self.pressures[-1]
+            last, start = self.pressures[-1], "rest" if self.origin is None else f"{self._start:.6g} Pa"
             raise SolveError(
-                f"No equilibrium was found at {target:.6g} Pa: the curve of equilibria from rest on ends at "
+                f"No equilibrium was found at {target:.6g} Pa: the curve of equilibria from {start} on ends at "
                 f"{last:.6g} Pa, where it {self.reason}."
             )
         return self._settle(found, target), len(self._branch) - before

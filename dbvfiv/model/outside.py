@@ -83,8 +83,7 @@ class AddedMass:
         gram = motions.T @ images
         values, turn = la.eigh(0.5 * (gram + gram.T))
         told = values > len(values) * np.finfo(float).eps * values[-1]  # of the others rounding is all there is
-        scale = np.where(told, 1 / np.sqrt(np.where(told, values, 1.0)), 0.0)
-        return cls(images @ (turn * scale), slowness, motions)
+        return cls(images @ (turn / np.sqrt(np.where(told, values, np.inf))), slowness, motions)
 
     @property
     def rank(self) -> int:

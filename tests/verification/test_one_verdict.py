@@ -45,7 +45,7 @@ def is_published(asked: Asked) -> bool:
 
 @pytest.mark.parametrize("group", [n if n in (0, 3) else pytest.param(n, marks=pytest.mark.slow) for n in range(20)])
 def test_every_study_gives_one_outcome(group):
-    """A hundred states, five of a valve, a line and a pressure in each group; a group of two of the valves is quick."""
+    """A hundred states, five of a valve, a line and a pressure in each group; one group each of two valves is quick."""
     valves = "cases/dbv18.toml", "cases/dbv6.toml", "cases/dbv12-in-line.toml", "cases/dbv12.toml"
     asked = list(ask_all(random_cases(5, seed=100 + group, valves=(valves[group % 4],), each=5, mesh=COARSE)))
     judge(asked, left_open=2, differing=0)
