@@ -13,7 +13,7 @@ from .drawing import views
 from .drawing.style import draw_figures, write_figures
 from .errors import CaseError, SolveError, as_path
 from .explore import Explorer
-from .fit.damping import DampingReport, describe_damping
+from .fit.cards import DampingReport, describe_damping
 from .model import ValveModel
 from .observer import Observer, Progress, is_watched
 from .record.files import kind_of

@@ -34,8 +34,7 @@ from ..model.sizes import ValveSizes
 from ..record.files import reading
 from ..record.mesh import MeshData
 from ..shell.recovery import layer_fields
-from ..studies.session import load_result
-from ..studies.study import find_study
+from ..studies.session import find_study, load_result
 from .sheet import shown_as, stay_inside
 
 #: Time without a question after which the reduced operator is enriched, s.

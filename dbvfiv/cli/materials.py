@@ -36,7 +36,7 @@ def damping(
     dbvfiv damping my.toml --set damping.model="loss factor" --at 5,40 --plots figures
     """
     from ..drawing.materials import damping_figure
-    from ..fit.damping import describe_damping, read_frequencies
+    from ..fit.cards import describe_damping, read_frequencies
     from ..studies.case import load_case
 
     case = load_case(case_file, overrides or ())

@@ -198,8 +198,7 @@ def compare(
     from h5py import is_hdf5
 
     from ..studies.comparing import save_figure
-    from ..studies.session import load_result
-    from ..studies.study import find_study
+    from ..studies.session import find_study, load_result
 
     if files[0].is_file() and not is_hdf5(files[0]):
         found = _recognise(files, columns or (), within)

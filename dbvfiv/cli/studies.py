@@ -75,8 +75,7 @@ def _in_units_asked(case, pressures):
 
 def perform(kind: str, case, request, name: str, output: Path | None, plots: Path | None, as_json: bool) -> None:
     """Run a study on a case with what its command asks for (a `Request`), and report it."""
-    from ..studies.session import Session
-    from ..studies.study import find_study
+    from ..studies.session import Session, find_study
 
     if is_sheet(output) and request.sheet is None:
         raise CaseError(

@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 from matplotlib.figure import Figure
 
-from ..fit.cards import MaterialDamping
-from ..fit.damping import DampingReport
+from ..fit.cards import DampingReport, MaterialDamping
 from ..fit.ply import PlyFit
 from ..fit.report import FitReport
 from .style import COMPUTED, DANGER, REST, branch_looks, headline, log_axis, new_figure

@@ -1,8 +1,16 @@
 """Constants of materials from their tests: rubbers, plies and loss factors; laws and damping of a case's materials."""
 
-from dbvfiv.fit.cards import MaterialDamping, damping_of, law_from_card, law_from_case, relaxation_from_case
+from dbvfiv.fit.cards import (
+    DampingReport,
+    MaterialDamping,
+    damping_of,
+    describe_damping,
+    law_from_card,
+    law_from_case,
+    outside_band,
+    relaxation_from_case,
+)
 from dbvfiv.fit.curves import TensionTest
-from dbvfiv.fit.damping import DampingReport, describe_damping, outside_band
 from dbvfiv.fit.prony import PronyFit, fit_constant, fit_moduli, fit_relaxation, fit_tan_delta
 from dbvfiv.fit.rubber import RubberFit, fit_rubber, form_of, uniaxial_stress
 

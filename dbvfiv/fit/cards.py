@@ -1,8 +1,10 @@
-"""Laws and viscoelasticity of the materials that a case names, from its cards."""
+"""Laws, viscoelasticity and damping of the materials that a case names, from its cards; damping over frequency, of
+Rayleigh's C = alpha M + beta K as the ratio xi = alpha / (2 omega) + beta omega / 2 (Th. Eq. 5.5).
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from functools import cache
 from typing import TYPE_CHECKING, Any
@@ -10,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from dbvfiv.case.damping import celsius
+from dbvfiv.case.quantity import Quantity, number_or_text
 from dbvfiv.errors import CaseError
 from dbvfiv.fit.curves import loading_tests, read_tests
 from dbvfiv.fit.prony import (
@@ -45,6 +48,7 @@ from dbvfiv.texts import shortly
 if TYPE_CHECKING:
     from dbvfiv.case import Case
     from dbvfiv.case.damping import Relaxing
+
 
 #: Errors of a fit, rms, beyond which it says nothing of the material, and largest one that passes without a note.
 _WORST, _FAIR = 0.5, 0.1
@@ -283,3 +287,270 @@ def _between(at: np.ndarray, frequency: np.ndarray, values: np.ndarray) -> np.nd
     """Straight lines between measured points on logarithmic axes."""
     inside = np.clip(at, frequency[0], frequency[-1])
     return np.exp(np.interp(np.log(inside), np.log(frequency), np.log(values)))
+
+
+def rayleigh_ratio(frequency, alpha: float, beta: float):
+    """Damping ratio of a mode of a frequency, Hz, under Rayleigh damping by alpha, 1/s, and beta, s.
+
+    Examples
+    --------
+    >>> round(float(rayleigh_ratio(41.0, 0.0, 0.003)), 3)
+    0.386
+    """
+    omega = 2 * np.pi * np.asarray(frequency, float)
+    return 0.5 * (alpha / omega + beta * omega)
+
+
+def rayleigh_constants(ratios: tuple[float, float], frequencies: tuple[float, float]) -> tuple[float, float]:
+    """alpha and beta that give two damping ratios at two frequencies (Th. Eq. 5.5).
+
+    Between the frequencies the damping is lower, beyond them higher. One constant is negative where the ratios
+    differ by more than the frequencies do, and then no Rayleigh damping meets both.
+
+    Ratios are half the loss factors, frequencies in Hz, positive and different; alpha comes in 1/s and beta in s.
+
+    Raises
+    ------
+    MaterialError
+        For frequencies that are not two positive ones.
+
+    Examples
+    --------
+    Table 5-1 of the thesis, a ratio of 0.05 from 1 to 10 Hz; it prints 0.57 and 0.002:
+
+    >>> alpha, beta = rayleigh_constants((0.05, 0.05), (1.0, 10.0))
+    >>> round(alpha, 3), round(beta, 5)
+    (0.571, 0.00145)
+    """
+    low, high = (float(f) for f in frequencies)
+    if not (0 < low < np.inf and 0 < high < np.inf and low != high):
+        raise MaterialError(
+            f"alpha and beta follow from two different frequencies above 0 Hz, but {low:g} and {high:g} Hz were given."
+        )
+    omega = 2 * np.pi * np.array([low, high])
+    alpha, beta = np.linalg.solve(np.stack([0.5 / omega, 0.5 * omega], axis=1), np.asarray(ratios, float))
+    return float(alpha), float(beta)
+
+
+#: Steps of a decade at which the table has a row.
+_STEPS = (1.0, 2.0, 5.0)
+_SHARE = 1e-9
+
+
+@dataclass(frozen=True)
+class RayleighMatch:
+    """Rayleigh's constants, 1/s and s, that damp as a material does at two frequencies, Hz; one is negative where no
+    Rayleigh damping meets both damping ratios.
+    """
+
+    name: str
+    frequencies: tuple[float, float]
+    ratios: tuple[float, float]
+    alpha: float
+    beta: float
+
+
+@shortly
+@dataclass(frozen=True)
+class DampingReport:
+    """Damping of a case.
+
+    Attributes
+    ----------
+    case : Case
+    materials : tuple of MaterialDamping
+        Of the layers, inside to outside, each once; under Rayleigh damping those of which the case says how they
+        relax.
+    """
+
+    case: Case
+    materials: tuple[MaterialDamping, ...]
+
+    @property
+    def factor(self) -> float:
+        """Factor on the loss factors; 1 under Rayleigh damping, where they are there for comparison."""
+        return self.case.damping.loss_factor if self.case.damping.relaxes else 1.0
+
+    @property
+    def table_frequencies(self) -> np.ndarray:
+        """Round frequencies within the band and its ends, Hz."""
+        low, high = self.case.damping.band
+        first, last = int(np.floor(np.log10(low))), int(np.ceil(np.log10(high)))
+        steps = [step * 10.0**k for k in range(first, last + 1) for step in _STEPS]
+        within = [f for f in steps if low * (1 + _SHARE) < f < high * (1 - _SHARE)]
+        return np.array([low, *within, high])
+
+    def series(self, material: MaterialDamping) -> Prony:
+        """Series of a material with the factor on all loss factors."""
+        return material.prony.scaled(self.factor)
+
+    def material_ratio(self, material: MaterialDamping, frequency) -> np.ndarray:
+        """Damping ratio of what consists of one material alone: half its loss factor."""
+        return 0.5 * self.series(material).loss_factor(frequency)
+
+    def stiffening(self, material: MaterialDamping, frequency) -> np.ndarray:
+        """Storage modulus of a material over its slow one."""
+        return self.series(material).modulus(2j * np.pi * np.asarray(frequency, float)).real
+
+    def rayleigh(self, frequency) -> np.ndarray:
+        """Damping ratio by alpha and beta of the case."""
+        return rayleigh_ratio(frequency, self.case.damping.alpha, self.case.damping.beta)
+
+    def matches(self, at: tuple[float, float]) -> tuple[RayleighMatch, ...]:
+        """Rayleigh's constants for each material at two frequencies, Hz."""
+        ratios = {m.name: tuple(float(x) for x in self.material_ratio(m, np.array(at))) for m in self.materials}
+        return tuple(RayleighMatch(name, tuple(at), own, *rayleigh_constants(own, at)) for name, own in ratios.items())
+
+    def summary(self, at: tuple[float, float] | None = None) -> dict[str, Any]:
+        """Plain numbers for JSON."""
+        damping, frequency = self.case.damping, self.table_frequencies
+        found = {
+            "model": damping.model,
+            "alpha": damping.alpha,
+            "beta": damping.beta,
+            "loss_factor": damping.loss_factor,
+            "band": damping.band,
+            "frequencies": frequency,
+            "rayleigh_ratio": self.rayleigh(frequency),
+            "materials": [self._entry(material, frequency) for material in self.materials],
+        }
+        if at is not None:
+            found["matches"] = list(self.matches(at))
+            found["warning"] = outside_band(self.case, at)
+        return found
+
+    def _entry(self, material: MaterialDamping, frequency: np.ndarray) -> dict[str, Any]:
+        series, fit = self.series(material), material.fit
+        return {
+            "name": material.name,
+            "source": material.source,
+            "fitted": fit.quantity if fit else None,
+            "largest_error": fit.largest_error if fit else None,
+            "rms_error": fit.rms_error if fit else None,
+            "note": material.note,
+            "strengths": series.strengths,
+            "times": series.times,
+            "damping_ratio": self.material_ratio(material, frequency),
+            "storage_over_slow": self.stiffening(material, frequency),
+        }
+
+    def lines(self, at: tuple[float, float] | None = None) -> list[str]:
+        """Lines of the report as text; `at` adds the Rayleigh constants that match at two frequencies, Hz."""
+        damping = self.case.damping
+        low, high = damping.band
+        if damping.relaxes:
+            lines = [
+                f"Loss factors, layer by layer, times {damping.loss_factor:g}, and alpha = {damping.alpha:g} 1/s; "
+                f"{damping.branches} branches over {low:g} to {high:g} Hz."
+            ]
+        else:
+            lines = [f"Rayleigh damping, alpha = {damping.alpha:g} 1/s, beta = {damping.beta:g} s."]
+            if self.materials:
+                lines.append("For comparison, what the materials lose by their loss factors:")
+        lines += ["", *_table(("material", "fit: largest", "rms", "source"), [_fit_row(m) for m in self.materials])]
+        lines += [f"Note: {m.note}" for m in self.materials if m.note]
+        return [*lines, "", *self._ratio_lines(), *(self._match_lines(at) if at is not None else [])]
+
+    def _ratio_lines(self) -> list[str]:
+        frequency, damping = self.table_frequencies, self.case.damping
+        own = {}
+        if damping.alpha or not damping.relaxes:
+            own["alpha" if damping.relaxes else "alpha, beta"] = self.rayleigh(frequency)
+        own |= {m.name: self.material_ratio(m, frequency) for m in self.materials}
+        lines = ["Damping ratio over frequency (half the loss factor of a material):", *_columns(frequency, own)]
+        if self.materials:
+            stiff = {m.name: self.stiffening(m, frequency) for m in self.materials}
+            lines += ["", "Storage modulus over the slow one:", *_columns(frequency, stiff)]
+        return lines
+
+    def _match_lines(self, at: tuple[float, float]) -> list[str]:
+        rows = [
+            (m.name, f"{m.ratios[0]:.4g}", f"{m.ratios[1]:.4g}", f"{m.alpha:.4g}", f"{m.beta:.4g}")
+            for m in self.matches(at)
+        ]
+        titles = ("material", f"at {at[0]:g} Hz", f"at {at[1]:g} Hz", "alpha, 1/s", "beta, s")
+        lines = ["", "Rayleigh damping of the same ratio at both frequencies (Eq. 5.5):", *_table(titles, rows)]
+        if any(min(m.alpha, m.beta) < 0 for m in self.matches(at)):
+            lines.append("A negative constant: no Rayleigh damping meets both ratios.")
+        outside = outside_band(self.case, at)
+        return [*lines, *([f"Note: {outside}"] if outside else [])]
+
+
+def describe_damping(case: Case) -> DampingReport:
+    """Report on the damping of a case.
+
+    Raises
+    ------
+    CaseError
+        For data of a material that cannot be used.
+    """
+    names = dict.fromkeys(layer.material for layer in case.layers)
+    told = [name for name in names if case.damping.relaxes or case.materials.loss(name) is not None]
+    return DampingReport(case, tuple(damping_of(case, name) for name in told))
+
+
+def outside_band(case: Case, frequencies: Iterable[float]) -> str | None:
+    """Warning where frequencies, Hz, leave the band in which the loss factors of a case hold.
+
+    Zero (no oscillation) and non-finite values are left out. None where all lie within, under Rayleigh damping, and
+    where every material is a series given outright.
+    """
+    names = {layer.material for layer in case.layers}
+    cards = [case.materials.loss(name) for name in names]
+    if not case.damping.relaxes or all(card is not None and card.prony is not None for card in cards):
+        return None
+    low, high = case.damping.band
+    asked = np.array([abs(float(f)) for f in frequencies])
+    asked = asked[np.isfinite(asked) & (asked > 0)]
+    beyond = np.sort(asked[(asked < low * (1 - _SHARE)) | (asked > high * (1 + _SHARE))])
+    if not beyond.size:
+        return None
+    if beyond.size <= 3:
+        which = f"{_listed([f'{f:.4g}' for f in beyond])} Hz"
+    else:
+        which = f"{beyond.size} of {asked.size} frequencies, between {beyond[0]:.4g} and {beyond[-1]:.4g} Hz,"
+    verb = "lies" if beyond.size == 1 else "lie"
+    return (
+        f"{which} {verb} outside damping.band, {low:g} to {high:g} Hz, over which the loss factors hold; the materials "
+        "damp less there than given, or the band must be widened."
+    )
+
+
+def read_frequencies(given: str | Sequence[float]) -> tuple[float, float]:
+    """Two frequencies, Hz, of a text such as "5,40" or "5 Hz, 40 Hz", or of two numbers.
+
+    Raises
+    ------
+    CaseError
+    """
+    quantity = Quantity("Hz")
+    parts = given.split(",") if isinstance(given, str) else list(given)
+    try:
+        values = [quantity.parse(number_or_text(part)) for part in parts]
+    except ValueError as error:
+        raise CaseError(f"--at is given as {given!r}, {error}; it must be two frequencies such as 5,40.") from None
+    if len(values) != 2 or min(values) <= 0 or values[0] == values[1]:
+        raise CaseError(f"--at is given as {given!r}; it must be two different frequencies above 0 Hz, such as 5,40.")
+    return min(values), max(values)
+
+
+def _fit_row(material: MaterialDamping) -> tuple[str, str, str, str]:
+    fit = material.fit
+    errors = (f"{100 * fit.largest_error:.2g} %", f"{100 * fit.rms_error:.2g} %") if fit else ("none", "none")
+    return material.name, *errors, material.source
+
+
+def _columns(frequency: np.ndarray, columns: dict[str, np.ndarray]) -> list[str]:
+    """Lines of a table over frequencies."""
+    shown = [[f"{value:.4g}" for value in values] for values in columns.values()]
+    return _table(("Hz", *columns), list(zip([f"{f:g}" for f in frequency], *shown)))
+
+
+def _table(titles: Sequence[str], rows: Sequence[Sequence[str]]) -> list[str]:
+    """Lines of a table, its columns aligned."""
+    widths = [max(len(row[i]) for row in (titles, *rows)) for i in range(len(titles))]
+    return ["  ".join(cell.ljust(width) for cell, width in zip(row, widths)).rstrip() for row in (titles, *rows)]
+
+
+def _listed(words: list[str]) -> str:
+    return words[0] if len(words) == 1 else ", ".join(words[:-1]) + f" and {words[-1]}"

@@ -11,8 +11,7 @@ import numpy as np
 from ..case.model import Case
 from ..case.tables import read_drive_table
 from .scheme import Scheme, scheme
-from .state import MotionState
-from .stepper import StepFailure, StepOptions, Stepper, StepResult
+from .stepper import MotionState, StepFailure, StepOptions, Stepper, StepResult
 
 
 @dataclass(frozen=True)

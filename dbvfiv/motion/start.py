@@ -18,7 +18,7 @@ from ..model.leading import select_search
 from ..model.newton import NewtonOptions
 from ..observer import Observer
 from .equations import ValveMotion
-from .state import MotionState, consistent_state
+from .stepper import MotionState, consistent_state
 
 
 @dataclass(frozen=True)

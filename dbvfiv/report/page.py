@@ -19,10 +19,9 @@ from ..case.write import case_toml
 from ..errors import CaseError
 from ..studies.stability.place import fixed_conditions
 from .answers import UNKNOWN, Answer, answers, trade
-from .content import Part, Picture
 from .figures import library
 from .gather import Gathered
-from .parts import MAKERS, first_pictures
+from .parts import MAKERS, Part, Picture, first_pictures
 
 
 @dataclass(frozen=True)

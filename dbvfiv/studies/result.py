@@ -16,8 +16,7 @@ from ..record.mesh import MeshData, WholeValve
 from ..record.record import Record, copy_record, tabulate
 from ..record.vtkhdf import Step, export_result
 from .case import Case
-from .session import Session
-from .study import find_study
+from .session import Session, find_study
 
 
 class StudyResult:

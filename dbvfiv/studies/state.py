@@ -26,8 +26,7 @@ from ..record.vtkhdf import Step, layer_field_names, motion
 from ..shell.recovery import LayerFields
 from .case import Case
 from .result import StudyResult
-from .session import Session, named_changes
-from .study import find_study
+from .session import Session, find_study, named_changes
 
 
 @dataclass(frozen=True, eq=False)

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from ..observer import Observer
-from ..report.content import Part, Picture, Table
+from ..report.parts import Part, Picture, Table
 from ..studies.case import thesis_case
 from ..studies.closure.study import ClosureResult
 from ..studies.session import Session, kept_run

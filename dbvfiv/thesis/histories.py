@@ -7,7 +7,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from typing import Any
 
-from ..report.content import Picture, picture, pictures_of
+from ..report.parts import Picture, picture, pictures_of
 from ..studies.transient import figures
 from .entry import Found, Number, Workshop, entry
 

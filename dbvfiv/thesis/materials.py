@@ -7,11 +7,11 @@ import scipy.sparse.linalg as spla
 
 from ..drawing.style import branch_looks, new_figure
 from ..errors import SolveError
-from ..fit.damping import rayleigh_constants
+from ..fit.cards import rayleigh_constants
 from ..fit.rubber import uniaxial_stress
 from ..materials.laws import fibre_ply, ply_from_constituents
 from ..materials.shipped import published_rubber, strain_levels
-from ..report.content import picture
+from ..report.parts import picture
 from ..shell import Layer, Section, Shell, ShellMesh
 from .entry import Number, Workshop, entry
 

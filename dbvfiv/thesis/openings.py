@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from ..drawing.views import deformed, layer_stress
-from ..report.content import Picture, picture, pictures_of
+from ..report.parts import Picture, picture, pictures_of
 from ..studies.case import Case
 from ..studies.steady import figures
 from ..studies.steady.figures import HEAD_DISCHARGE

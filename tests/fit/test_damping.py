@@ -14,7 +14,7 @@ from dbvfiv.case import CaseError
 from dbvfiv.case.damping import SHIPPED_LOSSES
 from dbvfiv.case.parameters import Mu
 from dbvfiv.fit import damping_of, relaxation_from_case
-from dbvfiv.fit.damping import describe_damping, outside_band, rayleigh_constants, rayleigh_ratio, read_frequencies
+from dbvfiv.fit.cards import describe_damping, outside_band, rayleigh_constants, rayleigh_ratio, read_frequencies
 from dbvfiv.materials import MaterialError, shipped_loss, shipped_loss_names
 from dbvfiv.model.build import build_section
 from dbvfiv.studies.case import Case, thesis_case

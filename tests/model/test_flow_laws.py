@@ -13,8 +13,7 @@ from dbvfiv.model.newton import NewtonOptions
 from dbvfiv.model.residual import ValveResidual
 from dbvfiv.motion.equations import ValveMotion
 from dbvfiv.motion.scheme import scheme
-from dbvfiv.motion.state import consistent_state
-from dbvfiv.motion.stepper import StepOptions, Stepper
+from dbvfiv.motion.stepper import StepOptions, Stepper, consistent_state
 from eigen import leading_modes
 from tests.flow.test_adding_a_law import LipLoss, Pipe
 from tests.flow.vessel import Vessel

@@ -8,8 +8,7 @@ import pytest
 from dbvfiv.model.residual import ValveResidual
 from dbvfiv.motion.equations import ValveMotion
 from dbvfiv.motion.scheme import scheme
-from dbvfiv.motion.state import consistent_state
-from dbvfiv.motion.trial import Trial
+from dbvfiv.motion.stepper import Trial, consistent_state
 
 LAWS = [
     {"fluid.continuity": "quasi-steady"},

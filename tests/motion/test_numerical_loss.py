@@ -7,8 +7,7 @@ import pytest
 
 from dbvfiv.contact import ContactLaw, Rebound
 from dbvfiv.motion.scheme import scheme
-from dbvfiv.motion.state import consistent_state
-from dbvfiv.motion.stepper import StepOptions, Stepper
+from dbvfiv.motion.stepper import StepOptions, Stepper, consistent_state
 from tests.systems.bouncing import BouncingMotion, Planes
 
 TIGHT = StepOptions(tolerance=1e-12, floor=1e-15, largest_turn=np.inf)

@@ -7,8 +7,7 @@ import pytest
 
 import dbvfiv
 from dbvfiv.motion.control import RunOptions
-from dbvfiv.motion.equations import ValveMotion
-from dbvfiv.motion.outside import OutsideCorrection
+from dbvfiv.motion.equations import OutsideCorrection, ValveMotion
 from dbvfiv.studies.transient.run import Runner
 from tests.observers import Stop
 from tests.small_valves import make_valve

@@ -5,7 +5,7 @@ import pytest
 
 from continuation.harmonics import Harmonics
 from continuation.periodic import PeriodicMotion
-from dbvfiv.motion import periodic_wall
+from dbvfiv.motion import periodic as periodic_wall
 from dbvfiv.motion.periodic import PeriodicValve
 from tests.motion.test_periodic import motion_of, valve_of
 from tests.small_valves import make_valve

@@ -11,8 +11,7 @@ from scipy.linalg import expm
 from dbvfiv.materials import IsotropicElastic
 from dbvfiv.materials.prony import Prony
 from dbvfiv.motion.scheme import scheme
-from dbvfiv.motion.state import consistent_state
-from dbvfiv.motion.stepper import StepOptions, Stepper
+from dbvfiv.motion.stepper import StepOptions, Stepper, consistent_state
 from dbvfiv.shell import Layer, Section, Shell, ShellMesh
 from tests.shell.structures import observed_order, random_state, rectangle
 from tests.verification.moving import ShellMotion

@@ -6,8 +6,7 @@ import pytest
 from dbvfiv.motion.control import ControlOptions, FixedSteps, step_control
 from dbvfiv.motion.equations import ValveMotion
 from dbvfiv.motion.scheme import scheme
-from dbvfiv.motion.state import consistent_state
-from dbvfiv.motion.stepper import StepFailure, StepOptions, Stepper
+from dbvfiv.motion.stepper import StepFailure, StepOptions, Stepper, consistent_state
 from tests.small_valves import FORMER
 
 TIGHT = StepOptions(tolerance=1e-9, floor=1e-13)

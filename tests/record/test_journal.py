@@ -12,8 +12,7 @@ import pytest
 
 from dbvfiv.errors import CaseError, DiskFull
 from dbvfiv.record.header import Header
-from dbvfiv.record.journal import Journal
-from dbvfiv.record.record import GrowingRecord, StoredRecord
+from dbvfiv.record.record import GrowingRecord, Journal, StoredRecord
 from dbvfiv.record.table import TEXT, Column, TableSpec
 from dbvfiv.studies.case import Case, thesis_case
 

@@ -12,8 +12,7 @@ from dbvfiv.case.parameters import Mu
 from dbvfiv.errors import CaseError, SolveError
 from dbvfiv.motion.equations import ValveMotion
 from dbvfiv.motion.scheme import scheme
-from dbvfiv.motion.state import consistent_state
-from dbvfiv.motion.stepper import Stepper
+from dbvfiv.motion.stepper import Stepper, consistent_state
 from dbvfiv.studies.case import thesis_case
 from dbvfiv.studies.life import Life, motion_of
 from dbvfiv.studies.session import Session, load_result, resume_result

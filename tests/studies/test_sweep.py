@@ -14,7 +14,7 @@ from dbvfiv.model.equilibria import LoadPath
 from dbvfiv.studies.case import thesis_case
 from dbvfiv.studies.modes.search import ModesOptions, run_modes
 from dbvfiv.studies.session import Session
-from dbvfiv.studies.sweep import branches as tracked
+from dbvfiv.studies.sweep import study as tracked
 from tests.observers import Stop
 
 LIGHT = Mu(density=10.0, alpha=0.0, beta=0.003)

@@ -24,7 +24,7 @@ from dbvfiv.errors import CaseError
 from dbvfiv.record.record import GrowingRecord, Record
 from dbvfiv.studies import KINDS
 from dbvfiv.studies.case import thesis_case
-from dbvfiv.studies.study import find_study
+from dbvfiv.studies.session import find_study
 
 CASE = {"mesh.around": 4, "mesh.along": 6, "drive.pressure": 2e3, "fluid.density": 10}
 #: A valve that has cycles.

@@ -13,8 +13,7 @@ import pytest
 from dbvfiv.case.parameters import Mu
 from dbvfiv.motion.equations import ValveMotion
 from dbvfiv.motion.scheme import scheme
-from dbvfiv.motion.state import consistent_state
-from dbvfiv.motion.stepper import StepOptions, Stepper
+from dbvfiv.motion.stepper import StepOptions, Stepper, consistent_state
 from dbvfiv.studies.case import thesis_case
 from dbvfiv.studies.session import Session
 

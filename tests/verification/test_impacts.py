@@ -12,8 +12,7 @@ from scipy.optimize import brentq
 
 from dbvfiv.contact import ContactLaw, Rebound, mean_pressure
 from dbvfiv.motion.scheme import scheme
-from dbvfiv.motion.state import consistent_state
-from dbvfiv.motion.stepper import StepOptions, Stepper
+from dbvfiv.motion.stepper import StepOptions, Stepper, consistent_state
 from tests.systems.bouncing import BouncingMotion, Planes, bar, cantilever
 
 TIGHT = StepOptions(tolerance=1e-9, floor=1e-13, largest_turn=np.inf)

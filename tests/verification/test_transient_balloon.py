@@ -13,8 +13,7 @@ from scipy.interpolate import CubicSpline
 from scipy.optimize import brentq
 
 from dbvfiv.motion.scheme import scheme
-from dbvfiv.motion.state import consistent_state
-from dbvfiv.motion.stepper import StepOptions, Stepper
+from dbvfiv.motion.stepper import StepOptions, Stepper, consistent_state
 from tests.shell.structures import richardson
 from tests.verification.moving import ShellMotion
 from tests.verification.test_shell_balloon import RUBBER, H, octant

@@ -14,8 +14,7 @@ import dbvfiv
 from dbvfiv.motion.equations import ValveMotion
 from dbvfiv.motion.scheme import scheme
 from dbvfiv.motion.start import steady_positions
-from dbvfiv.motion.state import consistent_state
-from dbvfiv.motion.stepper import StepOptions, Stepper
+from dbvfiv.motion.stepper import StepOptions, Stepper, consistent_state
 from dbvfiv.studies.case import thesis_case
 from tests.small_valves import FORMER
 from tests.verification.moving import PointMotion

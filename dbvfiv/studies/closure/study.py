@@ -38,9 +38,8 @@ from ...shell.recovery import LayerFields
 from ..comparing import Compared, Comparison, draw_shapes
 from ..measured import PASSAGE, Measured, keep_measured
 from ..result import StudyResult
-from ..session import Session
+from ..session import Session, Study, print_rows
 from ..state import pressure_steps
-from ..study import Study, print_rows
 from . import figures
 from .safety import (
     ClassBuckling,

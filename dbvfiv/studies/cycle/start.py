@@ -14,8 +14,7 @@ from ...errors import CaseError, SolveError
 from ...model import ValveModel
 from ...motion.equations import ValveMotion
 from ...motion.scheme import scheme
-from ...motion.state import consistent_state
-from ...motion.stepper import StepFailure, Stepper
+from ...motion.stepper import StepFailure, Stepper, consistent_state
 from ...observer import Observer
 from ..case import Case
 from ..orbits import Onset, onset_at

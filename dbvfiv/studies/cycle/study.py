@@ -32,11 +32,10 @@ from ...shell.recovery import layer_fields
 from ..case import Case
 from ..orbits import MODES, Follower, Orbit
 from ..result import StudyResult
-from ..session import Session
+from ..session import Session, Study, print_rows
 from ..stability.place import check_scan, describe_fixed, fixed_conditions, models_of
 from ..stability.verdict import Verdict
 from ..stability.walk import StabilityWalk
-from ..study import Study, print_rows
 from . import figures
 from .start import find_onset, given_motion
 

@@ -14,8 +14,7 @@ from ...record.table import Column, TableSpec
 from ..case import Case
 from ..inputs import Plan, quasi_random
 from ..workers import Lost, Work, Workers
-from .learning import MORE, SMALL, Learning, coordinates
-from .posterior import sample_posterior
+from .learning import MORE, SMALL, Learning, coordinates, sample_posterior
 from .valves import MODES, Begins, Modes, Places, Valves
 
 VALVES, SPECTRA, BEGINS, POSTERIOR = "valves", "spectra", "onsets", "posterior"

@@ -23,13 +23,11 @@ from ...record.table import TableSpec
 from ..case import Case
 from ..inputs import Plan
 from ..result import StudyResult
-from ..session import Session
+from ..session import Session, Study
 from ..stability.place import check_scan, describe_fixed
 from ..stability.walk import StabilityWalk
-from ..study import Study
 from ..workers import Workers
-from .learning import Learning, coordinates
-from .posterior import Learned
+from .learning import Learned, Learning, coordinates
 from .search import (
     BEGINS,
     POSTERIOR,

@@ -13,8 +13,7 @@ from ...record.mesh import MeshData
 from ...record.record import GrowingRecord
 from ...record.table import TEXT, Column, Shown, TableSpec, printed_head, printed_row
 from ..result import StudyResult
-from ..session import Session
-from ..study import Study
+from ..session import Session, Study
 
 LEVELS = "levels"
 _LEVEL = "Strain level whose constants it has; NaN of rubbers without levels"

@@ -21,13 +21,12 @@ from ...record.record import GrowingRecord, Record
 from ...record.table import Column, TableSpec
 from ..case import Case
 from ..result import StudyResult
-from ..session import Session
+from ..session import Session, Study
 from ..stability.dimensions import leading_class
 from ..stability.place import check_scan, describe_fixed, fixed_conditions
 from ..stability.samples import SAMPLE_TABLE, SAMPLES, Sample, keep_samples, read_samples
 from ..stability.verdict import DIVERGES, FLUTTERS, NOT_VALID, OUTCOMES, STABLE, Verdict
 from ..stability.walk import StabilityWalk
-from ..study import Study
 from . import chances, cycles, figures
 from .column import ColumnPool, ColumnTask, MapColumn, MapPlan, grid_of
 from .curves import OnsetCurve, Web, doubts, linked

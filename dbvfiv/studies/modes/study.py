@@ -21,12 +21,11 @@ from ...record.table import TableSpec
 from ...record.vtkhdf import Step, motion
 from ..case import Case
 from ..result import StudyResult
-from ..session import Session, describe_surroundings
+from ..session import Session, Study, describe_surroundings
 from ..stability.dimensions import Variant, compare_states, own_variant, variants
 from ..stability.verdict import Verdict
 from ..stability.walk import StabilityWalk
 from ..state import State, states_of
-from ..study import Study
 from . import figures
 from .figures import animate_mode
 from .search import CURVE, MODE, Certificate, FoundModes, ModeShape, ModesOptions, critical_damping_factor, run_modes

@@ -16,13 +16,12 @@ from ...record.mesh import MeshData
 from ...record.record import GrowingRecord, Record
 from ...record.table import TableSpec
 from ..result import StudyResult
-from ..session import Session
+from ..session import Session, Study
 from ..stability.dimensions import Variant, compare_ranges, leading_class, own_variant, variants
 from ..stability.place import describe_fixed, fixed_conditions
 from ..stability.samples import SAMPLE_TABLE, Sample, keep_samples, read_samples
 from ..stability.verdict import DIVERGES, FLUTTERS, NOT_VALID, STABLE, UNDECIDED, Verdict, lowered
 from ..stability.walk import StabilityWalk
-from ..study import Study
 from . import figures
 from .line import FoundOnsets, Interval, OnsetPoint, common_stretches, disagreements, joined_stretches, merge_points
 from .search import FINE, OnsetOptions, run_onset

@@ -23,12 +23,11 @@ from ...record.record import GrowingRecord
 from ...record.states import read_states, state_row, state_table
 from ...record.table import TEXT, Column, TableSpec
 from ..result import StudyResult
-from ..session import Session, describe_surroundings
+from ..session import Session, Study, describe_surroundings
 from ..stability.derivatives import PERFORMANCE, Neighbourhood, Sensitivity, parameters_of, require_number, unit_of
 from ..stability.place import describe_fixed
 from ..stability.walk import ValveFamily, name_state_in_failures
 from ..state import State, states_of
-from ..study import Study
 
 #: Modes searched for beyond the one asked for, so that its rank is certain.
 _MARGIN = 3

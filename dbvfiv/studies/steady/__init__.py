@@ -1,8 +1,12 @@
-"""``dbvfiv steady``: equilibria over a list of pressures."""
+"""``dbvfiv steady``: equilibria over a list of pressures, and the catalogue sheet of them."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+import csv
+import math
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -15,9 +19,9 @@ from ...case.model import Case
 from ...case.physics import LoadPressure
 from ...case.quantity import Number, Quantity, number_or_text
 from ...case.section import Section, key
+from ...case.units import Units, factor_of
 from ...errors import CaseError
 from ..request import Request, is_sheet, with_unit
-from .sheet import require_sheet, write_sheet
 
 ORDER = 20
 
@@ -76,7 +80,7 @@ Sizes = Annotated[
         help="Of a sheet: one size, valve.scale as a number or the bore, '100 mm' or '4 in'; repeated for several.",
     ),
 ]
-Units = Annotated[
+UnitsOption = Annotated[
     str | None,
     typer.Option(
         "--units", metavar="U,U", help="Units of tables and sheet, 'ft, gpm, ft/s, in'; else m, L/s, m/s, mm."
@@ -85,7 +89,7 @@ Units = Annotated[
 
 
 def command(
-    case: Case, pressures: Pressures = None, sizes: Sizes = None, units: Units = None, output: Path | None = None
+    case: Case, pressures: Pressures = None, sizes: Sizes = None, units: UnitsOption = None, output: Path | None = None
 ) -> Request:
     """Equilibria of the coupled valve: flow, lip area, jet velocity, deflections, layer stresses.
 
@@ -149,3 +153,97 @@ def _range(text: str, density: float) -> tuple[float, ...]:
             f"--pressure is given as {text!r}, {error}; a range is START:STOP:COUNT, with ':log' behind it for "
             f"logarithmic steps."
         ) from None
+
+
+@dataclass(frozen=True)
+class SheetColumn:
+    """A column of the sheet.
+
+    Attributes
+    ----------
+    title : str
+    kind : str
+        Quantity whose unit can be chosen, a key of `dbvfiv.case.units.UNITS`; empty for one of fixed unit.
+    unit : str
+        Unit where none is chosen.
+    value : callable
+        From a steady `State` of a result to the number, in SI units where there is a kind.
+    """
+
+    title: str
+    kind: str
+    unit: str
+    value: Callable[[Any], float]
+
+
+COLUMNS = (
+    SheetColumn("bore", "size", "mm", lambda s: 2 * _bore(s)),
+    SheetColumn("static head", "head", "m", lambda s: s.head),
+    SheetColumn("static pressure", "pressure", "kPa", lambda s: s.flange_pressure),
+    SheetColumn("flow", "flow", "L/s", lambda s: s.volume_flow),
+    SheetColumn("velocity", "velocity", "m/s", lambda s: s.hydraulics.flange_velocity),
+    SheetColumn("jet velocity", "velocity", "m/s", lambda s: s.outlet_velocity),
+    SheetColumn("head loss", "head", "m", lambda s: s.hydraulics.head_loss),
+    SheetColumn("K", "", "", lambda s: s.hydraulics.loss_coefficient),
+    SheetColumn("Kv", "", "m3/h", lambda s: s.hydraulics.kv),
+    SheetColumn("Cv", "", "gpm", lambda s: s.hydraulics.cv),
+    SheetColumn("opening", "size", "mm", lambda s: s.lip_opening),
+)
+
+
+def _bore(state: Any) -> float:
+    valve = state.results.case.valve
+    return valve.inlet_radius - valve.flange_wall_deduction
+
+
+def require_sheet(path: Path) -> None:
+    """Refuse a sheet that cannot be written before anything is computed.
+
+    Raises
+    ------
+    CaseError
+    """
+    if path.suffix.lower() == ".xlsx" and find_spec("openpyxl") is None:
+        raise CaseError(
+            f"{str(path)!r} needs the package openpyxl (pip install 'dbvfiv[report]'); a name in .csv does not."
+        )
+    if path.is_dir() or not path.absolute().parent.is_dir():
+        raise CaseError(f"{str(path)!r} cannot be written: it is a folder, or its folder does not exist.")
+
+
+def sheet_rows(states: Iterable[Any], units: Units) -> list[list[str | float | None]]:
+    """Head line and one row for each state that flows; a number that is not finite is left blank."""
+    names = [_unit(column, units) for column in COLUMNS]
+    factors = [factor_of(column.kind, name) if column.kind else 1.0 for column, name in zip(COLUMNS, names)]
+    rows: list[list[str | float | None]] = [
+        [f"{column.title} [{name}]" if name else column.title for column, name in zip(COLUMNS, names)]
+    ]
+    for state in states:
+        if state.hydraulics is not None:
+            values = (column.value(state) / factor for column, factor in zip(COLUMNS, factors))
+            rows.append([float(f"{value:.6g}") if math.isfinite(value) else None for value in values])
+    return rows
+
+
+def _unit(column: SheetColumn, units: Units) -> str:
+    """Unit of a column; pressures have one of their own beside heads."""
+    if not column.kind or (column.kind == "pressure" and units.heads):
+        return column.unit
+    return units.name(column.kind)
+
+
+def write_sheet(path: Path, states: Sequence[Any]) -> Path:
+    """Write the sheet in the units of its case; one of that name is replaced."""
+    rows = sheet_rows(states, states[0].results.case.units if states else Units("", 1.0))
+    if path.suffix.lower() == ".csv":
+        with path.open("w", newline="", encoding="utf-8") as file:
+            csv.writer(file).writerows(rows)
+        return path
+    from openpyxl import Workbook  # optional
+
+    book = Workbook()
+    book.active.title = "steady"
+    for row in rows:
+        book.active.append(row)
+    book.save(path)
+    return path

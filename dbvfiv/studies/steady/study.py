@@ -42,9 +42,8 @@ from ..case import Case
 from ..comparing import Compared, Comparison, draw_shapes
 from ..measured import FLOW, LIP_AREA, Measured, keep_measured
 from ..result import StudyResult
-from ..session import Session
+from ..session import Session, Study, print_rows
 from ..state import State, gather_states, pressure_steps, reach_states, states_of
-from ..study import Study, print_rows
 from . import figures
 
 #: Table of the states, and kinds of the notes that hold the cracking pressure, limit points, further equilibria at the

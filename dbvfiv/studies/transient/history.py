@@ -16,8 +16,7 @@ from ...model import ValveModel
 from ...model.state import LipCentre
 from ...motion.control import RunOptions
 from ...motion.equations import ValveMotion
-from ...motion.state import MotionState
-from ...motion.stepper import StepResult
+from ...motion.stepper import MotionState, StepResult
 from ...record.mesh import MeshData
 from ...record.record import GrowingRecord, Record
 from ...record.states import LIP, NODAL, OPENING, STATION_AREA, by_node, by_row, by_unknown
@@ -225,7 +224,7 @@ STATE_COLUMNS = (
 
 
 def _of_state(name: str, units: str, words: str, shape: Any = ()) -> Column:
-    """Column of the state of a motion between two steps, see `dbvfiv.motion.state.MotionState`."""
+    """Column of the state of a motion between two steps, see `dbvfiv.motion.stepper.MotionState`."""
     return Column(name, units, words, shape=shape, read=lambda p: getattr(p.state, name))
 
 

@@ -17,8 +17,7 @@ from ...model.material_stability import material_stability
 from ...motion.control import Drive, RunOptions, step_control
 from ...motion.equations import ValveMotion
 from ...motion.start import first_state, steady_fluid
-from ...motion.state import MotionState, consistent_state
-from ...motion.stepper import StepFailure, Stepper
+from ...motion.stepper import MotionState, StepFailure, Stepper, consistent_state
 from ...record.files import kind_of
 from ...record.header import Header
 from ...record.mesh import MeshData

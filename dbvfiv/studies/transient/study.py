@@ -18,10 +18,9 @@ from ...record.record import GrowingRecord, Record
 from ...record.vtkhdf import Step
 from ..comparing import labels
 from ..result import StudyResult
-from ..session import Session
+from ..session import Session, Study
 from ..stability.verdict import DIVERGES, FLUTTERS, STABLE, UNDECIDED, Verdict
 from ..state import StateSteps
-from ..study import Study
 from . import figures
 from .history import HISTORY, RESTART, STATE_COLUMNS, STATES, rows_to_keep, tables_of
 from .run import NUMBERS, REFUSAL, Runner, assess

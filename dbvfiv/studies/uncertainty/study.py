@@ -18,17 +18,15 @@ from ...record.table import Column, TableSpec
 from ..case import Case
 from ..inputs import CONFIDENCE, Plan, Probability, counted, quasi_random
 from ..result import StudyResult
-from ..session import Session
+from ..session import Session, Study
 from ..stability.dimensions import flow_models
 from ..stability.neighbours import CHECKS, NEAR_SEED, TAKEN, Neighbours, find_neighbours
 from ..stability.place import check_scan, describe_fixed, fixed_conditions
 from ..stability.verdict import DIVERGES, FLUTTERS, NOT_VALID, OUTCOMES, STABLE, UNDECIDED
 from ..stability.walk import StabilityWalk
-from ..study import Study
 from ..workers import Lost, Work, Workers, require_answer
 from . import figures
-from .sampler import Found, Sampler, Start
-from .sampling import Shifted, approach, shares, subset, weighted
+from .sampling import Found, Sampler, Shifted, Start, approach, shares, subset, weighted
 
 SAMPLES, NUMBERS = "samples", "numbers"
 #: Notes: reason of an undecided sample; error of the space that samples share at a value of the range; a sample found

@@ -11,7 +11,7 @@ from dbvfiv.errors import CaseError
 from dbvfiv.observer import Observer
 from dbvfiv.studies.identify.valves import least_damping, onsets
 from dbvfiv.studies.inputs import Plan
-from dbvfiv.studies.response.transfer import Transfer
+from dbvfiv.studies.response.study import Transfer
 from dbvfiv.studies.stability.walk import StabilityWalk
 from tests.small_valves import SMALL, load_small
 

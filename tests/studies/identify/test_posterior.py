@@ -6,7 +6,7 @@ from scipy.stats import norm
 
 from dbvfiv.case.distribution import Distribution
 from dbvfiv.case.quantity import Quantity
-from dbvfiv.studies.identify.posterior import Emulator, Learned, expected_variance, sample_posterior
+from dbvfiv.studies.identify.learning import Emulator, Learned, expected_variance, sample_posterior
 from dbvfiv.studies.identify.study import distribution_text
 from dbvfiv.studies.identify.valves import follow, least_damping, onsets
 

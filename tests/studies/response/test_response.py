@@ -9,7 +9,7 @@ import pytest
 import dbvfiv
 from dbvfiv.case.parameters import Mu
 from dbvfiv.studies.case import load_case
-from dbvfiv.studies.response.transfer import OUTPUTS, Transfer
+from dbvfiv.studies.response.study import OUTPUTS, Transfer
 from dbvfiv.studies.stability.walk import StabilityWalk
 from tests.small_valves import SMALL, load_small
 

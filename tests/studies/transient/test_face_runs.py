@@ -9,8 +9,7 @@ from dbvfiv.model.dynamics import linearise
 from dbvfiv.motion.equations import ValveMotion
 from dbvfiv.motion.scheme import scheme
 from dbvfiv.motion.start import steady_positions
-from dbvfiv.motion.state import consistent_state
-from dbvfiv.motion.stepper import StepOptions, Stepper
+from dbvfiv.motion.stepper import StepOptions, Stepper, consistent_state
 from dbvfiv.studies.session import load_result
 from dbvfiv.studies.transient.figures import energies
 from tests.observers import Stop

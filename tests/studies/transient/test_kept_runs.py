@@ -16,9 +16,8 @@ from dbvfiv.case import CaseError
 from dbvfiv.motion import stepper
 from dbvfiv.motion.control import RunOptions
 from dbvfiv.record.header import Header
-from dbvfiv.record.journal import Journal
 from dbvfiv.record.mesh import MeshData
-from dbvfiv.record.record import GrowingRecord, StoredRecord
+from dbvfiv.record.record import GrowingRecord, Journal, StoredRecord
 from dbvfiv.studies.case import THESIS, Case
 from dbvfiv.studies.session import load_result
 from dbvfiv.studies.transient import history
