@@ -12,7 +12,7 @@ import numpy as np
 from dbvfiv.model import ValveModel
 from dbvfiv.motion.control import RunOptions
 from dbvfiv.observer import Observer
-from dbvfiv.record.header import Header
+from dbvfiv.record.files import Header
 from dbvfiv.record.mesh import MeshData
 from dbvfiv.record.record import GrowingRecord
 from dbvfiv.studies.case import thesis_case

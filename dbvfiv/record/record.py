@@ -7,7 +7,7 @@ after the row has reached the file, and a log of one JSON document a line for wh
 Layout::
 
     /                 attributes: kind, layout, name, program, created, command
-    /case, /versions  see `header`
+    /case, /versions  see `dbvfiv.record.files`
     /mesh             see `mesh`
     /tables/NAME/...  one dataset a column, with units and description
     /tables/NAME/#    1 for each whole row
@@ -31,8 +31,16 @@ import numpy as np
 from ..case.model import Case
 from ..errors import CaseError, DiskFull, as_path
 from ..observer import Observer
-from .files import DeferredSignals, WriterLock, older_program, reading, refuse_foreign
-from .header import Header, read_header, write_header
+from .files import (
+    DeferredSignals,
+    Header,
+    WriterLock,
+    older_program,
+    read_header,
+    reading,
+    refuse_foreign,
+    write_header,
+)
 from .mesh import MeshData, read_mesh, write_mesh
 from .table import MARK, TableSpec, pack_documents, read_column, read_rows
 

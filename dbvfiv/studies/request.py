@@ -11,6 +11,7 @@ import typer
 
 from ..case.parameters import PARAMETERS
 from ..case.quantity import number_or_text
+from ..case.section import BrokenRule
 from ..errors import CaseError
 from .workers import WORKERS_HELP
 
@@ -99,6 +100,23 @@ def refuse_moved(ranges: Mapping[str, str], **given: str | None) -> None:
             raise CaseError(
                 f"--{name} is given as {given[name]!r}, but {key} = {text!r} moves the {name}; one of them has to go."
             )
+
+
+def require_start_file(start: str, word: str, path: Path | None) -> None:
+    """Refuse a `start_file` of a study without the `start` that is called by a word, and that without a file.
+
+    Raises
+    ------
+    BrokenRule
+    """
+    if (start == word) != (path is not None):
+        given = f"none with start = {word!r}" if path is None else f"{str(path)!r} with start = {start!r}"
+        raise BrokenRule("start_file", given, f"it goes with start = {word!r} and only with that")
+
+
+def over_option(words: str, metavar: str = "RANGE") -> Any:
+    """Option --over of a study over a range."""
+    return typer.Option("--over", metavar=metavar, help=words)
 
 
 #: What several studies take in place of keys of the case.

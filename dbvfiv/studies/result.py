@@ -11,7 +11,7 @@ from typing import Any, ClassVar, Literal
 from ..drawing.style import draw_figures, write_figures
 from ..errors import CaseError
 from ..model import ValveModel
-from ..record.header import Header
+from ..record.files import Header
 from ..record.mesh import MeshData, WholeValve
 from ..record.record import Record, copy_record, tabulate
 from ..record.vtkhdf import Step, export_result

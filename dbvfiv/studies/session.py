@@ -25,8 +25,7 @@ from ..model.sizes import hoop_strain
 from ..model.state import SteadyState
 from ..model.strain_level import SettledLevels, settle_levels
 from ..observer import Observer
-from ..record.files import check_writable, kind_of
-from ..record.header import Header
+from ..record.files import Header, check_writable, kind_of
 from ..record.mesh import MeshData
 from ..record.record import GrowingRecord, Record, StoredRecord
 from ..record.table import Column, TableSpec, printed_head, printed_row

@@ -10,7 +10,7 @@ from dbvfiv.studies.case import thesis_case
 from dbvfiv.studies.map import figures as map_figures
 from dbvfiv.studies.map.column import MapPlan
 from dbvfiv.studies.map.curves import OnsetCurve
-from dbvfiv.studies.onset import figures as onset_figures
+from dbvfiv.studies.onset import study as onset_study
 from dbvfiv.studies.onset.line import known_intervals, uncertain_intervals
 from dbvfiv.studies.stability.verdict import FLUTTERS, NOT_VALID, OUTCOMES, STABLE, UNDECIDED
 
@@ -112,7 +112,7 @@ def onset_result(values, growth, certified=None):
 
 
 def test_onsets_say_static_pressure_and_keep_legend_and_title_apart():
-    figure = onset_figures.onset(onset_result([2e3, 6e3, 9e3, 20e3], np.array([50.0, 20.0, 0.0, -30.0])))
+    figure = onset_study.onset(onset_result([2e3, 6e3, 9e3, 20e3], np.array([50.0, 20.0, 0.0, -30.0])))
     assert figure.axes[1].get_xlabel() == "Static inlet pressure, kPa"
     figure.canvas.draw()
     (legend,) = figure.legends
@@ -123,7 +123,7 @@ def test_onsets_say_static_pressure_and_keep_legend_and_title_apart():
 def test_onsets_shade_what_is_certified_alone_and_hatch_the_rest():
     """Before, everything between two onsets was called unstable or stable by the middle one of its values."""
     values, growth = [2e3, 5e3, 8e3, 15e3, 20e3], np.array([50.0, 30.0, 10.0, -20.0, -30.0])
-    figure = onset_figures.onset(onset_result(values, growth, [True, True, True, True, False]))
+    figure = onset_study.onset(onset_result(values, growth, [True, True, True, True, False]))
     stretches = {"unstable": [], "uncertain": []}
     for patch in figure.axes[0].patches:
         name = "uncertain" if patch.get_hatch() else "unstable"
@@ -133,7 +133,7 @@ def test_onsets_shade_what_is_certified_alone_and_hatch_the_rest():
 
 
 def test_an_onset_scan_of_one_value_shows_it():
-    figure = onset_figures.onset(onset_result([6e3], np.array([20.0])))
+    figure = onset_study.onset(onset_result([6e3], np.array([20.0])))
     line = next(line for line in figure.axes[0].lines if line.get_label() == "leading mode")
     low, high = figure.axes[0].get_xlim()
     assert line.get_marker() == "." and low < line.get_xdata()[0] < high

@@ -14,7 +14,7 @@ from dbvfiv.errors import CaseError
 from dbvfiv.materials.shipped import published_rubber
 from dbvfiv.model.equilibria import LoadPath
 from dbvfiv.observer import Observer
-from dbvfiv.record.header import Header, read_header, write_header
+from dbvfiv.record.files import Header, read_header, write_header
 from dbvfiv.shell.recovery import layer_fields
 from dbvfiv.studies.case import Case
 

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from dbvfiv.errors import CaseError, DiskFull
-from dbvfiv.record.header import Header
+from dbvfiv.record.files import Header
 from dbvfiv.record.record import GrowingRecord, Journal, StoredRecord
 from dbvfiv.record.table import TEXT, Column, TableSpec
 from dbvfiv.studies.case import Case, thesis_case

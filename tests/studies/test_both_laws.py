@@ -9,7 +9,7 @@ import pytest
 import dbvfiv
 from dbvfiv.case import CaseError
 from dbvfiv.studies.case import THESIS, thesis_case
-from dbvfiv.studies.onset.line import disagreements
+from dbvfiv.studies.onset.study import disagreements
 from dbvfiv.studies.stability.dimensions import compare_ranges, compare_states
 
 SMALL = {"mesh.around": 6, "mesh.along": 8, "damping.alpha": 0.0, "drive.pressure": "6 kPa", "fluid.density": 60.0}

@@ -10,7 +10,8 @@ import pytest
 import dbvfiv
 from dbvfiv.model.symmetry import SYMMETRIES
 from dbvfiv.studies.case import thesis_case
-from dbvfiv.studies.onset.line import common_stretches, joined_stretches, merge_points
+from dbvfiv.studies.onset.line import joined_stretches
+from dbvfiv.studies.onset.study import common_stretches, merge_points
 from dbvfiv.studies.stability.dimensions import leading_class
 
 OTHERS = ["SA", "AS", "AA"]

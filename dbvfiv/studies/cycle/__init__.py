@@ -2,19 +2,17 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Annotated, Literal
 
-import typer
-from pydantic import StrictInt, ValidationInfo, field_validator, model_validator
+from pydantic import StrictInt, model_validator
 
 from ...case.axis import Axis, StabilityRange, parse_stability_axis
 from ...case.model import Case
 from ...case.parameters import listed
 from ...case.quantity import Length, Number
-from ...case.section import BrokenRule, Section, key
-from ...case.tables import existing_file
-from ..request import DensityOption, PressureOption, Request, ranged_changes
+from ...case.section import Section, key
+from ...case.tables import ExistingFile
+from ..request import DensityOption, PressureOption, Request, over_option, ranged_changes, require_start_file
 
 ORDER = 42
 
@@ -32,7 +30,7 @@ class Keys(Section):
         "Where the branch starts: at the onset of the largest value of the range, at that of the smallest, or at a "
         "motion of a result file, from which it goes both ways.",
     )
-    start_file: Path | None = key(
+    start_file: ExistingFile | None = key(
         None,
         "Result file of the motion to start from, relative to the case file: of a branch of cycles, or of a run in "
         "time that has settled on a cycle. Its value of the parameter is taken, and all else from this case.",
@@ -57,20 +55,9 @@ class Keys(Section):
     max_step: Number = key(0.5, "Largest step along the branch, a step of one being 10 mm of the lip.", gt=0, le=10)
     max_points: StrictInt = key(100, "Most cycles of the branch.", ge=2, le=100_000)
 
-    @field_validator("start_file", mode="after")
-    @classmethod
-    def _find_start(cls, path: Path | None, info: ValidationInfo) -> Path | None:
-        return path if path is None else existing_file(path, info)
-
     @model_validator(mode="after")
     def _starts_somewhere(self) -> Keys:
-        if (self.start == "file") != (self.start_file is not None):
-            given = (
-                "none with start = 'file'"
-                if self.start_file is None
-                else f"{str(self.start_file)!r} with start = {self.start!r}"
-            )
-            raise BrokenRule("start_file", given, "it goes with start = 'file' and only with that")
+        require_start_file(self.start, "file", self.start_file)
         return self
 
     @property
@@ -82,12 +69,7 @@ class Keys(Section):
 def command(
     case: Case,
     over: Annotated[
-        str | None,
-        typer.Option(
-            "--over",
-            metavar="RANGE",
-            help=f"PARAMETER=START:STOP:COUNT[:log] of {listed()}; cycle.over without it.",
-        ),
+        str | None, over_option(f"PARAMETER=START:STOP:COUNT[:log] of {listed()}; cycle.over without it.")
     ] = None,
     pressure: PressureOption = None,
     density: DensityOption = None,

@@ -490,9 +490,7 @@ class CycleResult(StudyResult):
             "verdict": self.verdict.summary(),
             "reason": self.reason,
             "fixed": fixed_conditions(self.case, self.parameter),
-            "failures": list(self.failures),
-            "warnings": list(self.warnings),
-            "interrupted": not self.complete,
+            **self.ending(),
         }
 
     def shortfall(self) -> str | None:

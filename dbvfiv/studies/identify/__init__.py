@@ -15,7 +15,7 @@ from ...case.quantity import Frequency, Number, number_or_text
 from ...case.section import Section, key
 from ...case.tables import ExistingFile
 from ...errors import CaseError
-from ..request import DensityOption, LawOption, Request, WorkersOption
+from ..request import DensityOption, LawOption, Request, WorkersOption, over_option
 from ..workers import WORKERS_HELP, WorkersKey
 
 ORDER = 34
@@ -77,12 +77,7 @@ def command(
     column: Annotated[
         list[str] | None, typer.Option("--column", "-c", metavar="NAME", help="Column of each, or of all.")
     ] = None,
-    over: Annotated[
-        str | None,
-        typer.Option(
-            "--over", metavar="RANGE", help=f"PARAMETER=START:STOP:COUNT of {listed()}: where flutter begins."
-        ),
-    ] = None,
+    over: Annotated[str | None, over_option(f"PARAMETER=START:STOP:COUNT of {listed()}: where flutter begins.")] = None,
     density: DensityOption = None,
     law: LawOption = None,
     samples: Annotated[int | None, typer.Option("--samples", "-n", metavar="N", help="Valves computed first.")] = None,

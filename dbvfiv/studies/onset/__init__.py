@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from typing import Annotated, Literal
 
-import typer
 from pydantic import StrictBool
 
 from ...case.axis import Axis, StabilityRange, parse_stability_axis
@@ -12,7 +11,16 @@ from ...case.model import Case
 from ...case.parameters import listed
 from ...case.quantity import Number
 from ...case.section import Section, key
-from ..request import ClassesOption, DensityOption, LawOption, PressureOption, Request, law_changes, ranged_changes
+from ..request import (
+    ClassesOption,
+    DensityOption,
+    LawOption,
+    PressureOption,
+    Request,
+    law_changes,
+    over_option,
+    ranged_changes,
+)
 
 ORDER = 28
 
@@ -57,10 +65,8 @@ def command(
     case: Case,
     over: Annotated[
         str | None,
-        typer.Option(
-            "--over",
-            metavar="PARAMETER",
-            help=f"{listed()}, with =START:STOP:COUNT[:log] for a range of one's own; onset.over without it.",
+        over_option(
+            f"{listed()}, with =START:STOP:COUNT[:log] for a range of one's own; onset.over without it.", "PARAMETER"
         ),
     ] = None,
     pressure: PressureOption = None,

@@ -9,7 +9,6 @@ from typing import Any
 
 import numpy as np
 
-from ...model.symmetry import EQUILIBRIA
 from ...texts import shortly
 from ..stability.dimensions import Variant
 from ..stability.samples import WATCHED, Sample
@@ -19,8 +18,6 @@ Interval = tuple[float, float]
 
 #: Relative distance from an onset within which values of a scan say nothing of the state.
 BESIDE = 1e-7
-#: Stretches narrower than this part of their place are what is left of the search for an onset.
-_SLIVER = 1e-6
 
 
 @dataclass(frozen=True)
@@ -270,15 +267,6 @@ def uncertain_intervals(values: np.ndarray, certified: np.ndarray) -> list[Inter
     return joined_stretches([[(a, b) for a, b, low, high in pairs if not (low and high)]])
 
 
-def common_stretches(parts: Sequence[Sequence[Interval]]) -> list[Interval]:
-    """Stretches that lie in all of some lists."""
-    found = list(map(tuple, parts[0]))
-    for part in parts[1:]:
-        pairs = ((max(a, c), min(b, d)) for a, b in found for c, d in part)
-        found = [(low, high) for low, high in pairs if low < high]
-    return sorted(found)
-
-
 def joined_stretches(parts: Sequence[Sequence[Interval]]) -> list[Interval]:
     """Stretches that lie in any of some lists, those that touch joined."""
     found: list[Interval] = []
@@ -288,51 +276,3 @@ def joined_stretches(parts: Sequence[Sequence[Interval]]) -> list[Interval]:
         else:
             found.append((low, high))
     return found
-
-
-def disagreements(
-    own: str, stable: Sequence[Interval], unstable: Sequence[Interval], other: dict[str, Any]
-) -> list[tuple[float, float, str]]:
-    """Stretches (start, stop, law that is stable) in which one law is stable and the other is not.
-
-    Parameters
-    ----------
-    own : str
-        The case's law, with its `stable` and `unstable` stretches.
-    other : dict
-        Summary of the other law, see `FoundOnsets.summary`.
-    """
-    found = [(*part, own) for part in common_stretches([stable, other["unstable"]])]
-    found += [(*part, other["continuity"]) for part in common_stretches([unstable, other["stable"]])]
-    found = [part for part in found if part[1] - part[0] > _SLIVER * abs(part[1])]
-    joined: list[tuple[float, float, str]] = []
-    for low, high, law in sorted(found):
-        if joined and joined[-1][2] == law and low - joined[-1][1] <= _SLIVER * abs(low):
-            joined[-1] = (joined[-1][0], high, law)
-        else:
-            joined.append((low, high, law))
-    return joined
-
-
-def merge_points(
-    own: Iterable[dict[str, Any]], unstable: Sequence[Interval], classes, name: str = EQUILIBRIA
-) -> list[dict[str, Any]]:
-    """Points of all classes in ascending order. Where another class is unstable a crossing is no edge of stability.
-
-    Parameters
-    ----------
-    own : iterable of dict
-        Points of the class of the equilibria, with the stretches `unstable` in which that is unstable.
-    classes : sequence of dict
-        Summaries of the others, see `FoundOnsets.summary`.
-    name : str
-        Of the class of the equilibria.
-    """
-    parts = {name: (list(own), unstable)} | {c["symmetry"]: (c["points"], c["unstable"]) for c in classes}
-    merged = []
-    for name, (points, _) in parts.items():
-        elsewhere = [stretch for other, (_, found) in parts.items() if other != name for stretch in found]
-        for point in points:
-            covered = any(low <= point["value"] <= high for low, high in elsewhere)
-            merged.append(point | {"symmetry": name, "edge": point["edge"] and not covered})
-    return sorted(merged, key=lambda point: point["value"])

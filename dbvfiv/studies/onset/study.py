@@ -1,9 +1,9 @@
-"""Onsets along one parameter: run, storage, and what can be read off a run or its file."""
+"""Onsets along one parameter: run, storage, what can be read off a run or its file, and the figure."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from functools import cached_property
 from typing import Any
 
@@ -11,6 +11,8 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from ...case.parameters import PARAMETERS, Parameter
+from ...drawing.style import ACCENT, COMPUTED, HALO, PUBLISHED, REST, limits, log_axis, new_figure, parameter_label
+from ...model.symmetry import EQUILIBRIA
 from ...observer import Observer
 from ...record.mesh import MeshData
 from ...record.record import GrowingRecord, Record
@@ -22,8 +24,7 @@ from ..stability.place import describe_fixed, fixed_conditions
 from ..stability.samples import SAMPLE_TABLE, Sample, keep_samples, read_samples
 from ..stability.verdict import DIVERGES, FLUTTERS, NOT_VALID, STABLE, UNDECIDED, Verdict, lowered
 from ..stability.walk import StabilityWalk
-from . import figures
-from .line import FoundOnsets, Interval, OnsetPoint, common_stretches, disagreements, joined_stretches, merge_points
+from .line import FoundOnsets, Interval, OnsetPoint, joined_stretches
 from .search import FINE, OnsetOptions, run_onset
 
 CRITICALITY = {"super": "supercritical", "sub": "subcritical"}
@@ -228,9 +229,7 @@ class OnsetResult(StudyResult):
             "leading": self.leading,
             "classes": self.classes,
             "fixed": fixed_conditions(self.case, self.parameter),
-            "failures": list(self.failures),
-            "warnings": list(self.warnings),
-            "interrupted": not self.complete,
+            **self.ending(),
         } | (compared if self.other_law else {})
 
     def shortfall(self) -> str | None:
@@ -238,7 +237,7 @@ class OnsetResult(StudyResult):
         return f"Parts of the range were not reached: {failed} states failed" if failed else None
 
     def drawers(self) -> Iterator[tuple[str, Callable[[], Figure]]]:
-        yield from figures.draw(self)
+        yield from draw(self)
 
     def lines(self) -> list[str]:
         fixed = f"At {describe_fixed(self.case, self.parameter)}:"
@@ -314,6 +313,177 @@ class OnsetResult(StudyResult):
             f"{point['value'] / scale:16.8g} {spread} {point['frequency']:8.3f}  "
             f"{words:<28}{below:11.4g}{above:11.4g}{mark}" + (f"  {point['symmetry']}" if self.classes else "")
         )
+
+
+#: Stretches narrower than this part of their place are what is left of the search for an onset.
+_SLIVER = 1e-6
+
+
+def common_stretches(parts: Sequence[Sequence[Interval]]) -> list[Interval]:
+    """Stretches that lie in all of some lists."""
+    found = list(map(tuple, parts[0]))
+    for part in parts[1:]:
+        pairs = ((max(a, c), min(b, d)) for a, b in found for c, d in part)
+        found = [(low, high) for low, high in pairs if low < high]
+    return sorted(found)
+
+
+def disagreements(
+    own: str, stable: Sequence[Interval], unstable: Sequence[Interval], other: dict[str, Any]
+) -> list[tuple[float, float, str]]:
+    """Stretches (start, stop, law that is stable) in which one law is stable and the other is not.
+
+    Parameters
+    ----------
+    own : str
+        The case's law, with its `stable` and `unstable` stretches.
+    other : dict
+        Summary of the other law, see `FoundOnsets.summary`.
+    """
+    found = [(*part, own) for part in common_stretches([stable, other["unstable"]])]
+    found += [(*part, other["continuity"]) for part in common_stretches([unstable, other["stable"]])]
+    found = [part for part in found if part[1] - part[0] > _SLIVER * abs(part[1])]
+    joined: list[tuple[float, float, str]] = []
+    for low, high, law in sorted(found):
+        if joined and joined[-1][2] == law and low - joined[-1][1] <= _SLIVER * abs(low):
+            joined[-1] = (joined[-1][0], high, law)
+        else:
+            joined.append((low, high, law))
+    return joined
+
+
+def merge_points(
+    own: Iterable[dict[str, Any]], unstable: Sequence[Interval], classes, name: str = EQUILIBRIA
+) -> list[dict[str, Any]]:
+    """Points of all classes in ascending order. Where another class is unstable a crossing is no edge of stability.
+
+    Parameters
+    ----------
+    own : iterable of dict
+        Points of the class of the equilibria, with the stretches `unstable` in which that is unstable.
+    classes : sequence of dict
+        Summaries of the others, see `FoundOnsets.summary`.
+    name : str
+        Of the class of the equilibria.
+    """
+    parts = {name: (list(own), unstable)} | {c["symmetry"]: (c["points"], c["unstable"]) for c in classes}
+    merged = []
+    for name, (points, _) in parts.items():
+        elsewhere = [stretch for other, (_, found) in parts.items() if other != name for stretch in found]
+        for point in points:
+            covered = any(low <= point["value"] <= high for low, high in elsewhere)
+            merged.append(point | {"symmetry": name, "edge": point["edge"] and not covered})
+    return sorted(merged, key=lambda point: point["value"])
+
+
+_UNSTABLE = "#f6ddcf"
+
+
+def draw(result: StudyResult) -> Iterator[tuple[str, Callable[[], Figure]]]:
+    """Figures of an onset result, each with its name."""
+    if len(result.values):
+        yield "onset", lambda: onset(result)
+
+
+def onset(result: StudyResult) -> Figure:
+    """Growth rate and frequency of the leading modes, unstable ranges shaded, uncertain ones hatched, onsets marked."""
+    axis = result.case.onset.axis
+    scale = PARAMETERS[axis.parameter].scale
+    values = result.values / scale
+    figure = new_figure(7.2, 5.8)
+    top, bottom = figure.subplots(2, 1, sharex=True, height_ratios=(3, 2))
+    _shade(result, scale, top, bottom)
+    low = _draw_scan(result, values, top, bottom)
+    for row in result.points:
+        _mark(row, scale, axis.parameter, top, bottom)
+    # room for the words at the marks
+    top.set_ylim(low, max(1.1 * np.nanmax(result.growth_rates), -0.3 * low))
+    top.set_ylabel("Growth rate, 1/s")
+    bottom.set_ylabel("Frequency, Hz")
+    bottom.set_ylim(bottom=0)
+    bottom.set_xlabel(parameter_label(result.case, axis.parameter))
+    top.set_title(_title(result), loc="left", fontweight="bold")
+    figure.legend(loc="outside lower center", ncols=3)
+    for axes in (top, bottom):
+        if axis.log:
+            log_axis(axes.xaxis, *limits(values, True))
+        axes.set_xlim(*limits(values, axis.log))
+        axes.tick_params(labelbottom=True)
+    return figure
+
+
+def _shade(result: StudyResult, scale: float, *panels) -> None:
+    """Unstable ranges in a tint; hatched where nothing is certified, and so nothing claimed."""
+    unsure = {"facecolor": "#ececec", "edgecolor": "#9a9a9a", "hatch": "////"}
+    _span(result.unstable_intervals, scale, panels, "unstable", facecolor=_UNSTABLE)
+    _span(result.uncertain_intervals, scale, panels, "uncertain", **unsure)
+
+
+def _span(intervals: list[Interval], scale: float, panels, label: str, **look) -> None:
+    for number, (a, b) in enumerate(intervals):
+        for axes in panels:
+            named = label if axes is panels[0] and not number else None
+            axes.axvspan(a / scale, b / scale, lw=0, zorder=0, label=named, **look)
+
+
+def _draw_scan(result: StudyResult, values: np.ndarray, top, bottom) -> float:
+    """Curves of the scan; the growth rate down to which they are shown."""
+    growth, frequency = result.growth_rates, result.frequencies
+    low = _floor(growth)
+    for k in range(1, growth.shape[1]):
+        shown = growth[:, k] > low
+        label = "further modes" if k == 1 else None
+        top.plot(values, np.where(shown, growth[:, k], np.nan), "s", color=REST, ms=3.5, label=label)
+        bottom.plot(values, np.where(shown, frequency[:, k], np.nan), "s", color=REST, ms=3.5)
+    top.plot(values, growth[:, 0], ".-", color=COMPUTED, label="leading mode")
+    changes = np.flatnonzero(_jumps(frequency[:, 0]))
+    bottom.plot(np.insert(values, changes, np.nan), np.insert(frequency[:, 0], changes, np.nan), ".-", color=COMPUTED)
+    for part, style in zip(result.classes, ("--", "-.", ":")):
+        scan, scale = part["scan"], PARAMETERS[result.parameter].scale
+        places, rates = np.array(scan["values"]) / scale, np.array(scan["growth_rate"])
+        look = {"ls": style, "color": ACCENT, "lw": 1.2}
+        top.plot(places, np.where(rates > low, rates, np.nan), label=f"class {part['symmetry']}", **look)
+        bottom.plot(places, scan["frequency"], **look)
+    top.axhline(0.0, color="0.25", lw=1.0)
+    return low
+
+
+def _mark(row: dict, scale: float, parameter: str, top, bottom) -> None:
+    """An onset with its uncertainty and its numbers: full where it is supercritical, hollow where it is subcritical."""
+    x = row["value"] / scale
+    inside = "white" if row["criticality"] == "sub" else PUBLISHED
+    look = {"marker": "o", "ms": 7, "color": PUBLISHED, "mfc": inside, "ls": "none", "zorder": 5}
+    top.plot(x, 0.0, **look)
+    bottom.plot(x, row["frequency"], **look)
+    if row["uncertainty"] is not None:
+        reach = row["uncertainty"] / scale
+        top.plot([x - reach, x + reach], [0, 0], color=ACCENT, lw=3.5, alpha=0.75, zorder=4, solid_capstyle="butt")
+    kind = {"super": "supercritical", "sub": "subcritical"}.get(row["criticality"], "")
+    words = f"{x:.4g}{_unit(parameter)}\n{row['frequency']:.3g} Hz" + (f"\n{kind}" if kind else "")
+    # on the side of the mark that the curve leaves free
+    place = {"xytext": (9, -8), "va": "top"} if row["gains"] else {"xytext": (9, 8), "va": "bottom"}
+    look = {"textcoords": "offset points", "fontsize": 8.5, "color": PUBLISHED, "path_effects": HALO}
+    top.annotate(words, (x, 0.0), **look, **place)
+
+
+def _unit(parameter: str) -> str:
+    unit = PARAMETERS[parameter].shown_unit
+    return f" {unit}" if unit else ""
+
+
+def _floor(growth: np.ndarray) -> float:
+    leading = growth[:, 0]
+    return float(min(-5.0, 1.25 * np.nanmin(leading), -0.6 * np.nanmax(np.abs(leading))))
+
+
+def _jumps(frequency: np.ndarray) -> np.ndarray:
+    """Mask of values where another mode has become the leading one."""
+    step = np.abs(np.diff(frequency, prepend=frequency[:1]))
+    return step > 0.25 * np.maximum(frequency, 1.0)
+
+
+def _title(result: StudyResult) -> str:
+    return f"{result.header.name}, {describe_fixed(result.case, result.parameter)}"
 
 
 STUDY = Study("onset", tables_of, run, OnsetResult)

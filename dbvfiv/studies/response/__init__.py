@@ -15,7 +15,7 @@ from ...case.quantity import Frequency, Pressure, Quantity, number_or_text
 from ...case.section import Section, key
 from ...case.tables import ExistingFile, read_pairs
 from ...errors import CaseError
-from ..request import DensityOption, LawOption, PressureOption, Request, ranged_changes, with_unit
+from ..request import DensityOption, LawOption, PressureOption, Request, over_option, ranged_changes, with_unit
 
 ORDER = 33
 
@@ -71,10 +71,7 @@ def command(
     pressure: PressureOption = None,
     density: DensityOption = None,
     law: LawOption = None,
-    over: Annotated[
-        str | None,
-        typer.Option("--over", metavar="RANGE", help=f"PARAMETER=START:STOP:COUNT of {listed()}; how an onset nears."),
-    ] = None,
+    over: Annotated[str | None, over_option(f"PARAMETER=START:STOP:COUNT of {listed()}; how an onset nears.")] = None,
     noise: Annotated[
         str | None,
         typer.Option("--noise", metavar="P", callback=with_unit, help="Root mean square of white pressure noise."),

@@ -186,9 +186,7 @@ class SensitivityResult(StudyResult):
                 }
                 for found in self.sensitivities
             ],
-            "failures": list(self.failures),
-            "warnings": list(self.warnings),
-            "interrupted": not self.complete,
+            **self.ending(),
         }
 
     def shortfall(self) -> str | None:

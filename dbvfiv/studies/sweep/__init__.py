@@ -11,7 +11,7 @@ from ...case.axis import Axis, Range, parse_axis
 from ...case.parameters import SWEPT, listed
 from ...case.quantity import Number, number_or_text
 from ...case.section import Section, key
-from ..request import DensityOption, PressureOption, Request
+from ..request import DensityOption, PressureOption, Request, over_option
 
 ORDER = 26
 
@@ -46,12 +46,7 @@ class Keys(Section):
 
 def command(
     over: Annotated[
-        str | None,
-        typer.Option(
-            "--over",
-            metavar="RANGE",
-            help=f"PARAMETER=START:STOP:COUNT[:log] of {listed(SWEPT)}; sweep.over without it.",
-        ),
+        str | None, over_option(f"PARAMETER=START:STOP:COUNT[:log] of {listed(SWEPT)}; sweep.over without it.")
     ] = None,
     pressure: PressureOption = None,
     density: DensityOption = None,

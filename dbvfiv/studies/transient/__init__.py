@@ -10,8 +10,8 @@ from pydantic import StrictBool, StrictInt, ValidationInfo, field_validator, mod
 
 from ...case.quantity import Length, Number, Time
 from ...case.section import BrokenRule, Section, key
-from ...case.tables import existing_file, read_drive_table
-from ..request import Request
+from ...case.tables import ExistingFile, read_drive_table
+from ..request import Request, require_start_file
 
 ORDER = 40
 
@@ -63,7 +63,7 @@ class Keys(Section):
     kick_opening: Length = key(
         1e-4, "Displacement in y of one lip by the push; the clear opening changes by twice that.", gt=0, le=1
     )
-    start_file: Path | None = key(None, "Result file of the state to start from, relative to the case file.")
+    start_file: ExistingFile | None = key(None, "Result file of the state to start from, relative to the case file.")
     start_state: StrictInt = key(-1, "Which state of start_file, from 0; negative ones count from the end.")
     ramp: Time = key(0.0, "Time in which the pressure rises from zero; zero applies it at once.", ge=0, le=1e5)
     drive_table: Path | None = key(
@@ -92,24 +92,13 @@ class Keys(Section):
         read_drive_table(path)
         return path.resolve()
 
-    @field_validator("start_file", mode="after")
-    @classmethod
-    def _find_start(cls, path: Path | None, info: ValidationInfo) -> Path | None:
-        return path if path is None else existing_file(path, info)
-
     @model_validator(mode="after")
     def _fits_together(self) -> Keys:
         if self.scheme == "hht" and self.numerical_damping > 1 / 3:
             raise BrokenRule(
                 "numerical_damping", f"{self.numerical_damping:g} with scheme = 'hht'", "it must be at most 1/3 there"
             )
-        if (self.start == "state") != (self.start_file is not None):
-            given = (
-                "none with start = 'state'"
-                if self.start_file is None
-                else f"{str(self.start_file)!r} with start = {self.start!r}"
-            )
-            raise BrokenRule("start_file", given, "it goes with start = 'state' and only with that")
+        require_start_file(self.start, "state", self.start_file)
         if self.ramp and self.drive_table is not None:
             raise BrokenRule(
                 "ramp", f"{self.ramp:g} s beside a drive_table", "only one of the two can say how the pressure changes"

@@ -18,8 +18,7 @@ from ...motion.control import Drive, RunOptions, step_control
 from ...motion.equations import ValveMotion
 from ...motion.start import first_state, steady_fluid
 from ...motion.stepper import MotionState, StepFailure, Stepper, consistent_state
-from ...record.files import kind_of
-from ...record.header import Header
+from ...record.files import Header, kind_of
 from ...record.mesh import MeshData
 from ...record.record import GrowingRecord, Record, StoredRecord
 from ...record.states import state_table

@@ -13,7 +13,16 @@ from ...case.model import Case
 from ...case.parameters import listed
 from ...case.quantity import Number
 from ...case.section import Described, Section, flattened, key
-from ..request import DensityOption, LawOption, PressureOption, Request, WorkersOption, law_changes, ranged_changes
+from ..request import (
+    DensityOption,
+    LawOption,
+    PressureOption,
+    Request,
+    WorkersOption,
+    law_changes,
+    over_option,
+    ranged_changes,
+)
 from ..workers import WORKERS_HELP, WorkersKey
 
 ORDER = 31
@@ -66,12 +75,7 @@ class Keys(Section):
 def command(
     case: Case,
     over: Annotated[
-        str | None,
-        typer.Option(
-            "--over",
-            metavar="RANGE",
-            help=f"PARAMETER=START:STOP:COUNT of {listed()}; uncertainty.over without it.",
-        ),
+        str | None, over_option(f"PARAMETER=START:STOP:COUNT of {listed()}; uncertainty.over without it.")
     ] = None,
     pressure: PressureOption = None,
     density: DensityOption = None,

@@ -12,7 +12,7 @@ from dbvfiv.errors import SolveError
 from dbvfiv.model import ValveModel
 from dbvfiv.model.equilibria import LoadPath, find_equilibrium
 from dbvfiv.observer import Observer
-from dbvfiv.record.header import Header
+from dbvfiv.record.files import Header
 from dbvfiv.record.record import GrowingRecord
 from dbvfiv.studies.case import thesis_case
 from dbvfiv.studies.map.figures import stability_map

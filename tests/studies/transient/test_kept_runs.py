@@ -15,7 +15,7 @@ import dbvfiv
 from dbvfiv.case import CaseError
 from dbvfiv.motion import stepper
 from dbvfiv.motion.control import RunOptions
-from dbvfiv.record.header import Header
+from dbvfiv.record.files import Header
 from dbvfiv.record.mesh import MeshData
 from dbvfiv.record.record import GrowingRecord, Journal, StoredRecord
 from dbvfiv.studies.case import THESIS, Case
