@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -10,8 +10,7 @@ import numpy as np
 
 from .basis import TransferBasis
 from .count import Count, unstable_count
-from .determinant import Structure
-from .factor import ScaledLU, StructureMatrices, Workspace
+from .factor import StructureMatrices, Workspace
 from .krylov import KrylovPairs, krylov_pairs
 from .operator import CoupledPencil, real_apply
 from .pairs import SAME, Found, acceptable, all_pairs, newton, normalised
@@ -163,6 +162,8 @@ def joined(spectrum: Spectrum, found: Found, line: float) -> Spectrum:
     )
 
 
+#: Unknowns beyond which a count is made on a basis.
+LARGE = 400
 #: Largest accepted error of log det of the reduced basis behind a count.
 TRUSTED = 0.1
 #: Points of a count over all frequencies where one up to the end of a band can stand in for it.
@@ -270,7 +271,7 @@ def certified_spectrum(
     """
     search = partial(leading_modes, pencil, workspace=workspace or Workspace(), solver=solver)
     spectrum = search(count, options)
-    if pencil.n > Structure.dense_below:
+    if pencil.n > LARGE:
         basis = basis or TransferBasis(pencil)
     else:
         basis = None
@@ -284,7 +285,7 @@ def certified_spectrum(
         if found.agrees or basis is None:
             break
         basis = _finer(pencil, basis, found, finer)
-        if basis.size > Structure.dense_below:
+        if basis.size > LARGE:
             break
         found, basis = _judged(*asked, found.spectrum, basis, finer)
     return found
@@ -296,7 +297,12 @@ def _finer(pencil, basis, found, finer) -> TransferBasis:
     if finer == 1 and len(spectrum):  # a mode that is all but neutral has to be met to a fraction of its growth rate
         return basis.enlarged(pencil, *(q for q in (spectrum.q, spectrum.left_q) if q is not None))
     checked = _checks(spectrum, found.count, finer - 1, basis)
-    return basis.enlarged(pencil, *responses(pencil, checked), compression=DISTINCT)
+    exact = []
+    for f in checked:
+        factor = Workspace().factored(pencil, 2j * np.pi * f)
+        exact += [factor.solve(pencil.G.toarray().astype(complex))]
+        exact += [factor.solve_transposed(pencil.J.toarray().T.astype(complex))]
+    return basis.enlarged(pencil, *exact, compression=DISTINCT)
 
 
 def _judged(pencil, options, search, spectrum, basis, finer=0, within=None):
@@ -309,7 +315,7 @@ def _judged(pencil, options, search, spectrum, basis, finer=0, within=None):
 
     def counted(band=None):
         # a structure that loses stability by itself has very many modes beyond a band that hardly decay
-        most = POINTS_BEYOND if band is None and np.isfinite(spectrum.band) and model is not pencil else None
+        most = POINTS_BEYOND if band is None and np.isfinite(spectrum.band) and model is not pencil else 4000
         return unstable_count(model, scale=scale, hints=spectrum.eigenvalues, band=band, max_points=most)
 
     winding = counted(within)
@@ -355,31 +361,15 @@ def listed_unstable(spectrum: Spectrum, count: Count) -> int:
 def response_error(pencil: CoupledPencil, reduced: CoupledPencil, frequencies) -> float:
     """Largest error of log det of the condensed pencil made by a reduced one, at i 2 pi f."""
     worst, small, forces = 0.0, StructureMatrices(reduced), reduced.G.toarray()
-    for s, factor in _factored(pencil, frequencies if pencil.m else ()):
-        exact = real_apply(pencil.J, factor.solve(pencil.G.toarray().astype(complex)))
+    for f in frequencies if pencil.m else ():
+        s = 2j * np.pi * f
+        exact = Workspace().factored(pencil, s).solve(pencil.G.toarray().astype(complex))
         coupling, _ = pencil.fluid.condensed([s])
-        other = reduced.J @ np.linalg.solve(small.matrix(s).toarray(), forces)
-        both = [np.eye(pencil.m) - coupling[0] @ H for H in (exact, other)]
+        other = np.linalg.solve(small.matrix(s).toarray(), forces)
+        both = [np.eye(pencil.m) - coupling[0] @ H for H in (real_apply(pencil.J, exact), reduced.J @ other)]
         ratio = np.linalg.det(np.linalg.solve(*both))
         worst = max(worst, float(abs(np.log(ratio))) if ratio != 0 else np.inf)
     return worst
-
-
-def responses(pencil: CoupledPencil, frequencies) -> list[np.ndarray]:
-    """Responses of the full structure to all forces, and of its transpose to all motions, at i 2 pi f; (n, m) each."""
-    found = []
-    for _, factor in _factored(pencil, frequencies):
-        found.append(factor.solve(pencil.G.toarray().astype(complex)))
-        found.append(factor.solve_transposed(pencil.J.toarray().T.astype(complex)))
-    return found
-
-
-def _factored(pencil: CoupledPencil, frequencies) -> Iterator[tuple[complex, ScaledLU]]:
-    """Places i 2 pi f and the factored structure there."""
-    structure = StructureMatrices(pencil)
-    for f in frequencies:
-        s = 2j * np.pi * float(f)
-        yield s, ScaledLU(structure.columns(structure.values(s).astype(complex)))
 
 
 def _checks(spectrum, winding, finer, basis):

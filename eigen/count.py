@@ -62,7 +62,7 @@ def unstable_count(
     band: float | None = None,
     hints=(),
     scale: float | None = None,
-    max_points: int | None = None,
+    max_points: int = 4000,
     structure: Structure | None = None,
 ) -> Count:
     """Count the eigenvalues with growth rate above a line by the argument principle.
@@ -75,8 +75,7 @@ def unstable_count(
     Parameters
     ----------
     pencil : CoupledPencil
-        M symmetric, positive definite. Orders up to 400 are treated densely. The poles of what relaxes have to
-        lie left of the line.
+        M symmetric, positive definite; treated densely. The poles of what relaxes have to lie left of the line.
     line : float, optional
         Growth rate, 1/s. Default 0; for a structure without any damping, whose eigenvalues
         may lie on the imaginary axis, a small positive value, which `Count.line` reports.
@@ -88,8 +87,7 @@ def unstable_count(
         They add points, nothing else.
     scale : float, optional
         A typical angular frequency, rad/s.
-    max_points : int, optional
-        Default 4000 for dense, 300 for sparse pencils.
+    max_points : int
     structure : Structure, optional
         Of the pencil, where it is known; its line is that of the count.
 
@@ -108,7 +106,6 @@ def unstable_count(
     if structure is None:
         structure = Structure(pencil, counted_line(pencil, scale) if line is None else line)
     line, determinant = structure.line, Determinant(pencil, structure)
-    dense = pencil.n <= Structure.dense_below
     # a zero of the pencil can hide from a coarse walk only beside a zero of the reference
     own = [line + z for z in structure.reference_zeros()]
     hints = [complex(h) for h in hints]
@@ -117,7 +114,7 @@ def unstable_count(
     if pencil.b > 1:
         zeros = pencil.fluid.zeros
         hints += list(zeros[zeros.imag > 0])
-    walk = _Walk(determinant, max_points or (4000 if dense else 300), band)
+    walk = _Walk(determinant, max_points, band)
     walk.start(scale, hints, own)
     walk.refine()
     return walk.count()

@@ -266,7 +266,7 @@ def _release(objects):
 
 
 class ScaledLU:
-    """Real or complex SuperLU of D A D with D = |diag A|^(-1/2), for a nearly symmetric pattern; knows its determinant.
+    """Real or complex SuperLU of D A D with D = |diag A|^(-1/2), for a nearly symmetric pattern.
 
     Unknowns of different kinds (metres, radians) differ by powers of ten; unscaled, SuperLU leaves
     the diagonal for its pivots and fills in without need.
@@ -274,8 +274,6 @@ class ScaledLU:
     Parameters
     ----------
     matrix : sparse, shape (n, n)
-    pivoting : float
-        Share of the largest entry of a column below which a pivot is not taken from the diagonal.
 
     Raises
     ------
@@ -283,7 +281,7 @@ class ScaledLU:
         If a pivot is exactly zero.
     """
 
-    def __init__(self, matrix: sp.csc_matrix, pivoting: float = 0.01):
+    def __init__(self, matrix: sp.csc_matrix):
         matrix = sp.csc_matrix(matrix)
         size = np.abs(matrix.diagonal())
         typical = size.max(initial=0.0) or 1.0
@@ -293,7 +291,7 @@ class ScaledLU:
             self._lu = spla.splu(
                 (D @ matrix @ D).tocsc(),
                 permc_spec="MMD_AT_PLUS_A",
-                diag_pivot_thresh=pivoting,
+                diag_pivot_thresh=0.01,  # below this share of a column a pivot is not taken from the diagonal
                 options={"SymmetricMode": True},
             )
         except RuntimeError as error:
@@ -313,42 +311,12 @@ class ScaledLU:
         """Solve with the transpose (not the adjoint)."""
         return self.solve(b, "T")
 
-    def log_determinant(self) -> complex:
-        """log |det A| + i arg det A; the argument lies in (-pi, pi]."""
-        diagonal = self._lu.U.diagonal()
-        sign = _permutation_sign(self._lu.perm_r) * _permutation_sign(self._lu.perm_c)
-        phase = float(np.angle(diagonal).sum()) + (np.pi if sign < 0 else 0.0)
-        size = float(np.log(np.abs(diagonal)).sum()) - 2.0 * float(np.log(self._scale).sum())
-        return complex(size, np.angle(np.exp(1j * phase)))
-
-    def has_positive_pivots(self) -> bool:
-        """Pivots are those of the diagonal, and positive: a symmetric matrix is then positive definite (Sylvester)."""
-        return bool(np.array_equal(self._lu.perm_r, self._lu.perm_c) and (self._lu.U.diagonal() > 1e-13).all())
-
-
-def is_positive_definite(matrix: sp.spmatrix) -> bool:
-    """True where a symmetric sparse matrix is positive definite, by its pivots."""
-    if (matrix.diagonal() <= 0).any():
-        return False
-    try:
-        return ScaledLU(matrix, pivoting=0.0).has_positive_pivots()
-    except SingularShiftError:
-        return False
-
 
 def petsc_is_complex() -> bool:
     """True where the PETSc that is installed computes with complex numbers."""
     from petsc4py import PETSc
 
     return np.dtype(PETSc.ScalarType).kind == "c"
-
-
-def _permutation_sign(permutation: np.ndarray) -> int:
-    # cycles of a permutation = components of its graph
-    size = permutation.size
-    graph = sp.csr_matrix((np.ones(size, np.int8), (np.arange(size), permutation)), (size, size))
-    cycles = sp.csgraph.connected_components(graph, directed=False, return_labels=False)
-    return 1 if (size - cycles) % 2 == 0 else -1
 
 
 def _parts(pencil):

@@ -258,7 +258,7 @@ class ReducedFamily(PencilFamily):
         rank = min(P.shape[1], Q.shape[1])
         P, Q = P[:, :rank], Q[:, :rank]
         small = CoupledPencil(M, C, K, G @ Q, P.T @ J, relaxation=pencil.relaxation)
-        structure = Structure(small, counted_line(pencil, self.lowest_frequency), keep=True)
+        structure = Structure(small, counted_line(pencil, self.lowest_frequency))
         return P, Q, small, structure
 
     def pairs(self, mu: Hashable, most: int = 8, share: float = 1.0) -> Pairs:

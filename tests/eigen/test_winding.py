@@ -5,8 +5,7 @@ import pytest
 import scipy.sparse as sp
 
 from eigen import CoupledPencil, Relaxation, SearchOptions, TransferBasis, certified_spectrum, unstable_count
-from eigen.certificate import response_error
-from eigen.determinant import Structure
+from eigen.certificate import LARGE, response_error
 from tests.systems.plate_over_channel import plate_over_channel
 from tests.systems.random_pencils import dense_eigenvalues, random_pencil
 from tests.systems.relaxing import STRENGTHS, TIMES, relaxing_random
@@ -72,9 +71,7 @@ def test_counts_where_the_stiffness_relaxes(seed):
     assert uncertain <= 2
 
 
-@pytest.mark.parametrize("dense_below", [400, 0])
-def test_of_a_relaxing_stiffness_that_is_not_passive_a_part_makes_the_reference(dense_below, monkeypatch):
-    monkeypatch.setattr(Structure, "dense_below", dense_below)
+def test_of_a_relaxing_stiffness_that_is_not_passive_a_part_makes_the_reference():
     relaxation = Relaxation([np.diag([1.0, -0.4]), [[0.0, 0.3], [-0.3, 0.0]]], [[0.5], [1.0]], [0.7])
     for damping in (0.0, 0.01):
         pencil = CoupledPencil(np.eye(2), damping * np.eye(2), np.diag([1.0, 0.3]), relaxation=relaxation)
@@ -99,7 +96,7 @@ def test_lines_beside_the_axis_where_the_stiffness_relaxes(line):
 def test_certificate_where_the_stiffness_relaxes(storage, density, monkeypatch):
     elastic, stiffness = plate_over_channel(5, 8, beta=0.0, storage=storage, density=density, with_parts=True)
     pencil = elastic.replace(relaxation=Relaxation([stiffness], [STRENGTHS], TIMES))
-    monkeypatch.setattr(Structure, "dense_below", 100)
+    monkeypatch.setattr("eigen.certificate.LARGE", 100)
     result = certified_spectrum(pencil, 4, SearchOptions(max_frequency=40.0))
     assert result.agrees, result.statement
     values = dense_eigenvalues(pencil)
@@ -115,7 +112,7 @@ def test_a_basis_for_materials_that_relax_unlike_each_other():
     halves = [sp.diags(w) @ stiffness @ sp.diags(w) for w in (weight, np.sqrt(1 - weight**2))]
     pencil = elastic.replace(relaxation=Relaxation(halves, [[0.4] * 4, [0.03] * 4], TIMES))
     result = certified_spectrum(pencil, 4, SearchOptions(max_frequency=40.0))
-    assert pencil.n > Structure.dense_below
+    assert pencil.n > LARGE
     assert result.agrees, result.statement
     assert result.response_error < 1e-4
     plain = pencil.projected(TransferBasis(pencil).V)
@@ -172,22 +169,13 @@ def test_poles_of_the_fluid_in_the_right_half_plane_are_no_trouble():
     assert unstable_count(pencil).number == 1
 
 
-def test_sparse_and_dense_determinants_agree(monkeypatch):
-    pencil = plate_over_channel(4, 6, storage=True, density=300.0)
-    dense = unstable_count(pencil)
-    monkeypatch.setattr(Structure, "dense_below", 0)
-    sparse = unstable_count(pencil, scale=50.0)
-    assert dense.certain and sparse.certain
-    assert dense.number == sparse.number == int(np.sum(dense_eigenvalues(pencil).real > 0))
-
-
 @pytest.mark.parametrize(
     "velocity, storage, density",
     [(3.0, False, 10.0), (3.0, True, 10.0), (6.0, False, 10.0), (8.0, False, 2.0), (5.0, True, 1000.0)],
 )
 def test_large_pencils_by_basis(velocity, storage, density):
     pencil = plate_over_channel(6, 15, inlet_velocity=velocity, storage=storage, density=density)
-    assert pencil.n > Structure.dense_below
+    assert pencil.n > LARGE
     result = certified_spectrum(pencil, 4)
     assert result.agrees, result.statement
     assert result.unstable_count == int(np.sum(dense_eigenvalues(pencil).real > result.count.line))
