@@ -244,7 +244,7 @@ def _search(pencil, count, options, workspace, first, solver) -> Found:
     if pencil.relaxation is not None:
         found.lowest, found.slope = lowest_sought(pencil, count, options, workspace), SLOPE
     aim = max(count, options.least)
-    pairs = min(int(2.4 * aim) + 4, options.max_pairs)
+    pairs = int(2.4 * aim) + 4
     given = options.shifts is not None
     queue = list(options.shifts) if given else [first]
     while queue:

@@ -45,8 +45,6 @@ class SearchOptions:
         searched does not depend on small differences in the number asked for.
     max_shifts : int
         Automatic shifts at most.
-    max_pairs : int
-        Eigenvalues sought at one shift at most.
     """
 
     max_frequency: float | None = None
@@ -58,7 +56,6 @@ class SearchOptions:
     dense_below: int = 240
     least: int = 6
     max_shifts: int = 4
-    max_pairs: int = 500
 
     def __post_init__(self):
         if self.max_frequency is not None and not self.max_frequency > 0:
@@ -75,8 +72,8 @@ class SearchOptions:
                     raise ValueError("Shifts must be finite numbers.")
         if not 0 < self.tolerance < 1:
             raise ValueError("The tolerance must lie between 0 and 1.")
-        if self.max_shifts < 1 or self.max_pairs < 1 or self.least < 1:
-            raise ValueError("max_shifts, max_pairs and least must be at least 1.")
+        if self.max_shifts < 1 or self.least < 1:
+            raise ValueError("max_shifts and least must be at least 1.")
 
 
 @dataclass(frozen=True)

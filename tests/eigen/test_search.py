@@ -197,7 +197,7 @@ def test_wrong_pencils_are_refused(parts, message):
         {"shifts": ()},
         {"tolerance": 0.0},
         {"shifts": (np.inf,)},
-        {"max_pairs": 0},
+        {"max_shifts": 0},
     ],
 )
 def test_wrong_options_are_refused(wrong):
