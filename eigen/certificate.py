@@ -315,8 +315,9 @@ def _judged(pencil, options, search, spectrum, basis, finer=0, within=None):
 
     def counted(band=None):
         # a structure that loses stability by itself has very many modes beyond a band that hardly decay
-        most = POINTS_BEYOND if band is None and np.isfinite(spectrum.band) and model is not pencil else 4000
-        return unstable_count(model, scale=scale, hints=spectrum.eigenvalues, band=band, max_points=most)
+        beyond = band is None and np.isfinite(spectrum.band) and model is not pencil
+        most = {"max_points": POINTS_BEYOND} if beyond else {}
+        return unstable_count(model, scale=scale, hints=spectrum.eigenvalues, band=band, **most)
 
     winding = counted(within)
     if (

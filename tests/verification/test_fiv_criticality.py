@@ -22,6 +22,27 @@ ASIDE = 0.02
 pytestmark = pytest.mark.slow
 
 
+def onset_over(case, parameter: str, values) -> tuple:
+    """The search for the one onset among values of a parameter, the onset, its normal form, and its model."""
+    search = OnsetSearch(case, OnsetOptions(parameter, tuple(values), True, normal_form=False, coarse_mesh=0))
+    (crossing,) = search.scan.run(search.options.values)
+    point = search.point(crossing)
+    place = search.place(point.value)
+    form = normal_form(case, search.walk, place, search.critical(place, 2j * np.pi * point.frequency), parameter)
+    return search, point, form, search.walk.built(place).model
+
+
+def lip_of(model, q) -> float:
+    """Displacement of the lip, m."""
+    return float(model.nodal(q)[model.mesh.rows[0, 0], 1])
+
+
+def swing(model, form) -> float:
+    """Amplitude of the lip for a normal-form amplitude of one, m."""
+    shape = form.q[: model.size]
+    return 2 * abs(lip_of(model, shape.real) + 1j * lip_of(model, shape.imag))
+
+
 class Onset:
     """The onset over density of a coarse valve at 6 kPa, its normal form, and runs beside it."""
 
@@ -29,31 +50,12 @@ class Onset:
         self.case = thesis_case(
             ["mesh.around=8", "mesh.along=16", "damping.alpha=0", "damping.beta=0.003", "drive.pressure=6 kPa"]
         )
-        options = OnsetOptions("density", tuple(np.geomspace(1, 1000, 21)), True, normal_form=False, coarse_mesh=0)
-        search = OnsetSearch(self.case, options)
-        (crossing,) = search.scan.run(options.values)
-        self.point = point = search.point(crossing)
-        self.form = normal_form(
-            self.case,
-            search.walk,
-            search.place(point.value),
-            search.critical(search.place(point.value), 2j * np.pi * point.frequency),
-            "density",
-        )
-        self.model = search.walk.built(search.place(point.value)).model
-        self.steady = self.lip(search.walk.equilibrium(search.place(point.value)))
-        shape = self.form.q[: self.model.size]
-        change = ASIDE * point.value
+        search, self.point, self.form, self.model = onset_over(self.case, "density", np.geomspace(1, 1000, 21))
+        self.steady = lip_of(self.model, search.walk.equilibrium(search.place(self.point.value)))
+        change = ASIDE * self.point.value
         #: Amplitude of the lip on the predicted cycle, m.
-        self.cycle = (
-            2
-            * abs(self.lip(shape.real) + 1j * self.lip(shape.imag))
-            * np.sqrt(abs(self.form.crossing.real / self.form.c1.real) * change)
-        )
+        self.cycle = swing(self.model, self.form) * np.sqrt(abs(self.form.crossing.real / self.form.c1.real) * change)
         self.sigma = abs(self.form.crossing.real) * change
-
-    def lip(self, q) -> float:
-        return float(self.model.nodal(q)[self.model.mesh.rows[0, 0], 1])
 
     def rate(self, side: int, kick: float) -> tuple[float, float]:
         """Rate of the lip's amplitude (1/s) after a kick in units of the predicted cycle, and the mean amplitude in the
@@ -112,8 +114,8 @@ BRANCHES = [
 
 @pytest.mark.parametrize("law, pressure, parameter, values, amplitude", BRANCHES)
 def test_a_branch_of_cycles_says_the_growth_of_the_eigenvalue(law, pressure, parameter, values, amplitude):
-    """Where a cycle of amplitude r stands on its branch, the eigenvalue grows by -Re c1 r^2, but for a share that falls
-    as r^2 and that two cycles remove. Faces touch in the first states of each law, in the cycles too; cycles must be
+    """The growth rate at the value of a cycle of amplitude r is -Re c1 r^2, but for a share that falls as r^2 and that
+    two cycles remove. Faces touch in the first states of each law, in the cycles too; cycles must be
     small there, and growth rates so near to the onset are known to some 1e-9 of the eigenvalue.
     """
     case = thesis_case(
@@ -122,19 +124,13 @@ def test_a_branch_of_cycles_says_the_growth_of_the_eigenvalue(law, pressure, par
         | {"cycle.over": f"{parameter}={values[0]}:{values[-1]}:2", "cycle.amplitude": amplitude}
         | {"cycle.max_points": 2, "cycle.exponents": 0, "cycle.tolerance": 2e-4}
     )
-    search = OnsetSearch(case, OnsetOptions(parameter, values, True, normal_form=False, coarse_mesh=0))
-    (crossing,) = search.scan.run(search.options.values)
-    point = search.point(crossing)
-    place = search.place(point.value)
-    form = normal_form(case, search.walk, place, search.critical(place, 2j * np.pi * point.frequency), parameter)
-    model = search.walk.built(place).model
-    lip = model.nodal(form.q[: model.size])[model.mesh.rows[0, 0], 1]
+    search, point, form, model = onset_over(case, parameter, values)
     small, large = cycles = sorted(dbvfiv.load(case).cycle().points, key=lambda cycle: cycle.amplitude)[:2]
     growths = [
         search.critical(search.place(cycle.value), 2j * np.pi * cycle.frequency).eigenvalue.real for cycle in cycles
     ]
     ratios = [
-        -form.c1.real * (cycle.amplitude / (2 * abs(lip))) ** 2 / growth
+        -form.c1.real * (cycle.amplitude / swing(model, form)) ** 2 / growth
         for cycle, growth in zip(cycles, growths, strict=True)
     ]
     share = (large.amplitude / small.amplitude) ** 2
