@@ -170,12 +170,14 @@ class Tracer:
             local=local,
         )
 
-    def at(self, before: CurvePoint, after: CurvePoint, fraction: float) -> CurvePoint | None:
-        """The point of the curve over a fraction of the chord, or None if there is none near the chord."""
+    def at(self, before: CurvePoint, after: CurvePoint, fraction: float, start=None) -> CurvePoint | None:
+        """The point of the curve over a fraction of the chord, or None if there is none near that of the chord, or
+        near another start over the same fraction.
+        """
         chord = after.z - before.z
         normal = self.problem.weights * chord
         scale = np.abs(normal).max()
-        start = before.z + fraction * chord
+        start = before.z + fraction * chord if start is None else start
         correction = self.correct(start, normal / scale)
         far = self.problem.norm(correction.z - start) > FARTHEST * self.problem.norm(chord)
         if not correction.converged or far:
@@ -195,10 +197,20 @@ class Tracer:
         met = {0.0: before, 1.0: after}
 
         def value(share: float) -> float:
-            point = met[share] = met.get(share) or self.at(before, after, share)
-            if point is None:
-                raise NotConverged(Reason.LOST_AT_LIMIT())
-            return function(point)
+            below = max(s for s in met if s <= share)
+            step = share - below
+            least = step / 2**SUBDIVISIONS
+            while below < share:
+                above, there = min(s for s in met if s > below), min(below + step, share)
+                part = (there - below) / (above - below)
+                point = self.at(before, after, there, (1 - part) * met[below].z + part * met[above].z)
+                if point is not None:
+                    met[there], below = point, there
+                elif step > least:
+                    step /= 2
+                else:
+                    raise NotConverged(Reason.LOST_AT_LIMIT())
+            return function(met[share])
 
         try:
             return met[brentq(value, 0.0, 1.0, xtol=tolerance, rtol=1e-14)]

@@ -285,10 +285,14 @@ def sealing_for_cracking(case: Case, area_ratio: float, observer: Observer | Non
     observer = Observer() if observer is None else observer
     head = case.valve.cracking_head
     drive = case.fluid.density * GRAVITY * head
-    sealing, known = drive / _CRACKS_AT, []
+    sealing, known, why = drive / _CRACKS_AT, [], ""
     for _ in range(_BILLS):
         observer.progress(f"looking for a cracking head of {head:.4g} m with a sealing pressure of {sealing:.6g} Pa")
-        model = ValveModel(case.replace({"valve.cracking_head": None, "valve.sealing_pressure": sealing}))
+        try:
+            model = ValveModel(case.replace({"valve.cracking_head": None, "valve.sealing_pressure": sealing}))
+        except SolveError as error:  # no wall presses so hard
+            why, sealing = f" {error}", np.sqrt(sealing * (np.exp(known[-1][0]) if known else 0.5 * sealing))
+            continue
         path, cracks = LoadPath(model, SteadyOptions.of(case), observer=observer), None
         for factor in _BEYOND:
             path.go_to(model.flow.back + factor * drive)
@@ -304,7 +308,7 @@ def sealing_for_cracking(case: Case, area_ratio: float, observer: Observer | Non
             (a, at_a), (b, at_b) = known[-2:]
             slope = np.clip((at_b - at_a) / (b - a), 0.3, 3.0)
         sealing = float(np.exp(known[-1][0] - off / slope))
-    raise SolveError(f"No sealing pressure was found with which the bill cracks at a head of {head:.4g} m.")
+    raise SolveError(f"No sealing pressure was found with which the bill cracks at a head of {head:.4g} m.{why}")
 
 
 #: Where the search begins: this part of the pump's largest head; and how far it goes up at once.
