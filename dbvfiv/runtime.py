@@ -62,6 +62,9 @@ def prepare() -> None:
     core = blas_core(_processor())
     if core:
         settings["OPENBLAS_CORETYPE"] = core
+    if _numpy_is_of_pypi():
+        # it would multiply complex numbers with fused instructions or without, by how far apart they lie in memory
+        settings["NPY_DISABLE_CPU_FEATURES"] = "FMA3"
     for name, value in settings.items():
         os.environ.setdefault(name, value)
     os.environ["JAX_ENABLE_X64"] = "true"
@@ -77,6 +80,15 @@ def prepare() -> None:
         sys.path += debian_petsc()
     if mpi_size() > 1:
         _petsc_of_its_own()
+
+
+def _numpy_is_of_pypi() -> bool:
+    """True for a wheel of PyPI, whose kernels serve any processor; a build for one processor may need fused
+    multiplications and refuses to start without them.
+    """
+    numpy = importlib.util.find_spec("numpy")
+    wheels = Path(numpy.origin).parents[1].glob("numpy-*.dist-info/WHEEL") if numpy and numpy.origin else ()
+    return any("manylinux" in wheel.read_text(encoding="utf-8") for wheel in wheels)
 
 
 def debian_petsc(root: str = "/usr/lib") -> list[str]:
