@@ -66,7 +66,7 @@ ALL = (
         Made(
             f"moulded-{size}",
             f'dbvfiv map cases/dbv{size}-moulded.toml --x "pressure=0.02 m:1 m:14:log" --y sealing=400:2400:8:log '
-            "--both --set mesh.around=10 --set mesh.along=20 --set map.curve=false --set map.refine=0 "
+            "--both --set mesh.around=20 --set mesh.along=36 --set map.curve=false --set map.refine=0 "
             "--set map.checks=2",
             {"stability-map.png": f"moulded-{size}-inch.png"},
         )

@@ -108,6 +108,7 @@ BRANCHES = [
     ("quasi-steady", 2.2e3, "beta", (4.5e-3, 4.6e-3, 4.7e-3), 4e-5),
     ("storage", 1.65e3, "density", (1.0, 4.0, 7.0), 1e-5),
     ("storage", 1.8e3, "density", (6.5, 7.5, 8.5), 4e-6),
+    ("storage", 2.0e3, "density", (21.0, 22.5, 24.0), 1e-5),
     ("storage", 2.2e3, "density", (24.0, 27.0, 30.0), 4e-5),
 ]
 
