@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from functools import lru_cache
+from functools import cached_property, lru_cache
 
 import numpy as np
 from scipy.interpolate import PchipInterpolator
@@ -46,6 +46,12 @@ class Surface:
         ValueError
             If two profiles lie at one place.
         """
+        i, share = self._piece(z)
+        xy = (1 - share) * self.profiles[i].points(s) + share * self.profiles[i + 1].points(s)
+        return np.column_stack([xy, np.full(len(xy), z)])
+
+    def _piece(self, z: float) -> tuple[int, float]:
+        """Number of the profile before an axial position, and the weight of that after it."""
         breaks = self.breaks
         i = int(np.clip(np.searchsorted(breaks, z, side="right") - 1, 0, len(breaks) - 2))
         if not breaks[i + 1] > breaks[i]:
@@ -53,25 +59,32 @@ class Surface:
                 f"Two sections of the valve lie at z = {breaks[i]:g} m: one length is nothing beside the rest."
             )
         share = (z - breaks[i]) / (breaks[i + 1] - breaks[i])
-        if self.smooth:
-            share = share**2 * (3 - 2 * share)
-        xy = (1 - share) * self.profiles[i].points(s) + share * self.profiles[i + 1].points(s)
-        return np.column_stack([xy, np.full(len(xy), z)])
+        return i, share**2 * (3 - 2 * share) if self.smooth else share
 
     def area(self, z: float) -> float:
         """Area between the section and the symmetry planes, m2."""
-        points = self.section(z, self._fine())
-        return float(np.sum(0.5 * (points[1:, 1] + points[:-1, 1]) * np.diff(points[:, 0])))
-
-    def _fine(self) -> np.ndarray:
-        return np.linspace(self.part.begin, 1.0, 8000 * self.part.quarters + 1)
+        x, y = self._polygon(z).T
+        return float(np.sum(0.5 * (y[1:] + y[:-1]) * np.diff(x)))
 
     def length(self, z: float) -> float:
         """Arc length of the section, m: of the profile that lies there, else of a polygon of many points."""
         near = next((p for p in self.profiles if abs(p.z - z) <= 1e-9 * self.profiles[-1].z), None)
         if near is not None and np.isfinite(near.length):
             return near.length
-        return float(np.linalg.norm(np.diff(self.section(z, self._fine()), axis=0), axis=1).sum())
+        return float(np.linalg.norm(np.diff(self._polygon(z), axis=0), axis=1).sum())
+
+    def _polygon(self, z: float) -> np.ndarray:
+        """Many points (k, 2) of the section."""
+        i, share = self._piece(z)
+        return (1 - share) * self._polygons[i] + share * self._polygons[i + 1]
+
+    @cached_property
+    def _polygons(self) -> list[np.ndarray]:
+        """Many points (k, 2) of the profiles."""
+        return [profile.points(self._many()) for profile in self.profiles]
+
+    def _many(self) -> np.ndarray:
+        return np.linspace(self.part.begin, 1.0, 8000 * self.part.quarters + 1)
 
 
 @dataclass(frozen=True)
@@ -85,9 +98,14 @@ class SmoothSurface(Surface):
 
     def section(self, z: float, s: np.ndarray) -> np.ndarray:
         """Points (k, 3) of the section at the axial position z, normalised arc lengths s (k,)."""
-        s = np.asarray(s, float)
-        xy = self._curve(s.tobytes())(np.clip(z, *self.breaks))
+        xy = self._through(z, np.asarray(s, float))
         return np.column_stack([xy, np.full(len(xy), z)])
+
+    def _polygon(self, z: float) -> np.ndarray:
+        return self._through(z, self._many())
+
+    def _through(self, z: float, s: np.ndarray) -> np.ndarray:
+        return self._curve(s.tobytes())(np.clip(z, *self.breaks))
 
     @lru_cache(maxsize=8)  # noqa: B019
     def _curve(self, s: bytes) -> PchipInterpolator:
