@@ -103,6 +103,7 @@ def run(
     with Workers(count, prepare_valves, (case.to_dict(), known), record.warn) as team:
         search = Search(plan, places, lines, record, team, Valves(plan, places, known))
         learning, z, rounds = search.learn()
+        check = search.check(learning, z, rounds + 1)
     table = {"sample": np.repeat(np.arange(len(z)), z.shape[1]), "input": np.tile(np.arange(z.shape[1]), len(z))}
     record.extend(POSTERIOR, table | {"score": z.ravel()})
     record.note(
@@ -110,7 +111,7 @@ def run(
         rounds=rounds,
         left_out=[*learning.left_out],
         emulation=learning.emulation(z),
-        check=search.check(learning, z, rounds + 1),
+        check=check,
     )
     result = IdentifyResult(record, session)
     for sentence in result.doubts:
