@@ -36,8 +36,6 @@ _POINTS = 1e-9
 #: Newton's iterations for a point ahead, for which a shorter step is cheaper than more of them, and for one between two
 #: that are known, where faces may part on the way whatever the step.
 _AHEAD, _BETWEEN = 7, 25
-#: Range of the load where none is set.
-_ANY = (-np.inf, np.inf)
 #: Largest angles between tangents, rad, tried one after the other: where faces part, displacements of micrometres turn
 #: the curve, and one that turns right back has been missed.
 _ANGLES = 0.7, 1.4, 0.35
@@ -195,7 +193,7 @@ class LoadCurve:
 
     def limit_states(self) -> list[LimitState]:
         """Limit points along the curve, solved for."""
-        points, tracer, found = self._branch.points, self._tracer(_ANY, _BETWEEN), []
+        points, tracer, found = self._branch.points, self._tracer(), []
         for i in self._turns(self._slopes(slice(None))):
             at = tracer.root(points[i], points[i + 1], lambda point: point.tangent[-1], 1e-12)
             at = min(points[i : i + 2], key=lambda point: abs(point.tangent[-1])) if at is None else at
@@ -239,7 +237,7 @@ class LoadCurve:
         vanishes; None where the curve is lost.
         """
         points = self._branch.points
-        tracer = self._tracer(_ANY, _BETWEEN)
+        tracer = self._tracer()
         point = tracer.root(points[after - 1], points[after], lambda p: function(p.z), 1e-8)
         return None if point is None else point.z
 
@@ -283,7 +281,8 @@ class LoadCurve:
         part = (target - pressure[i - 1]) / (pressure[i] - pressure[i - 1])
         return (points[i - 1].z + part * (points[i].z - points[i - 1].z))[:-1]
 
-    def _tracer(self, limits: tuple[float, float], iterations: int = _AHEAD):
+    def _tracer(self, ahead: tuple[float, float] | None = None):
+        """Tracer that follows the curve within limits of the load, or without them finds points between known ones."""
         if self._system is None:
             # residuals against the load at the start, where there is one: rounding of forces is of their size
             self._system = LoadSystem(self.model, max(self._unit, abs(self._start - self.model.flow.back)))
@@ -292,13 +291,13 @@ class LoadCurve:
             min_step=_SMALLEST,
             max_step=_LARGEST,
             max_points=_MOST,
-            limits={LOAD: limits},
+            limits={LOAD: ahead or (-np.inf, np.inf)},
             parameter_scales={LOAD: self._unit},
             folds=self.stops_at_limit,
             locate=False,
             stop_at=frozenset({"fold"}),
             branch_points=False,
-            newton=ContinuationNewton(max(self.newton.tolerance, _POINTS), iterations),
+            newton=ContinuationNewton(max(self.newton.tolerance, _POINTS), _AHEAD if ahead else _BETWEEN),
             max_angle=self._angle,
         )
         return branch_tracer(self._system, {LOAD: self._start}, LOAD, options, observers=_Told(self.observer))

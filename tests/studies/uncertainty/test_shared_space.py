@@ -55,7 +55,7 @@ class OnSample(Observer):
 def numbers(found):
     """All that a run says but that a worker was lost, with the bits of the rows of its samples."""
     rows = {name: np.asarray(column).tobytes() for name, column in found.at(found.plan.values[0]).items()}
-    return {key: value for key, value in found.summary().items() if key != "warnings"} | rows
+    return {key: value for key, value in found.summary().items() if key != "warnings"} | {"rows": rows}
 
 
 def assert_same(found, whole):
