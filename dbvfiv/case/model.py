@@ -24,8 +24,9 @@ from .units import Units, unit_of
 from .valve import Valve
 from .wall import edges_of
 
-#: Pressure over depth with which faces resist, Pa/m: nearly rigid, and some modulus over thickness of a rubber wall.
-FACE_STIFFNESS, PRESET_STIFFNESS = 1e10, 1e9
+#: Pressure over depth with which faces resist, Pa/m: nearly rigid; where contact spreads, some modulus over thickness
+#: of a rubber wall.
+FACE_STIFFNESS, SPREADING_STIFFNESS = 1e10, 1e9
 #: Share of the gap between rough faces in contact below which no passage of a bill that is moulded shut narrows.
 PRESET_FILM = 0.75
 
@@ -133,11 +134,12 @@ class Case(Section):
             raise BrokenRule(
                 "drive.side", "'outside' with drive.kind = 'flow'", "it must be 'inside' unless drive.kind is 'uniform'"
             )
-        if self.valve.is_preset and self.supports.contact == "stops":
+        if self.contact_spreads and self.supports.contact == "stops":
+            shape = "a bill that is moulded shut" if self.valve.is_preset else "lips that are bowed apart"
             raise BrokenRule(
                 "supports.contact",
-                "'stops' for a bill that is moulded shut",
-                "its faces press on each other, so it must be 'faces' or left out",
+                f"'stops' for {shape}",
+                "stops hold lips in the shape at rest, so it must be 'faces' or left out",
             )
         self._check_fillers()
         self.mesh.check_positions(self.valve.as_given.length)
@@ -210,9 +212,14 @@ class Case(Section):
         return part_of(self.valve, self.mesh)
 
     @property
+    def contact_spreads(self) -> bool:
+        """True where faces meet and part row by row: of a bill that is moulded shut, and of lips bowed apart."""
+        return self.valve.is_preset or self.valve.lip_rise > 0
+
+    @property
     def faces_touch(self) -> bool:
         """True where the inner faces touch, and not stops."""
-        return self.supports.contact == "faces" or self.valve.is_preset
+        return self.supports.contact == "faces" or self.contact_spreads
 
     @property
     def film_share(self) -> float:
@@ -223,7 +230,7 @@ class Case(Section):
     def face_stiffness(self) -> float:
         """Pressure over depth with which faces that meet resist, Pa/m."""
         given = self.supports.contact_stiffness
-        return (PRESET_STIFFNESS if self.valve.is_preset else FACE_STIFFNESS) if given is None else given
+        return (SPREADING_STIFFNESS if self.contact_spreads else FACE_STIFFNESS) if given is None else given
 
     @property
     def separation(self) -> float:

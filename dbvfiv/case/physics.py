@@ -189,13 +189,13 @@ class Supports(Section):
         None,
         "What keeps the walls from crossing the closing plane y = 0: springs on the displacement of duckbill nodes "
         "(stops, App. A, said by the keys lip_stop...), which let the outer half of the lips cross, or contact of the "
-        "inner faces of the whole wall (faces), for which these keys say nothing. Stops where not given, and faces "
-        "for a bill that is moulded shut.",
+        "inner faces of the whole wall (faces), for which these keys say nothing. Stops where not given; faces for a "
+        "bill moulded shut and for lips bowed apart.",
     )
     contact_stiffness: FaceStiffness | None = key(
         None,
-        'Pressure over depth with which faces that meet resist, for contact = "faces"; 1e10 Pa/m where not given, of '
-        "a bill that is moulded shut 1e9 Pa/m, some modulus over thickness of its wall.",
+        'Pressure over depth with which faces that meet resist, for contact = "faces"; 1e10 Pa/m where not given, '
+        "1e9 Pa/m, some modulus over thickness, for a bill moulded shut and lips bowed apart.",
         gt=0,
         le=1e15,
     )

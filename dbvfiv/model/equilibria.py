@@ -65,11 +65,24 @@ class LoadPath(LoadSteps):
                 way = self._loaded(target) if self._at_rest else self.reach(target)
         except SolveError as error:
             raise SolveError(f"{str(error).removesuffix('.')}{self._too_wide()}.") from None
+        return self._described(way)
+
+    def settled(self) -> SteadyState:
+        """Equilibrium at the present pressure, found from displacements next to it.
+
+        Raises
+        ------
+        SolveError
+        """
+        result = self.settle()
+        return self._described(LoadStepResult(result.iterations, 0, result))
+
+    def _described(self, way: LoadStepResult) -> SteadyState:
         last = way.result
         return describe_state(
             self.model,
             self.q,
-            target,
+            self.pressure,
             converged=True,
             iterations=way.iterations,
             load_steps=way.steps,

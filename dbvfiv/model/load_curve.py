@@ -173,7 +173,8 @@ class LoadCurve:
     @property
     def reason(self) -> str:
         """Why the curve ended."""
-        return str(self._branch.reason)
+        back = self._branch.reason.kind is Reason.LIMIT and self.pressures[-1] <= self._start
+        return "came back to where it began" if back else str(self._branch.reason)
 
     @property
     def pressures(self) -> np.ndarray:
@@ -332,7 +333,8 @@ class LoadCurve:
             if self._branch.reason.kind is Reason.INTERRUPTED:
                 self._branch = None
                 raise KeyboardInterrupt
-            if self.pressures[-1] >= target * (1 - 1e-12) or self._branch.reason.kind is Reason.STOPPED:
+            ended = self._branch.reason.kind in (Reason.STOPPED, Reason.POINTS)
+            if ended or self.pressures[-1] >= target * (1 - 1e-12):
                 return
 
 

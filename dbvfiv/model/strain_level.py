@@ -221,12 +221,13 @@ class _Load:
         model = ValveModel(case.replace(self.changes) if self.changes else case)
         start, self.state = self.path if self.state is not None else None, None
         while self.state is None and self.halved <= self.lower:
-            self.path = LoadPath(model, self._options(model), observer=self.observer)
+            self.path, target = LoadPath(model, self._options(model), observer=self.observer), self._target(model)
             try:
                 if start is not None:
                     self.path.q, self.path.pressure = start.q, start.pressure
-                    self.path.settle()
-                self.state = self.path.go_to(self._target(model))
+                    self.state = self.path.settled()
+                if self.path.pressure != target or start is None:
+                    self.state = self.path.go_to(target)
             except SolveError as error:
                 if start is None:
                     self.missed, self.halved = self.missed or error, self.halved + 1

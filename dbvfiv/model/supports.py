@@ -93,9 +93,9 @@ def lip_stops(case: Case, mesh: ValveMesh, index: np.ndarray) -> LipStops:
     return LipStops(unknowns[moving].astype(int), stiffness)
 
 
-#: Half width of the rounded kink of the contact law over the initial gap, and that over it of a bill that is moulded
-#: shut, whose faces take up and lose contact row by row.
-ROUNDING, PRESET_ROUNDING = 0.01, 1 / 3
+#: Half width of the rounded kink of the contact law over the initial gap, and that over it where contact spreads row by
+#: row.
+ROUNDING, SPREADING_ROUNDING = 0.01, 1 / 3
 
 
 #: What closes a valve that is pressed from outside: contact of the faces, or the supports of Th. 3.6.
@@ -106,7 +106,7 @@ def face_contact(case: Case, mesh: ValveMesh, shell: Shell, closed_by: str | Non
     """Contact of the inner faces of a case, as drawn of a closed valve; None where it has stops."""
     every, area, gap = np.arange(shell.mesh.node_count), tributary_area(shell), case.valve.initial_gap
     preset = case.valve.is_preset
-    law = ContactLaw(case.face_stiffness, (PRESET_ROUNDING if preset else ROUNDING) * gap)
+    law = ContactLaw(case.face_stiffness, (SPREADING_ROUNDING if case.contact_spreads else ROUNDING) * gap)
     if closed_by == HELD_LIPS:
         return PlaneContact(shell, every, 0.0, area, law)
     if not case.faces_touch:

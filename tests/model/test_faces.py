@@ -73,6 +73,23 @@ def test_the_gap_of_a_bowed_lip_is_its_lens(make_model):
     assert gap == pytest.approx(valve.lip.height - inside, rel=1e-3)
 
 
+@pytest.mark.slow
+def test_bowed_lips_close_where_they_are_pressed_from_outside(make_model):
+    """The lens shrinks from the first pascal on, and its faces come to lie on each other row by row."""
+    soft = {
+        "valve__wall": "uniform",
+        "valve__wall_thickness": 5e-3,
+        "layers": ({"material": "SBR", "thickness": 5e-3},),
+    }
+    small = {"mesh__around": 6, "mesh__along": 8, "drive__kind": "uniform", "drive__side": "outside"}
+    model = make_model(valve__lip_rise=0.04, **soft, **small)
+    path = LoadPath(model, SteadyOptions.of(model.case))
+    states = [path.go_to(pressure) for pressure in (0.0, 50.0, 200.0, 500.0, 1000.0)]
+    area, touching = np.array([state.outlet_area for state in states]), [state.stops for state in states]
+    assert np.all(np.diff(area) < 0) and area[1] > 0.95 * area[0] and 0 < area[4] < 0.02 * area[0]
+    assert touching[:3] == [0, 0, 0] and 0 < touching[3] < touching[4]
+
+
 def test_open_states_do_not_know_of_it(make_model, model):
     """With nothing in touch, residual and tangent are those of the valve with stops to the last digit."""
     stops = make_model()

@@ -183,6 +183,7 @@ def test_cracking_head_that_is_asked_for_is_found(model, head):
     [
         ({"valve.overlap": 1e-3, "valve.sealing_pressure": 1e3}, "valve.overlap is 0.001 beside sealing_pressure"),
         ({"valve.overlap": 1e-3, "supports.contact": "stops"}, "supports.contact is 'stops' for a bill"),
+        ({"valve.lip_rise": "20 mm", "supports.contact": "stops"}, "is .stops. for lips that are bowed"),
         ({"valve.overlap": 1e-3, "valve.lip_rise": "20 mm"}, "lips that leave a lens"),
         ({"valve.moulded_length": "300 mm"}, "must be at most duckbill_length"),
     ],
