@@ -28,6 +28,7 @@ EFFECTS = {
     "it is half the width of the bill": ("unknown", "valve.lip_half_width"),
     "before a valve of": ("unknown", "upstream.diameter"),
     "scaled until they fill the wall": ("none where their shares are meant", "-"),
+    "the thicknesses of valve.wall_map": ("unknown", "valve.wall"),
     "radians are given as": ("unknown", "-"),
     "and its jet of": ("a density that changes by half the Mach number squared", "fluid.sound_speed"),
     "a gas, of which": ("unknown", "drive.pressure"),

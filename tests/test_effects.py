@@ -65,6 +65,7 @@ MENDED = {
     "half the diameter is its radius": (oddities, ["valve.flange_radius=12 in"], "139 mm"),
     "more than any that is sold": (oddities, ["valve.scale=12"], "1"),
     "it is half the width of the bill": (oddities, ["valve.lip_half_width=250 mm"], "125 mm"),
+    "the thicknesses of valve.wall_map": (oddities, ["valve.wall_thickness=5 mm"], "uniform"),
     "before a valve of": (oddities, ["upstream.length=3 m", "upstream.diameter=45 mm"], "300 mm"),
     "and its jet of": (oddities, ["fluid.density=1"], "343 m/s"),
     "a gas, of which": (oddities, ["fluid.density=1", "drive.pressure=1 m"], "1 mH2O"),

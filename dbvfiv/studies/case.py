@@ -339,6 +339,12 @@ def _sizes_seldom_meant(case: Case) -> Iterator[str]:
         yield f"upstream.diameter is {1e3 * pipe:.4g} mm before a valve of {1e3 * bore:.4g} mm."
     valve, given = case.valve.as_given, 0.5 * case.valve.as_given.length
     wall = max(valve.thickness_at(place) for place in (0.0, given, 2 * given))
+    named = case.valve.model_fields_set
+    if "wall_thickness" in named and "wall" not in named and valve.wall == "measured":
+        yield (
+            f"valve.wall_thickness is {1e3 * valve.wall_thickness:.4g} mm, and the wall has the thicknesses of "
+            'valve.wall_map; valve.wall = "uniform" takes the former.'
+        )
     for i, layer in enumerate(case.layers):
         if layer.thickness > 3 * wall and len(case.layers) > 1:
             yield (

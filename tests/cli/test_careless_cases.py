@@ -90,6 +90,7 @@ def test_studies_refuse_contradictions_before_they_solve(command_line, one_sente
 
 SELDOM_MEANT = [
     (["valve.lip_half_width=250 mm"], "half the width of the bill"),
+    (["valve.wall_thickness=5 mm", "valve.scale=0.5"], 'valve.wall = "uniform" takes the former'),
     (["layers.2.angle=0.785"], "0.785 rad"),
     (["layers.0.thickness=60 mm"], "scaled until they fill the wall"),
     (["upstream.length=30 m", "upstream.diameter=45 mm"], "45 mm before a valve of 278"),
