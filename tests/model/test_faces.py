@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from dbvfiv.errors import SolveError
 from dbvfiv.model.classes import linearise_class
 from dbvfiv.model.equilibria import LoadPath, SteadyOptions
 from dbvfiv.model.newton import NewtonOptions
@@ -88,6 +89,8 @@ def test_bowed_lips_close_where_they_are_pressed_from_outside(make_model):
     area, touching = np.array([state.outlet_area for state in states]), [state.stops for state in states]
     assert np.all(np.diff(area) < 0) and area[1] > 0.95 * area[0] and 0 < area[4] < 0.02 * area[0]
     assert touching[:3] == [0, 0, 0] and 0 < touching[3] < touching[4]
+    with pytest.raises(SolveError, match="came down to no load in another shape, from 74.* Pa at most"):
+        path.go_to(18e3)
 
 
 def test_open_states_do_not_know_of_it(make_model, model):
