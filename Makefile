@@ -21,12 +21,12 @@ test: setup
 # all that is slow but the third dimension, with the tables that its tests print
 verify: setup
 	@$(PYTHON) -m pytest -n $(JOBS) --dist loadscope -rP -m "slow and not random" $(CORE)
-	@DBVFIV_FINE=1 $(PYTHON) -m pytest -n $(JOBS) --dist load -m slow tests/verification/test_shipped_cases.py tests/verification/test_cycles_in_time.py
+	@DBVFIV_FINE=1 $(PYTHON) -m pytest -n $(JOBS) --dist worksteal -m slow tests/verification/test_shipped_cases.py tests/verification/test_cycles_in_time.py
 	@$(MAKE) random
 
 # one outcome and one count at thousands of random states
 random: setup
-	@$(PYTHON) -m pytest -n $(JOBS) --dist load -m random tests/verification tests/model
+	@$(PYTHON) -m pytest -n $(JOBS) --dist worksteal -m random tests/verification tests/model
 
 # flow and wall in three dimensions, end to end; installs Debian's OpenFOAM where there is none
 verify-3d: setup
