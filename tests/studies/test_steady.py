@@ -9,10 +9,12 @@ from dbvfiv.case.load import make_case, parse_toml
 from dbvfiv.errors import CaseError, SolveError
 from dbvfiv.model import ValveModel
 from dbvfiv.model.equilibria import LoadPath, SteadyOptions, model_warnings
+from dbvfiv.model.load_curve import LimitPoint
 from dbvfiv.model.newton import NewtonOptions
 from dbvfiv.model.state import LipCentre, describe_state
 from dbvfiv.record.states import summarise
 from dbvfiv.studies.case import Case, thesis_case
+from dbvfiv.studies.steady.study import _met
 
 
 @pytest.fixture(scope="module")
@@ -153,3 +155,11 @@ def test_a_state_without_a_finite_flow_is_an_error():
     open_wide = 40.0 * LoadPath(model).go_to(6e3).q
     with pytest.raises(SolveError, match="no finite steady flow"):
         describe_state(model, open_wide, 6e3)
+
+
+def test_a_load_meets_limit_points_beyond_those_before():
+    """Those of lips bowed apart by 40 mm, of 5 mm SBR on 14 x 24 elements, pressed shut from outside."""
+    pressures = 1018.0, 984.0, 995.0, 886.0, 957.0, 831.0, 949.0, 871.0, 1073.0, 985.0
+    limits = [LimitPoint(pressure, highest=i % 2 == 0) for i, pressure in enumerate(pressures)]
+    assert _met(limits, rising=True) == [1018.0, 1073.0]
+    assert _met(limits, rising=False) == [985.0, 871.0, 831.0]

@@ -110,6 +110,21 @@ def _note_curve(model: ValveModel, states: Sequence[SteadyState], record: Growin
                 record.note(FURTHER, pressure=state.pressure, **found)
 
 
+def _met(limits: Sequence[LimitPoint], rising: bool) -> list[float]:
+    """Limit points, Pa, that a load meets on its way along a curve: each beyond those before it."""
+    met: list[float] = []
+    for limit in limits if rising else limits[::-1]:
+        if limit.highest == rising and (not met or (limit.pressure > met[-1]) == rising):
+            met.append(limit.pressure)
+    return met
+
+
+def _told(pressures: Sequence[float]) -> str:
+    if len(pressures) > 2:
+        return f"{len(pressures)} pressures from {pressures[0]:.4g} to {pressures[-1]:.4g} Pa"
+    return " and ".join(f"{p:.4g}" for p in pressures) + " Pa"
+
+
 class Cracking(NamedTuple):
     """Cracking pressure: that at which the passage at the lips has grown to a multiple of its area at rest.
 
@@ -346,7 +361,8 @@ class SteadyResult(StudyResult):
             return []
         high = [limit.pressure for limit in self.limits if limit.highest]
         low = [limit.pressure for limit in self.limits if not limit.highest]
-        back = f"; one that falls jumps back at {min(low):.4g} Pa" if low else ""
+        up, down = (_told(_met(self.limits, rising)) for rising in (True, False))
+        back = f"; one that falls jumps back at {down}" if low else ""
         rows = ""
         if len(high) > 1 and len(low) > 1 and self.case.valve.is_preset:
             rows = (
@@ -354,8 +370,8 @@ class SteadyResult(StudyResult):
                 "row by row of the mesh; a finer one has fewer."
             )
         said = [
-            f"Limit points: a pressure that rises leaves the curve of equilibria at {max(high):.4g} Pa and jumps to "
-            f"where it goes on{back}. The states are those of a pressure that rises slowly from rest." + rows
+            f"Limit points: a pressure that rises leaves the curve of equilibria at {up} and jumps "
+            f"to where it goes on{back}. The states are those of a pressure that rises slowly from rest." + rows
         ]
         for note in self.record.notes(FURTHER):
             said.append(
