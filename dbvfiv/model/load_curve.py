@@ -175,17 +175,7 @@ class LoadCurve:
         """Why the curve ended."""
         if self._branch.reason.kind is not Reason.LIMIT or self.pressures[-1] > self._start:
             return str(self._branch.reason)
-        if self._turned_right_back:
-            return "came back to where it began"
-        return f"came down to no load in another shape, from {self.pressures.max():.6g} Pa at most"
-
-    @property
-    def _turned_right_back(self) -> bool:
-        """True where the curve ends in the shape it began with; another shape without load lies about as far away as
-        the wall has gone.
-        """
-        away = np.linalg.norm(self.states - self.states[0], axis=1)
-        return bool(away[-1] < 0.1 * away.max())
+        return f"came down to no load again, from {self.pressures.max():.6g} Pa at most"
 
     @property
     def pressures(self) -> np.ndarray:
@@ -344,8 +334,7 @@ class LoadCurve:
             if self._branch.reason.kind is Reason.INTERRUPTED:
                 self._branch = None
                 raise KeyboardInterrupt
-            kind = self._branch.reason.kind
-            ended = kind in (Reason.STOPPED, Reason.POINTS, Reason.LIMIT) and not self._turned_right_back
+            ended = self._branch.reason.kind in (Reason.STOPPED, Reason.POINTS)
             if ended or self.pressures[-1] >= target * (1 - 1e-12):
                 return
 

@@ -89,7 +89,7 @@ def test_bowed_lips_close_where_they_are_pressed_from_outside(make_model):
     area, touching = np.array([state.outlet_area for state in states]), [state.stops for state in states]
     assert np.all(np.diff(area) < 0) and area[1] > 0.95 * area[0] and 0 < area[4] < 0.02 * area[0]
     assert touching[:3] == [0, 0, 0] and 0 < touching[3] < touching[4]
-    with pytest.raises(SolveError, match="came down to no load in another shape, from 74.* Pa at most"):
+    with pytest.raises(SolveError, match="came down to no load again, from 74.* Pa at most"):
         path.go_to(18e3)
 
 
