@@ -221,8 +221,9 @@ class _Load:
         model = ValveModel(case.replace(self.changes) if self.changes else case)
         start, self.state = self.path if self.state is not None else None, None
         while self.state is None and self.halved <= self.lower:
-            self.path, target = LoadPath(model, self._options(model), observer=self.observer), self._target(model)
+            self.path = LoadPath(model, self._options(model), observer=self.observer)
             try:
+                target = self._target(model)  # of a pump that has no operating point an error
                 if start is not None:
                     self.path.q, self.path.pressure = start.q, start.pressure
                     self.state = self.path.settled()

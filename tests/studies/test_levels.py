@@ -10,7 +10,7 @@ from dbvfiv.case import CaseError
 from dbvfiv.case.write import case_toml
 from dbvfiv.model.material_stability import tension_of
 from dbvfiv.model.strain_level import settle_levels
-from dbvfiv.studies.case import load_case, thesis_case
+from dbvfiv.studies.case import Case, load_case, thesis_case
 
 COARSE = {"mesh.around": 8, "mesh.along": 14}
 AUTO = COARSE | {"materials.strain_level": "auto"}
@@ -176,3 +176,11 @@ def test_the_command_prints_and_keeps_levels(tmp_path, command_line):
     assert done.status == 0 and "rubber" in done.out and "EPDM" in done.out
     assert len(dbvfiv.load_result(tmp_path / "l.h5").rows) == 3
     assert command_line("info", tmp_path / "l.h5").status == 0
+
+
+@pytest.mark.slow
+def test_a_pump_without_an_operating_point_leaves_the_levels_of_rest():
+    line = {"upstream.length": 20.0, "upstream.diameter": 0.3}
+    found = settle_levels(Case().replace(line | {"upstream.pump": [[0.4, 0.5], [0.5, 0.4]]}), None)
+    assert "rest, as the operating point of the pump was not reached" in str(found)
+    assert set(found.levels.values()) == {0.1}

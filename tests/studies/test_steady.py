@@ -158,7 +158,7 @@ def test_a_state_without_a_finite_flow_is_an_error():
 
 
 def test_a_load_meets_limit_points_beyond_those_before():
-    """Those of lips bowed apart by 40 mm, of 5 mm SBR on 14 x 24 elements, pressed shut from outside."""
+    """Limit points of lips bowed apart by 40 mm, of 5 mm SBR on 14 x 24 elements, pressed shut from outside."""
     pressures = 1018.0, 984.0, 995.0, 886.0, 957.0, 831.0, 949.0, 871.0, 1073.0, 985.0
     limits = [LimitPoint(pressure, highest=i % 2 == 0) for i, pressure in enumerate(pressures)]
     assert _met(limits, rising=True) == [1018.0, 1073.0]
