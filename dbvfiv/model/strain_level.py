@@ -224,11 +224,11 @@ class _Load:
             self.path = LoadPath(model, self._options(model), observer=self.observer)
             try:
                 target = self._target(model)  # of a pump that has no operating point an error
+                near = None
                 if start is not None:
                     self.path.q, self.path.pressure = start.q, start.pressure
-                    self.state = self.path.settled()
-                if self.path.pressure != target or start is None:
-                    self.state = self.path.go_to(target)
+                    near = self.path.settled()
+                self.state = near if near is not None and near.pressure == target else self.path.go_to(target)
             except SolveError as error:
                 if start is None:
                     self.missed, self.halved = self.missed or error, self.halved + 1
