@@ -77,6 +77,19 @@ class FoldCondition:
         self.p, self.q = at.w / np.linalg.norm(at.w), at.v / np.linalg.norm(at.v)
 
 
+def fold_coefficient(system, u, mu, v, w) -> float:
+    """``a`` of ``x' = a x^2 + ...`` at a fold, with ``|v| = 1`` and ``w' B v = 1``.
+
+    Zero at a cusp; infinite where ``w' B v`` vanishes (Bogdanov-Takens).
+    """
+    linear = system.linear(u, mu)
+    value = FoldCondition(w, v).evaluate(system, u, mu, (), linear, ())
+    v = value.v / np.linalg.norm(value.v)
+    scale = value.w @ linear.mass_matvec(v)
+    with np.errstate(divide="ignore"):
+        return float(0.5 * (value.w @ system.d2(u, mu, v, v)) / scale)
+
+
 class HopfCondition(FoldCondition):
     """Real and imaginary part of ``g``: ``F_u - i omega B`` is singular, with eigenvectors ``v, w``.
 

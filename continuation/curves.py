@@ -11,9 +11,16 @@ import numpy as np
 
 from continuation.branch import Branch, CurvePoint, SpecialPoint
 from continuation.checks import options_of, require_names, shown, special_of, spectrum_of, system_of
-from continuation.conditions import BogdanovTakensCondition, FoldCondition, HopfCondition, generic_borders, null_pair
+from continuation.conditions import (
+    BogdanovTakensCondition,
+    FoldCondition,
+    HopfCondition,
+    fold_coefficient,
+    generic_borders,
+    null_pair,
+)
 from continuation.event_location import solve_augmented, special_at
-from continuation.normal_form import fold_coefficient, hopf_normal_form
+from continuation.normal_form import hopf_normal_form
 from continuation.options import (
     ContinuationError,
     ContinuationOptions,

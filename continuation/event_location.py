@@ -13,8 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from continuation.branch import CurvePoint, SpecialPoint
-from continuation.conditions import FoldCondition, null_pair
-from continuation.normal_form import fold_coefficient
+from continuation.conditions import FoldCondition, fold_coefficient, null_pair
 from continuation.options import DerivativeMissing, SingularSystem
 from continuation.problem import Problem, correct
 from continuation.tracer import Monitor

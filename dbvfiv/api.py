@@ -14,7 +14,7 @@ from .drawing.style import draw_figures, write_figures
 from .errors import CaseError, SolveError, as_path
 from .explore import Explorer
 from .fit.cards import DampingReport, describe_damping
-from .model import ValveModel
+from .model.valve import ValveModel
 from .observer import Observer, Progress, is_watched
 from .record.files import kind_of
 from .studies.case import Case, load_case

@@ -35,9 +35,9 @@ import jax.numpy as jnp
 import numpy as np
 import scipy.sparse as sp
 
-from .shell import Shell
 from .shell.reference import SHAPE, reference_geometry
 from .shell.rotation import director
+from .shell.shell import Shell
 
 
 def tributary_area(shell: Shell) -> np.ndarray:

@@ -17,8 +17,8 @@ from typing import Any
 
 import numpy as np
 
-from eigen import FamilyReduction, ReducedFamily
-from eigen.reduction import OPTIONS
+from eigen.family import ReducedFamily
+from eigen.reduction import OPTIONS, FamilyReduction
 
 from .case.parameters import PARAMETERS, Mu
 from .errors import CaseError, SolveError

@@ -19,6 +19,44 @@ from .spectrum import SearchOptions, Spectrum
 
 
 @dataclass(frozen=True)
+class CertificateOptions:
+    """Sizes of a count on a basis, and how far it is trusted.
+
+    Attributes
+    ----------
+    dense : int
+        Unknowns beyond which a count is made on a basis: a dense factorisation of so many takes some 10 ms, a count
+        some hundred of them.
+    trusted : float
+        Largest error of log det on the basis; a count is wrong where it comes to pi.
+    checked : int
+        Frequencies at which a basis is compared with the full pencil.
+    finer : int
+        Finer bases tried at most where the first one leaves a count open.
+    distinct : float
+        Size, over the largest, below which directions of exact responses are left out of a finer basis.
+    points_beyond : int
+        Points of a count over all frequencies where one up to the end of a band can stand in for it.
+    distant : int
+        Pairs beyond the band that are looked for at most, and real ones.
+    steps : int
+        Newton steps for one of them, which is known roughly.
+    """
+
+    dense: int = 400
+    trusted: float = 0.1
+    checked: int = 2
+    finer: int = 3
+    distinct: float = 1e-4
+    points_beyond: int = 1000
+    distant: int = 4
+    steps: int = 8
+
+
+OPTIONS = CertificateOptions()
+
+
+@dataclass(frozen=True)
 class Certificate:
     """Agreement of a spectrum with an independent count, for a mode list and for a cell of a map alike.
 
@@ -76,12 +114,6 @@ class Certificate:
         return text + (f" up to {self.band:.4g} Hz" if np.isfinite(self.band) else "")
 
 
-#: Pairs beyond the band that are looked for at most, and real ones.
-MOST = 4
-#: Newton steps at most; what lies beyond the band is known roughly.
-STEPS = 8
-
-
 def distant_pairs(
     pencil: CoupledPencil,
     spectrum: Spectrum,
@@ -110,14 +142,14 @@ def distant_pairs(
     values, q, u, _, _ = all_pairs(pencil if basis is None else pencil.projected(basis.V), left=False)
     unstable = np.flatnonzero(values.real > line)
     unstable = unstable[np.argsort(-values.real[unstable])]
-    chosen = list(unstable[values.imag[unstable] == 0][:MOST])
+    chosen = list(unstable[values.imag[unstable] == 0][: OPTIONS.distant])
     if options.max_frequency is None:
-        chosen += list(unstable[values.imag[unstable] > 2 * np.pi * spectrum.band][:MOST])
+        chosen += list(unstable[values.imag[unstable] > 2 * np.pi * spectrum.band][: OPTIONS.distant])
     starts = [(values[i], q[:, i] if basis is None else basis.V @ q[:, i], u[:, i]) for i in chosen]
     workspace = Workspace()
     pairs = []
     for start in starts:
-        pair = newton(pencil, *start, workspace=workspace, tolerance=options.tolerance, steps=STEPS)
+        pair = newton(pencil, *start, workspace=workspace, tolerance=options.tolerance, steps=OPTIONS.steps)
         value, _, _, residual, backward = pair
         known = [abs(value - x) <= SAME * abs(x) for x in (*spectrum.eigenvalues, *(other[0] for other in pairs))]
         if value.real > line and acceptable(residual, backward, options.tolerance) and not any(known):
@@ -162,18 +194,6 @@ def joined(spectrum: Spectrum, found: Found, line: float) -> Spectrum:
     )
 
 
-#: Unknowns beyond which a count is made on a basis.
-LARGE = 400
-#: Largest accepted error of log det of the reduced basis behind a count.
-TRUSTED = 0.1
-#: Points of a count over all frequencies where one up to the end of a band can stand in for it.
-POINTS_BEYOND = 1000
-#: Frequencies at which a basis is compared with the full pencil.
-CHECKED = 2
-#: Finer bases tried at most where the first one leaves a count open.
-FINER = 3
-#: Size below which directions of exact responses are left out of a finer basis, relative to the largest.
-DISTINCT = 1e-4
 #: Multiples of it, modulo one, fill an interval evenly and never repeat.
 GOLDEN = 0.5 * (np.sqrt(5.0) - 1.0)
 
@@ -246,6 +266,7 @@ def certified_spectrum(
     workspace: Workspace | None = None,
     basis: TransferBasis | None = None,
     whole: bool = True,
+    dense: int = OPTIONS.dense,
     solver: Callable[..., KrylovPairs] = krylov_pairs,
 ) -> CertifiedSpectrum:
     """Leading modes and an independent count of the unstable ones, with their agreement.
@@ -259,6 +280,8 @@ def certified_spectrum(
     whole : bool
         Count over all frequencies, also where a band was asked for; without, in that band alone where both routes agree
         there. A lightly damped wall has very many modes to pass beyond it.
+    dense : int
+        Unknowns beyond which a count is made on a basis.
 
     Notes
     -----
@@ -271,21 +294,18 @@ def certified_spectrum(
     """
     search = partial(leading_modes, pencil, workspace=workspace or Workspace(), solver=solver)
     spectrum = search(count, options)
-    if pencil.n > LARGE:
-        basis = basis or TransferBasis(pencil)
-    else:
-        basis = None
+    basis = (basis or TransferBasis(pencil)) if pencil.n > dense else None
     asked = pencil, options, search
     if not whole and options is not None and options.max_frequency is not None and np.isfinite(spectrum.band):
         found, _ = _judged(*asked, spectrum, basis, within=0.999 * spectrum.band)
         if found.agrees:
             return found
     found, basis = _judged(*asked, spectrum, basis)
-    for finer in range(1, FINER + 1):
+    for finer in range(1, OPTIONS.finer + 1):
         if found.agrees or basis is None:
             break
         basis = _finer(pencil, basis, found, finer)
-        if basis.size > LARGE:
+        if basis.size > dense:
             break
         found, basis = _judged(*asked, found.spectrum, basis, finer)
     return found
@@ -302,7 +322,7 @@ def _finer(pencil, basis, found, finer) -> TransferBasis:
         factor = Workspace().factored(pencil, 2j * np.pi * f)
         exact += [factor.solve(pencil.G.toarray().astype(complex))]
         exact += [factor.solve_transposed(pencil.J.toarray().T.astype(complex))]
-    return basis.enlarged(pencil, *exact, compression=DISTINCT)
+    return basis.enlarged(pencil, *exact, compression=OPTIONS.distinct)
 
 
 def _judged(pencil, options, search, spectrum, basis, finer=0, within=None):
@@ -316,7 +336,7 @@ def _judged(pencil, options, search, spectrum, basis, finer=0, within=None):
     def counted(band=None):
         # a structure that loses stability by itself has very many modes beyond a band that hardly decay
         beyond = band is None and np.isfinite(spectrum.band) and model is not pencil
-        most = {"max_points": POINTS_BEYOND} if beyond else {}
+        most = {"max_points": OPTIONS.points_beyond} if beyond else {}
         return unstable_count(model, scale=scale, hints=spectrum.eigenvalues, band=band, **most)
 
     winding = counted(within)
@@ -348,7 +368,7 @@ def _judged(pencil, options, search, spectrum, basis, finer=0, within=None):
     error = None
     if model is not pencil:
         error = response_error(pencil, model, _checks(spectrum, winding, finer, basis))
-    trusted = winding.certain and (error is None or error < TRUSTED)
+    trusted = winding.certain and (error is None or error < OPTIONS.trusted)
     certificate = Certificate(listed, winding.number, trusted, winding.line, winding.band)
     return CertifiedSpectrum(spectrum, winding, certificate, error), basis
 
@@ -379,8 +399,8 @@ def _checks(spectrum, winding, finer, basis):
     """
     listed = [f for f in spectrum.frequency if 0 < f <= winding.band]
     if not finer:
-        return listed[:CHECKED] or list(winding.frequencies[1:2])
+        return listed[: OPTIONS.checked] or list(winding.frequencies[1:2])
     listed = listed or list(basis.structural_frequencies[basis.structural_frequencies > 0]) or winding.frequencies[1:2]
     low, high = 0.7 * min(listed), min(1.4 * max(listed), winding.band)
-    places = (np.arange((finer - 1) * CHECKED, finer * CHECKED) + 1) * GOLDEN % 1.0
+    places = (np.arange((finer - 1) * OPTIONS.checked, finer * OPTIONS.checked) + 1) * GOLDEN % 1.0
     return list(low * (high / low) ** places)

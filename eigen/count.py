@@ -7,8 +7,39 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .determinant import CLOSE, MAX_LOG, MAX_PHASE, MAX_PREDICTED, Determinant, Structure, middle, principal, thinned
+from .determinant import Determinant, Structure, middle, principal, thinned
 from .operator import CoupledPencil
+
+
+@dataclass(frozen=True)
+class CountOptions:
+    """How closely the phase of the determinant f is followed; found by trying on valves with few and many modes.
+
+    Attributes
+    ----------
+    phase : float
+        Largest increment of the phase between neighbours, rad: far from pi, where it becomes ambiguous.
+    size : float
+        Largest increment of log |f|, which feels zeros beside the line.
+    predicted : float
+        Largest increment of log f that the slope at a neighbour may predict.
+    apart : float
+        Distance of two places beside zeros that relax, over the distance of the zero from the line.
+    beside : tuple of int
+        Places beside a hint, in its distances from the line.
+    points : int
+        Points at most.
+    """
+
+    phase: float = np.pi / 3
+    size: float = 1.0
+    predicted: float = 1.5
+    apart: float = 0.4
+    beside: tuple[int, ...] = (-10, -3, -1, 0, 1, 3, 10)
+    points: int = 4000
+
+
+OPTIONS = CountOptions()
 
 
 @dataclass(frozen=True)
@@ -62,7 +93,7 @@ def unstable_count(
     band: float | None = None,
     hints=(),
     scale: float | None = None,
-    max_points: int = 4000,
+    max_points: int = OPTIONS.points,
     structure: Structure | None = None,
 ) -> Count:
     """Count the eigenvalues with growth rate above a line by the argument principle.
@@ -120,9 +151,6 @@ def unstable_count(
     return walk.count()
 
 
-BESIDE = (-10, -3, -1, 0, 1, 3, 10)
-
-
 class _Walk:
     """The phase along the line, refined until neighbours are close."""
 
@@ -164,7 +192,7 @@ class _Walk:
         places, widths = list(steps), []
         if np.isfinite(self.turn):
             places += [self.turn, *(self.turn + steps)]
-        for h, offsets in [*((h, BESIDE) for h in hints), *((h, (0,)) for h in zeros)]:
+        for h, offsets in [*((h, OPTIONS.beside) for h in hints), *((h, (0,)) for h in zeros)]:
             if h.imag == 0 or abs(h.imag) > self.turn:
                 continue
             width = max(abs(h.real - self.f.line), 1e-9 * abs(h))
@@ -175,7 +203,7 @@ class _Walk:
             widths += [width for omega in beside if omega > 0]
         if self.f.pencil.relaxation is not None:
             own = len(places) - len(widths)
-            places[own:] = thinned(places[own:], widths, CLOSE)
+            places[own:] = thinned(places[own:], widths, OPTIONS.apart)
         self._add(*places[: self.max_points // 2])
         top = max(self.values)
         settled = 0
@@ -239,9 +267,9 @@ class _Walk:
         power = 2.0 * (self.f.pencil.b - len(self.f.fluid) + 1)  # a growth like a power of omega hides nothing
         near = (slope > power) | (np.arange(slope.size) == 0)
         return np.flatnonzero(
-            (np.abs(steps.imag) > MAX_PHASE)
-            | (near & (np.abs(steps.real) > MAX_LOG))
-            | ((beside > power) & (beside * length > MAX_PREDICTED))
+            (np.abs(steps.imag) > OPTIONS.phase)
+            | (near & (np.abs(steps.real) > OPTIONS.size))
+            | ((beside > power) & (beside * length > OPTIONS.predicted))
         )
 
     def count(self) -> Count:

@@ -269,9 +269,3 @@ class Determinant:
 def _log_determinant(stack) -> np.ndarray:
     sign, size = np.linalg.slogdet(stack)
     return size + 1j * np.angle(sign)
-
-
-MAX_PHASE = np.pi / 3
-MAX_LOG = 1.0  # largest accepted increment of log |f|: feels zeros beside the line
-CLOSE = 0.4  # distance of two places beside zeros that relax, over the distance of the zero from the line
-MAX_PREDICTED = 1.5  # largest increment of log f that a neighbour's slope may predict

@@ -168,7 +168,7 @@ def _write_new(target: str | None, overrides: list[str] | None, as_json: bool) -
 
 def _write_key_points(valve, file: Path, points: int, profiles: int, as_json: bool) -> None:
     """Write the shape of a case as key points."""
-    from ..geometry import key_point_table
+    from ..geometry.surface import key_point_table
 
     _write(str(file), key_point_table(valve, points, profiles))
     instead = ("lip_half_width", "lip_rise", "lip_radius", "cuff_radius", "flange_radius", "saddle")

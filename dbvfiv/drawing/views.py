@@ -18,8 +18,8 @@ from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 
 from ..case.model import Case
 from ..case.part import QUARTER, Part
-from ..model import ValveModel
 from ..model.sizes import ValveSizes
+from ..model.valve import ValveModel
 from ..record.mesh import MeshData, WholeValve
 from ..record.vtkhdf import motion
 from ..shell.mesh import nodal_thickness

@@ -11,8 +11,9 @@ from dbvfiv.fit.cards import (
     relaxation_from_case,
 )
 from dbvfiv.fit.curves import TensionTest
-from dbvfiv.fit.prony import PronyFit, fit_constant, fit_moduli, fit_relaxation, fit_tan_delta
+from dbvfiv.fit.prony import fit_moduli, fit_relaxation, fit_tan_delta
 from dbvfiv.fit.rubber import RubberFit, fit_rubber, form_of, uniaxial_stress
+from dbvfiv.materials.prony import PronyFit, fit_constant
 
 __all__ = [
     "DampingReport",

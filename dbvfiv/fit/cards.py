@@ -7,28 +7,13 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from functools import cache
+from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from dbvfiv.case.damping import celsius
 from dbvfiv.case.quantity import Quantity, number_or_text
 from dbvfiv.errors import CaseError
-from dbvfiv.fit.curves import loading_tests, read_tests
-from dbvfiv.fit.prony import (
-    PronyFit,
-    checked_moduli,
-    checked_relaxation,
-    checked_tan_delta,
-    fit_constant,
-    fit_moduli,
-    fit_relaxation,
-    fit_tan_delta,
-    read_loss_table,
-    read_relaxation_table,
-    relaxation_times,
-)
-from dbvfiv.fit.rubber import fit_rubber, form_of
 from dbvfiv.materials.laws import (
     IsotropicElastic,
     Law,
@@ -41,7 +26,7 @@ from dbvfiv.materials.laws import (
     fibre_ply,
     ply_from_constituents,
 )
-from dbvfiv.materials.prony import Prony
+from dbvfiv.materials.prony import Prony, PronyFit, fit_constant
 from dbvfiv.materials.shipped import published_rubber, rubber, shipped_loss, shipped_loss_names
 from dbvfiv.texts import shortly
 
@@ -52,15 +37,12 @@ if TYPE_CHECKING:
 
 #: Errors of a fit, rms, beyond which it says nothing of the material, and largest one that passes without a note.
 _WORST, _FAIR = 0.5, 0.1
-#: Points a decade at which a measured table is met.
-_PER_DECADE = 25
 _CONSTITUENTS = ("fibre_fraction", "fibre_modulus", "matrix_modulus", "fibre_poisson", "matrix_poisson", "xi")
 
 
-def _fitted(card: Any) -> Law:
-    tests = loading_tests(read_tests(card.path, card.planar, card.biaxial), card.cycle)
-    form = form_of(card.law, card.terms)
-    return fit_rubber(tests, form, card.constraint, card.stable_to, card.error).law(card.density)
+def _of_tests(module: str, name: str, *given: Any) -> Any:
+    """What a module of this folder makes of measured data; loaded where a card names some."""
+    return getattr(import_module(f"dbvfiv.fit.{module}"), name)(*given)
 
 
 _SHIPPED = {"stable": rubber, "published": published_rubber}
@@ -73,7 +55,7 @@ _LAWS: dict[str, Callable[[Any], Law]] = {
     "isotropic": lambda c: IsotropicElastic(c.youngs_modulus, c.poisson_ratio, c.density),
     "orthotropic": lambda c: OrthotropicPly(c.e1, c.e2, c.nu12, c.g12, c.g13, c.g23, c.density),
     "halpin-tsai": lambda c: ply_from_constituents(**{n: getattr(c, n) for n in _CONSTITUENTS}, density=c.density),
-    "fit": _fitted,
+    "fit": lambda c: _of_tests("rubber", "law_of_tests", c),
     "shipped": lambda c: _SHIPPED[c.constants](c.rubber, c.strain_level, density=c.density),
 }
 CARD_KINDS = tuple(_LAWS)
@@ -217,76 +199,18 @@ def _of_series(name: str, card: Relaxing, band, branches: int) -> MaterialDampin
     return MaterialDamping(name, f"Prony series of {len(times)}, given", Prony(strengths, times))
 
 
-def _of_loss_table(name: str, card: Relaxing, band, branches: int) -> MaterialDamping:
-    table = read_loss_table(card.loss_data, card.loss_temperature)
-    check, fit_to, what = (
-        (checked_tan_delta, fit_tan_delta, "tan delta")
-        if len(table) == 2
-        else (checked_moduli, fit_moduli, "storage and loss modulus")
-    )
-    try:
-        frequency, *values = check(*table)
-        at = _points(band, frequency)
-        fit = fit_to(at, *(_between(at, frequency, value) for value in values), relaxation_times(band, branches))
-    except MaterialError as error:
-        raise _blamed(card.loss_data, error) from None
-    tan_delta = values[0] if len(values) == 1 else values[1] / values[0]
-    source = f"{what} measured, {_file(card.loss_data.name, card)}"
-    return MaterialDamping(name, source, fit.prony, fit, (frequency, tan_delta))
-
-
-def _of_relaxation(name: str, card: Relaxing, band, branches: int) -> MaterialDamping:
-    table = read_relaxation_table(card.relaxation_data, card.loss_temperature)
-    try:
-        time, modulus = checked_relaxation(*table)
-        _check_covers(band, 1.0 / (2 * np.pi * time[-1]), 1.0 / (2 * np.pi * time[0]))
-        fit = fit_relaxation(time, modulus, relaxation_times(band, branches))
-    except MaterialError as error:
-        raise _blamed(card.relaxation_data, error) from None
-    source = f"relaxing modulus measured, {_file(card.relaxation_data.name, card)}"
-    return MaterialDamping(name, source, fit.prony, fit)
+def _of_table(name: str, card: Relaxing, band, branches: int) -> MaterialDamping:
+    read = "series_of_loss_table" if card.loss_data else "series_of_relaxation"
+    fit, source, data = _of_tests("prony", read, card, band, branches)
+    return MaterialDamping(name, source, fit.prony, fit, data)
 
 
 _READERS = {
     "loss_factor": _of_constant,
-    "loss_data": _of_loss_table,
-    "relaxation_data": _of_relaxation,
+    "loss_data": _of_table,
+    "relaxation_data": _of_table,
     "prony": _of_series,
 }
-
-
-def _blamed(path: Any, error: MaterialError) -> MaterialError:
-    text = str(error)
-    return MaterialError(f"table {path}: {text[0].lower()}{text[1:]}")
-
-
-def _file(name: str, card: Relaxing) -> str:
-    return name if card.loss_temperature is None else f"{name} at {celsius(card.loss_temperature)}"
-
-
-def _check_covers(band: tuple[float, float], low: float, high: float) -> None:
-    """Refuse a band in which nothing was measured, at least at one end."""
-    if band[0] < low * (1 - 1e-6) or band[1] > high * (1 + 1e-6):
-        raise MaterialError(
-            f"damping.band is {band[0]:g} to {band[1]:g} Hz and must lie within what was measured, {low:.4g} to "
-            f"{high:.4g} Hz."
-        )
-
-
-def _points(band: tuple[float, float], measured: np.ndarray) -> np.ndarray:
-    """Frequencies at which a table is met: those measured within the band, and even steps between them."""
-    _check_covers(band, measured[0], measured[-1])
-    even = np.geomspace(*band, max(int(_PER_DECADE * np.log10(band[1] / band[0])), 8) + 1)
-    even[0], even[-1] = band
-    own = measured[(measured > band[0]) & (measured < band[1])]
-    far = np.abs(np.log(even[:, None] / own)).min(axis=1) > 1e-9 if own.size else np.ones(even.size, bool)
-    return np.sort(np.concatenate([even[far], own]))
-
-
-def _between(at: np.ndarray, frequency: np.ndarray, values: np.ndarray) -> np.ndarray:
-    """Straight lines between measured points on logarithmic axes."""
-    inside = np.clip(at, frequency[0], frequency[-1])
-    return np.exp(np.interp(np.log(inside), np.log(frequency), np.log(values)))
 
 
 def rayleigh_ratio(frequency, alpha: float, beta: float):

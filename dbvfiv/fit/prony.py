@@ -1,4 +1,4 @@
-"""Series of Maxwell branches fitted to loss factors, moduli and relaxation, and the tables that hold these.
+"""Series of Maxwell branches fitted to measured loss factors, moduli and relaxation, and the tables that hold these.
 
 Columns are separated by commas, semicolons, tabs or blanks; the first line of names says what each is, with its unit in
 brackets: ``frequency [Hz], tan delta``, ``frequency [Hz], storage modulus [MPa], loss modulus [MPa]`` or ``time [s],
@@ -8,23 +8,30 @@ modulus [MPa]``. A column ``temperature [degC]`` may stand beside them. Other co
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from dbvfiv.case.damping import LARGEST_LOSS, celsius, kelvin
+from dbvfiv.case.damping import celsius, kelvin
 from dbvfiv.fit.curves import STRESS_UNITS
 from dbvfiv.materials.laws import MaterialError
-from dbvfiv.materials.prony import Prony, branch_moduli, fit_loss, nonnegative
-from dbvfiv.texts import shortly
+from dbvfiv.materials.prony import (
+    PER_DECADE,
+    Prony,
+    PronyFit,
+    branch_moduli,
+    check_loss,
+    even_weights,
+    fit_loss_curve,
+    nonnegative,
+    relaxation_times,
+)
 from dbvfiv.verdict.table import Table, read_table, seconds_in, unit_in_name
 
-#: How far the ends of the times reach beyond the band, in decades of frequency at its lower and upper end: offset and
-#: slope over the decades a branch covers. Measured for loss factors of 0.05 to 0.5, see docs/damping.md.
-_LOWER, _UPPER = (0.60, -1.05), (0.86, -1.10)
-#: Points a decade at which a constant loss factor is asked for.
-_PER_DECADE = 25
+if TYPE_CHECKING:
+    from dbvfiv.case.damping import Relaxing
+
 _FREQUENCY_UNITS = {"Hz": 1.0, "mHz": 1e-3, "kHz": 1e3, "MHz": 1e6, "rad/s": 1.0 / (2.0 * np.pi)}
 _RATIO_UNITS = {"": 1.0, "-": 1.0, "1": 1.0, "%": 0.01}
 #: Names of columns, in small letters with single blanks; what stands in brackets is left out.
@@ -39,83 +46,6 @@ _NAMES = {
 }
 #: Temperatures within this of each other are one, K: a chamber holds no better.
 SAME_TEMPERATURE = 1.0
-
-
-@shortly
-@dataclass(frozen=True)
-class PronyFit:
-    """A series and how well it meets what it was fitted to.
-
-    Attributes
-    ----------
-    prony : Prony
-    quantity : str
-        What was fitted: "tan delta", "moduli" or "relaxing modulus".
-    error : numpy.ndarray, shape (n,)
-        Fitted over wanted, less one: of tan delta, or of the relaxing modulus.
-    """
-
-    prony: Prony
-    quantity: str
-    error: np.ndarray
-
-    @property
-    def largest_error(self) -> float:
-        """Largest relative error, a fraction."""
-        return float(np.abs(self.error).max())
-
-    @property
-    def rms_error(self) -> float:
-        """Root mean square of the relative errors, a fraction."""
-        return float(np.sqrt(np.mean(self.error**2)))
-
-
-def relaxation_times(band: tuple[float, float], branches: int) -> np.ndarray:
-    """Times (branches,), s, of a series that is to hold over a band of frequencies, Hz, ascending.
-
-    Spread evenly over the logarithm; few branches lie within the band, many reach beyond it.
-    """
-    low, high = _checked_band(band)
-    if isinstance(branches, bool) or not isinstance(branches, (int, np.integer)) or branches < 1:
-        raise MaterialError(f"A Prony series has at least one branch, but {branches!r} was given.")
-    if branches == 1:
-        return np.array([1.0 / (2 * np.pi * np.sqrt(low * high))])
-    decades = np.log10(high / low)
-    covered = decades / branches
-    beyond = [max(offset + slope * covered, -0.25 * decades) for offset, slope in (_LOWER, _UPPER)]
-    ends = np.log10(low) - beyond[0], np.log10(high) + beyond[1]
-    return 1.0 / (2 * np.pi * np.logspace(ends[1], ends[0], branches))
-
-
-def fit_constant(loss_factor: float, band: tuple[float, float], branches: int) -> PronyFit:
-    """A series whose loss factor is the same over a band, with the largest relative error as small as it gets.
-
-    Parameters
-    ----------
-    loss_factor : float
-        tan delta, 0 (elastic) to 2.
-    band : tuple of float
-        Lowest and highest frequency, Hz.
-    branches : int
-
-    Raises
-    ------
-    MaterialError
-        For a loss factor or a band out of range.
-
-    Examples
-    --------
-    >>> fit = fit_constant(0.2, (1.0, 200.0), 4)
-    >>> fit.largest_error < 0.03
-    True
-    """
-    _check_loss(np.array([loss_factor], float))
-    low, high = _checked_band(band)
-    times = relaxation_times(band, branches)
-    at = np.geomspace(low, high, max(int(_PER_DECADE * np.log10(high / low)), 4 * branches) + 1)
-    if loss_factor == 0.0:
-        return PronyFit(Prony((0.0,) * branches, times), "tan delta", np.zeros(len(at)))
-    return _of_tan_delta(at, np.full(len(at), float(loss_factor)), times, level=True)
 
 
 def fit_tan_delta(frequency, tan_delta, times) -> PronyFit:
@@ -133,7 +63,7 @@ def fit_tan_delta(frequency, tan_delta, times) -> PronyFit:
     MaterialError
         For tables that cannot be used.
     """
-    return _of_tan_delta(*checked_tan_delta(frequency, tan_delta), np.asarray(times, float))
+    return fit_loss_curve(*checked_tan_delta(frequency, tan_delta), np.asarray(times, float))
 
 
 def fit_moduli(frequency, storage, loss, times) -> PronyFit:
@@ -155,7 +85,7 @@ def fit_moduli(frequency, storage, loss, times) -> PronyFit:
     """
     frequency, storage, loss = checked_moduli(frequency, storage, loss)
     times = np.asarray(times, float)
-    branch, even = branch_moduli(frequency, times), _even_weights(frequency)
+    branch, even = branch_moduli(frequency, times), even_weights(frequency)
     above = np.hstack([np.ones((len(frequency), 1)), branch.real]) * (even / storage)[:, None]
     below = np.hstack([np.zeros((len(frequency), 1)), branch.imag]) * (even / loss)[:, None]
     found = nonnegative(np.vstack([above, below]), np.concatenate([even, even]))
@@ -180,22 +110,17 @@ def fit_relaxation(time, modulus, times) -> PronyFit:
     """
     time, modulus = checked_relaxation(time, modulus)
     times = np.asarray(times, float)
-    even = _even_weights(time)
+    even = even_weights(time)
     matrix = np.hstack([np.ones((len(time), 1)), np.exp(-np.multiply.outer(time, 1.0 / times))])
     found = nonnegative(matrix * (even / modulus)[:, None], even)
     prony = Prony(_over_slow(found, "relaxing modulus"), times)
     return PronyFit(prony, "relaxing modulus", matrix @ found / modulus - 1.0)
 
 
-def _of_tan_delta(at: np.ndarray, wanted: np.ndarray, times: np.ndarray, level: bool = False) -> PronyFit:
-    prony = Prony(fit_loss(at, wanted, times, _even_weights(at), level), times)
-    return PronyFit(prony, "tan delta", prony.loss_factor(at) / wanted - 1.0)
-
-
 def checked_tan_delta(frequency, tan_delta) -> tuple[np.ndarray, np.ndarray]:
     """A table that `fit_tan_delta` takes, as arrays; raises `MaterialError` for any other."""
     frequency, wanted = _checked("frequency", "Hz", frequency, tan_delta)
-    _check_loss(wanted)
+    check_loss(wanted)
     if not (wanted > 0).all():
         raise MaterialError("tan delta must be greater than 0 in a table; an elastic material is loss_factor = 0.")
     return frequency, wanted
@@ -207,7 +132,7 @@ def checked_moduli(frequency, storage, loss) -> tuple[np.ndarray, np.ndarray, np
     _, loss = _checked("frequency", "Hz", frequency, loss)
     _check_positive("storage modulus", frequency, "Hz", storage)
     _check_positive("loss modulus", frequency, "Hz", loss)
-    _check_loss(loss / storage)
+    check_loss(loss / storage)
     return frequency, storage, loss
 
 
@@ -239,35 +164,11 @@ def _checked(name: str, unit: str, at, values) -> tuple[np.ndarray, np.ndarray]:
     return at, values
 
 
-def _checked_band(band: tuple[float, float]) -> tuple[float, float]:
-    low, high = (float(f) for f in band)
-    if not 0 < low < high < np.inf:
-        raise MaterialError(
-            f"A band goes from a positive frequency to a higher one, but {low:g} to {high:g} Hz is given."
-        )
-    return low, high
-
-
-def _check_loss(tan_delta: np.ndarray) -> None:
-    for value in tan_delta:
-        if not 0 <= value <= LARGEST_LOSS:
-            raise MaterialError(
-                f"A loss factor (tan delta) must lie between 0 and {LARGEST_LOSS:g}, but {value:g} was found."
-            )
-
-
 def _check_positive(what: str, at: np.ndarray, unit: str, values: np.ndarray) -> None:
     bad = np.flatnonzero(values <= 0)
     if bad.size:
         i = bad[0]
         raise MaterialError(f"The {what} must be greater than 0, but at {at[i]:g} {unit} it is {values[i]:g}.")
-
-
-def _even_weights(at: np.ndarray) -> np.ndarray:
-    """Roots of the share of each point in the logarithmic axis, so that crowds of points do not rule."""
-    if at.size < 3:
-        return np.ones(at.size)
-    return np.sqrt(np.gradient(np.log(at)) * at.size / np.log(at[-1] / at[0]))
 
 
 def _over_slow(found: np.ndarray, what: str) -> np.ndarray:
@@ -403,3 +304,82 @@ def _steps(measured: np.ndarray) -> list[float]:
     ordered = np.sort(measured)
     groups = np.split(ordered, np.flatnonzero(np.diff(ordered) > SAME_TEMPERATURE) + 1)
     return [float(np.round(group.mean(), 2)) for group in groups]
+
+
+def series_of_loss_table(card: Relaxing, band: tuple[float, float], branches: int) -> tuple:
+    """Series of the table of loss factors or moduli that a card names, over a band, Hz.
+
+    Returns
+    -------
+    fit : PronyFit
+    source : str
+        Origin of the data, in words.
+    data : tuple of arrays
+        Frequencies, Hz, and tan delta that were measured.
+
+    Raises
+    ------
+    MaterialError
+        For a table that cannot be used.
+    """
+    table = read_loss_table(card.loss_data, card.loss_temperature)
+    check, fit_to, what = (
+        (checked_tan_delta, fit_tan_delta, "tan delta")
+        if len(table) == 2
+        else (checked_moduli, fit_moduli, "storage and loss modulus")
+    )
+    try:
+        frequency, *values = check(*table)
+        at = _points(band, frequency)
+        fit = fit_to(at, *(_between(at, frequency, value) for value in values), relaxation_times(band, branches))
+    except MaterialError as error:
+        raise _blamed(card.loss_data, error) from None
+    tan_delta = values[0] if len(values) == 1 else values[1] / values[0]
+    source = f"{what} measured, {_file(card.loss_data.name, card)}"
+    return fit, source, (frequency, tan_delta)
+
+
+def series_of_relaxation(card: Relaxing, band: tuple[float, float], branches: int) -> tuple:
+    """Series of the relaxation test that a card names; as `series_of_loss_table`, without data over frequency."""
+    table = read_relaxation_table(card.relaxation_data, card.loss_temperature)
+    try:
+        time, modulus = checked_relaxation(*table)
+        _check_covers(band, 1.0 / (2 * np.pi * time[-1]), 1.0 / (2 * np.pi * time[0]))
+        fit = fit_relaxation(time, modulus, relaxation_times(band, branches))
+    except MaterialError as error:
+        raise _blamed(card.relaxation_data, error) from None
+    return fit, f"relaxing modulus measured, {_file(card.relaxation_data.name, card)}", None
+
+
+def _blamed(path: Any, error: MaterialError) -> MaterialError:
+    text = str(error)
+    return MaterialError(f"table {path}: {text[0].lower()}{text[1:]}")
+
+
+def _file(name: str, card: Relaxing) -> str:
+    return name if card.loss_temperature is None else f"{name} at {celsius(card.loss_temperature)}"
+
+
+def _check_covers(band: tuple[float, float], low: float, high: float) -> None:
+    """Refuse a band in which nothing was measured, at least at one end."""
+    if band[0] < low * (1 - 1e-6) or band[1] > high * (1 + 1e-6):
+        raise MaterialError(
+            f"damping.band is {band[0]:g} to {band[1]:g} Hz and must lie within what was measured, {low:.4g} to "
+            f"{high:.4g} Hz."
+        )
+
+
+def _points(band: tuple[float, float], measured: np.ndarray) -> np.ndarray:
+    """Frequencies at which a table is met: those measured within the band, and even steps between them."""
+    _check_covers(band, measured[0], measured[-1])
+    even = np.geomspace(*band, max(int(PER_DECADE * np.log10(band[1] / band[0])), 8) + 1)
+    even[0], even[-1] = band
+    own = measured[(measured > band[0]) & (measured < band[1])]
+    far = np.abs(np.log(even[:, None] / own)).min(axis=1) > 1e-9 if own.size else np.ones(even.size, bool)
+    return np.sort(np.concatenate([even[far], own]))
+
+
+def _between(at: np.ndarray, frequency: np.ndarray, values: np.ndarray) -> np.ndarray:
+    """Straight lines between measured points on logarithmic axes."""
+    inside = np.clip(at, frequency[0], frequency[-1])
+    return np.exp(np.interp(np.log(inside), np.log(frequency), np.log(values)))

@@ -22,11 +22,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import combinations
+from typing import Any
 
 import numpy as np
 from scipy.optimize import least_squares
 
-from dbvfiv.fit.curves import TensionTest
+from dbvfiv.fit.curves import TensionTest, loading_tests, read_tests
 from dbvfiv.materials.energy import KNEE, OGDEN_FROM, PARAMETER_COUNT
 from dbvfiv.materials.laws import (
     LEAST_SHARE,
@@ -511,3 +512,16 @@ def _least_squares_above(matrix, target, normals) -> np.ndarray:
     reduced = np.linalg.solve(r.T, normals.T).T  # normals R^-1
     weights = nonnegative(reduced.T, -centre)  # nearest point of a cone, by its polar
     return np.linalg.solve(r, centre + reduced.T @ weights)
+
+
+def law_of_tests(card: Any) -> Law:
+    """Law fitted to the tests that a material card (`dbvfiv.case.Card`) names, as it says.
+
+    Raises
+    ------
+    MaterialError
+        For tests that cannot be used, or constants that its constraint leaves none of.
+    """
+    tests = loading_tests(read_tests(card.path, card.planar, card.biaxial), card.cycle)
+    form = form_of(card.law, card.terms)
+    return fit_rubber(tests, form, card.constraint, card.stable_to, card.error).law(card.density)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import scipy.sparse as sp
 
-from ..geometry import ValveMesh
+from ..geometry.valve_mesh import ValveMesh
 
 
 class RowAreas:

@@ -1,4 +1,4 @@
-"""Prony series of a viscoelastic material over its long-term (equilibrium) law, and strengths that meet a loss factor.
+"""Prony series of a viscoelastic material over its long-term (equilibrium) law, and series that meet a loss factor.
 
 Equations (T.7) and (T.8) of docs/theory.md.
 
@@ -18,13 +18,20 @@ from functools import lru_cache
 import numpy as np
 from scipy.optimize import lsq_linear, nnls
 
+from dbvfiv.case.damping import LARGEST_LOSS
 from dbvfiv.materials.laws import MaterialError
+from dbvfiv.texts import shortly
 
 #: How far beyond its branches a series keeps its loss factor when it is scaled, in decades.
 _MARGIN = 0.1
 _ROUNDS = 40
 #: Steps for each unknown: data that unknowns meet to rounding take more than the three of the library.
 _STEPS = 50
+#: How far the ends of the times reach beyond the band, in decades of frequency at its lower and upper end: offset and
+#: slope over the decades a branch covers. Measured for loss factors of 0.05 to 0.5, see docs/damping.md.
+_LOWER, _UPPER = (0.60, -1.05), (0.86, -1.10)
+#: Points a decade at which a constant loss factor is asked for.
+PER_DECADE = 25
 
 
 def nonnegative(matrix: np.ndarray, target: np.ndarray) -> np.ndarray:
@@ -164,3 +171,111 @@ def _scaled(prony: Prony, factor: float) -> Prony:
     frequency = np.logspace(low, high, max(int(20 * (high - low)), 4 * times.size) + 1) / (2 * np.pi)
     target = factor * prony.loss_factor(frequency)
     return Prony(tuple(fit_loss(frequency, target, times, target)), prony.times)
+
+
+@shortly
+@dataclass(frozen=True)
+class PronyFit:
+    """A series and how well it meets what it was fitted to.
+
+    Attributes
+    ----------
+    prony : Prony
+    quantity : str
+        What was fitted: "tan delta", "moduli" or "relaxing modulus".
+    error : numpy.ndarray, shape (n,)
+        Fitted over wanted, less one: of tan delta, or of the relaxing modulus.
+    """
+
+    prony: Prony
+    quantity: str
+    error: np.ndarray
+
+    @property
+    def largest_error(self) -> float:
+        """Largest relative error, a fraction."""
+        return float(np.abs(self.error).max())
+
+    @property
+    def rms_error(self) -> float:
+        """Root mean square of the relative errors, a fraction."""
+        return float(np.sqrt(np.mean(self.error**2)))
+
+
+def relaxation_times(band: tuple[float, float], branches: int) -> np.ndarray:
+    """Times (branches,), s, of a series that is to hold over a band of frequencies, Hz, ascending.
+
+    Spread evenly over the logarithm; few branches lie within the band, many reach beyond it.
+    """
+    low, high = _checked_band(band)
+    if isinstance(branches, bool) or not isinstance(branches, (int, np.integer)) or branches < 1:
+        raise MaterialError(f"A Prony series has at least one branch, but {branches!r} was given.")
+    if branches == 1:
+        return np.array([1.0 / (2 * np.pi * np.sqrt(low * high))])
+    decades = np.log10(high / low)
+    covered = decades / branches
+    beyond = [max(offset + slope * covered, -0.25 * decades) for offset, slope in (_LOWER, _UPPER)]
+    ends = np.log10(low) - beyond[0], np.log10(high) + beyond[1]
+    return 1.0 / (2 * np.pi * np.logspace(ends[1], ends[0], branches))
+
+
+def fit_constant(loss_factor: float, band: tuple[float, float], branches: int) -> PronyFit:
+    """A series whose loss factor is the same over a band, with the largest relative error as small as it gets.
+
+    Parameters
+    ----------
+    loss_factor : float
+        tan delta, 0 (elastic) to 2.
+    band : tuple of float
+        Lowest and highest frequency, Hz.
+    branches : int
+
+    Raises
+    ------
+    MaterialError
+        For a loss factor or a band out of range.
+
+    Examples
+    --------
+    >>> fit = fit_constant(0.2, (1.0, 200.0), 4)
+    >>> fit.largest_error < 0.03
+    True
+    """
+    check_loss(np.array([loss_factor], float))
+    low, high = _checked_band(band)
+    times = relaxation_times(band, branches)
+    at = np.geomspace(low, high, max(int(PER_DECADE * np.log10(high / low)), 4 * branches) + 1)
+    if loss_factor == 0.0:
+        return PronyFit(Prony((0.0,) * branches, times), "tan delta", np.zeros(len(at)))
+    return fit_loss_curve(at, np.full(len(at), float(loss_factor)), times, level=True)
+
+
+def fit_loss_curve(at: np.ndarray, wanted: np.ndarray, times: np.ndarray, level: bool = False) -> PronyFit:
+    """Series of given times, s, for tan delta `wanted` (n,) at frequencies (n,), Hz; see `fit_loss`."""
+    prony = Prony(fit_loss(at, wanted, times, even_weights(at), level), times)
+    return PronyFit(prony, "tan delta", prony.loss_factor(at) / wanted - 1.0)
+
+
+def _checked_band(band: tuple[float, float]) -> tuple[float, float]:
+    low, high = (float(f) for f in band)
+    if not 0 < low < high < np.inf:
+        raise MaterialError(
+            f"A band goes from a positive frequency to a higher one, but {low:g} to {high:g} Hz is given."
+        )
+    return low, high
+
+
+def check_loss(tan_delta: np.ndarray) -> None:
+    """Refuse loss factors out of range by a `MaterialError`."""
+    for value in tan_delta:
+        if not 0 <= value <= LARGEST_LOSS:
+            raise MaterialError(
+                f"A loss factor (tan delta) must lie between 0 and {LARGEST_LOSS:g}, but {value:g} was found."
+            )
+
+
+def even_weights(at: np.ndarray) -> np.ndarray:
+    """Roots of the share of each point in the logarithmic axis, so that crowds of points do not rule."""
+    if at.size < 3:
+        return np.ones(at.size)
+    return np.sqrt(np.gradient(np.log(at)) * at.size / np.log(at[-1] / at[0]))

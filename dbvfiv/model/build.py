@@ -7,17 +7,20 @@ import numpy as np
 from ..case.model import Case
 from ..case.quantity import GRAVITY
 from ..fit.cards import law_from_case, relaxation_from_case
-from ..flow import Channel, FlowLaw, UniformLoad
+from ..flow.channel import Channel
 from ..flow.elastic_line import ElasticLine, LineChannel
 from ..flow.gas import GasChannel
+from ..flow.law import FlowLaw, UniformLoad
 from ..flow.terms import terms_of
 from ..flow.terms.line import Line, PiecedLine
 from ..flow.terms.pump import Pump
-from ..geometry import ValveMesh, valve_mesh
 from ..geometry.divisions import grading
+from ..geometry.valve_mesh import ValveMesh, valve_mesh
 from ..materials.laws import OrthotropicPly
-from ..shell import Layer, Section, Shell, ShellMesh, Weight
-from ..shell.section import Zones
+from ..shell.mesh import ShellMesh
+from ..shell.pressure import Weight
+from ..shell.section import Layer, Section, Zones
+from ..shell.shell import Shell
 from .preset import pressure_for_overlap, stress_free_shape
 from .supports import free_unknowns
 

@@ -16,8 +16,8 @@ import numpy as np
 import scipy.sparse as sp
 
 from ..flow.plug import centroid_matrix, centroid_slope, plug_parts
-from ..shell import Shell
 from ..shell.pressure import pressure_stiffness
+from ..shell.shell import Shell
 from .dynamics import LinearisedState, linearise, without_circulation
 from .symmetry import ClassDofs, Symmetry
 from .valve import ValveModel

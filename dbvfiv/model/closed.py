@@ -12,9 +12,9 @@ import numpy as np
 from ..case.model import Case
 from ..contact import PlaneContact
 from ..errors import SolveError
-from ..geometry import ValveMesh
-from ..shell import Shell
+from ..geometry.valve_mesh import ValveMesh
 from ..shell.mesh import nodal_thickness
+from ..shell.shell import Shell
 from ..texts import shortly
 from .load_curve import LoadCurve
 from .load_steps import LARGEST_JUMP, LoadStepOptions, LoadSteps

@@ -15,12 +15,12 @@ from functools import cached_property
 import numpy as np
 import scipy.sparse as sp
 
-from eigen import CoupledPencil, Relaxation
-from eigen.operator import FLUID_PARTS
+from eigen.operator import FLUID_PARTS, CoupledPencil, Relaxation
 
 from ..case.parameters import PIPES
 from ..errors import SolveError
-from ..flow import Channel, FlowLaw, FlowMotion
+from ..flow.channel import Channel
+from ..flow.law import FlowLaw, FlowMotion
 from .outside import AddedMass
 from .valve import ValveModel
 

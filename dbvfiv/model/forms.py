@@ -15,8 +15,8 @@ import numpy as np
 
 from continuation.normal_form import Motion
 from continuation.system import expand
-from eigen import CoupledPencil, SingularShiftError, Workspace
-from eigen.operator import real_apply
+from eigen.factor import SingularShiftError, Workspace
+from eigen.operator import CoupledPencil, real_apply
 
 from .dynamics import linearise
 from .residual import ValveResidual

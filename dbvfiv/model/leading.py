@@ -8,7 +8,7 @@ from enum import Enum
 
 import numpy as np
 
-from eigen import CLEAR, SearchOptions
+from eigen.spectrum import CLEAR, SearchOptions
 
 from ..case.parameters import Mu
 

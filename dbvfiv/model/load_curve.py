@@ -15,10 +15,13 @@ from weakref import WeakKeyDictionary, proxy
 
 import numpy as np
 
-from continuation import ContinuationOptions, NotConverged, Observer, Reason, System
-from continuation import NewtonOptions as ContinuationNewton
 from continuation.branch import Branch
-from continuation.branches import branch_tracer
+from continuation.event_location import FoldMonitor
+from continuation.options import ContinuationOptions, NotConverged, Reason
+from continuation.options import NewtonOptions as ContinuationNewton
+from continuation.problem import Problem
+from continuation.system import System
+from continuation.tracer import Observer, Tracer
 
 from ..errors import SolveError
 from ..observer import Observer as ProgressObserver
@@ -295,14 +298,13 @@ class LoadCurve:
             max_points=_MOST,
             limits={LOAD: ahead or (-np.inf, np.inf)},
             parameter_scales={LOAD: self._unit},
-            folds=self.stops_at_limit,
             locate=False,
             stop_at=frozenset({"fold"}),
-            branch_points=False,
             newton=ContinuationNewton(max(self.newton.tolerance, _POINTS), _AHEAD if ahead else _BETWEEN),
             max_angle=self._angle,
         )
-        return branch_tracer(self._system, {LOAD: self._start}, LOAD, options, observers=_Told(self.observer))
+        problem = Problem(self._system, {LOAD: self._start}, (LOAD,), parameter_scales=options.units([LOAD]))
+        return Tracer(problem, options, [FoldMonitor()] if self.stops_at_limit else [], _Told(self.observer))
 
     def extend(self, target: float) -> None:
         """Follow the curve on to a pressure, anew with other steps where it comes back to its start.

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from petsc4py import PETSc
 
-from eigen import SingularShiftError
+from eigen.factor import SingularShiftError
 
 _REASONS = {
     -1: "the residual or tangent could not be evaluated",

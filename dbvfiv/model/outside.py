@@ -31,16 +31,19 @@ import scipy.linalg as la
 import scipy.sparse as sp
 import scipy.sparse.linalg as spla
 
-from eigen import CoupledPencil, NotConvergedError, NotPositiveError, SingularShiftError, Workspace, largest_pairs
+from eigen.basis import NotConvergedError, NotPositiveError, largest_pairs
+from eigen.factor import SingularShiftError, Workspace
+from eigen.operator import CoupledPencil
 
 from ..case.model import Case
 from ..case.part import QUARTER, Part
 from ..errors import CaseError, SolveError
-from ..flow.outside import BODY, ROOM, Impedance, Panels, PotentialFlow, ShapeDerivative, Surroundings
-from ..flow.outside.panels import arc, end_face, extruded, pipe, ring_face, stretched, strip
-from ..geometry import ValveMesh
-from ..shell import Shell
+from ..flow.outside.panels import Panels, arc, end_face, extruded, pipe, ring_face, stretched, strip
+from ..flow.outside.potential_flow import BODY, ROOM, Impedance, PotentialFlow, Surroundings
+from ..flow.outside.shape import ShapeDerivative
+from ..geometry.valve_mesh import ValveMesh
 from ..shell.pressure import OuterFace
+from ..shell.shell import Shell
 from .symmetry import equilibria_of
 
 #: Motions kept of the added mass of a quarter.

@@ -24,8 +24,9 @@ from scipy.optimize import root_scalar
 from eigen.factor import DirectFactor
 
 from ..errors import SolveError
-from ..shell import Shell, ShellMesh
+from ..shell.mesh import ShellMesh
 from ..shell.pressure import pressure_force, pressure_stiffness
+from ..shell.shell import Shell
 from .load_steps import LoadStepOptions, LoadSteps
 from .newton import EquilibriumSolver, NewtonOptions
 

@@ -7,10 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from eigen import Relaxation
+from eigen.operator import Relaxation
 
-from ..shell import Section
-from ..shell.section import RelaxingGroup
+from ..shell.section import RelaxingGroup, Section
 
 
 @dataclass(frozen=True)

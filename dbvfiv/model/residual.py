@@ -18,8 +18,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from ..flow import FlowMotion
-from ..flow.law import along
+from ..flow.law import FlowMotion, along
 from ..shell.reference import SHAPE, SLOPE
 from ..shell.rotation import director
 from .outside import OutsideForms

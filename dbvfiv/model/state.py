@@ -11,8 +11,8 @@ import numpy as np
 
 from ..case.quantity import GRAVITY, WATER, head_of
 from ..errors import SolveError
-from ..geometry import ValveMesh
-from ..shell import Shell
+from ..geometry.valve_mesh import ValveMesh
+from ..shell.shell import Shell
 from ..texts import shortly
 from .valve import ValveModel
 

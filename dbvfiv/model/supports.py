@@ -24,9 +24,9 @@ import numpy as np
 
 from ..case.model import Case
 from ..contact import ContactLaw, PlaneContact, tributary_area
-from ..geometry import ValveMesh
-from ..shell import Shell
+from ..geometry.valve_mesh import ValveMesh
 from ..shell.mesh import nodal_thickness
+from ..shell.shell import Shell
 
 
 def free_unknowns(mesh: ValveMesh) -> np.ndarray:

@@ -19,7 +19,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..case.part import HALF, QUARTER, Part
-from ..geometry import ValveMesh
+from ..geometry.valve_mesh import ValveMesh
 from ..shell.mesh import DofMap
 
 

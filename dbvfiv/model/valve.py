@@ -22,12 +22,13 @@ import scipy.sparse as sp
 from ..case.model import Case
 from ..contact import PlaneContact
 from ..errors import SolveError
-from ..flow import RowAreas
+from ..flow.rows import RowAreas
 from ..flow.terms.line import Line, PiecedLine
 from ..flow.terms.pump import Pump
 from ..flow.terms.tail import Tail
-from ..shell import Section, StepWall, Weight
-from ..shell.pressure import pressure_force, pressure_stiffness, station_forces
+from ..shell.pressure import Weight, pressure_force, pressure_stiffness, station_forces
+from ..shell.section import Section
+from ..shell.shell import StepWall
 from .build import build_flow, build_shell, build_weight, loaded_share
 from .linear import CoupledFactor
 from .load_steps import Loading

@@ -25,10 +25,11 @@ from eigen.factor import DirectFactor
 from ..case.parameters import Mu
 from ..contact import ContactStep, Rebound
 from ..flow.stepping import Flow, FrozenFluid, MovingFluid, SteadyFluid
-from ..model import ValveModel
 from ..model.linear import CoupledFactor
 from ..model.outside import AddedMass
-from ..shell import Memory, StepWall, WallMemory
+from ..model.valve import ValveModel
+from ..shell.memory import Memory, WallMemory
+from ..shell.shell import StepWall
 from .stepper import Weights
 
 #: Largest displacement of the wall, over the radius of the flange, up to which an added mass is kept.

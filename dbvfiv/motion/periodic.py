@@ -22,18 +22,19 @@ import numba
 import numpy as np
 import scipy.sparse as sp
 
-from continuation import OutOfDomain
 from continuation.blocks import BlockRows, SparseBlocks
 from continuation.harmonics import Harmonics, Rates
+from continuation.options import OutOfDomain
 from continuation.periodic import PeriodicMotion, PeriodicOperator, Term
-from eigen import CoupledPencil, SingularShiftError, Workspace
-from eigen.operator import FLUID_PARTS
+from eigen.factor import SingularShiftError, Workspace
+from eigen.operator import FLUID_PARTS, CoupledPencil
 
 from ..errors import SolveError
-from ..flow import FlowMotion
-from ..model import ValveModel
+from ..flow.law import FlowMotion
 from ..model.relaxing import Branches
-from ..shell import Shell, StepWall, WallMemory
+from ..model.valve import ValveModel
+from ..shell.memory import WallMemory
+from ..shell.shell import Shell, StepWall
 
 #: Weight of all but the structure's tangent in what is left out of sums: soft shapes are what is left of large
 #: stiffnesses, of which little may be missing. With a hundredth exponents move by 1e-6 of themselves.

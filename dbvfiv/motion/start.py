@@ -6,16 +6,20 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from eigen import CoupledPencil, SearchOptions, SingularShiftError, Spectrum, leading_modes, lowest_frequencies
+from eigen.basis import lowest_frequencies
+from eigen.factor import SingularShiftError
+from eigen.operator import CoupledPencil
+from eigen.search import leading_modes
+from eigen.spectrum import SearchOptions, Spectrum
 
 from ..case.model import Case
 from ..case.parameters import Mu
 from ..errors import SolveError
-from ..model import ValveModel
 from ..model.dynamics import linearise
 from ..model.equilibria import LoadPath, SteadyOptions
 from ..model.leading import select_search
 from ..model.newton import NewtonOptions
+from ..model.valve import ValveModel
 from ..observer import Observer
 from .equations import ValveMotion
 from .stepper import MotionState, consistent_state

@@ -28,10 +28,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from eigen import SingularShiftError
+from eigen.factor import SingularShiftError
 
 from ..flow.stepping import SECOND_ORDER, Flow, FluidState
-from ..shell import Memory
+from ..shell.memory import Memory
 from .scheme import Scheme
 from .scheme import scheme as member
 

@@ -14,7 +14,7 @@ from ..texts import shortly
 from .table import TEXT, Column, read_array, write_array
 
 if TYPE_CHECKING:
-    from ..model import ValveModel
+    from ..model.valve import ValveModel
 
 
 def _kept(units: str, words: str, dtype: str = "f8", default: Any = MISSING) -> Any:

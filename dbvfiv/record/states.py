@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 
 from ..case.model import Case
-from ..model import ValveModel
 from ..model.load_steps import LoadSteps
 from ..model.state import SteadyState
+from ..model.valve import ValveModel
 from ..shell.recovery import LayerFields, layer_fields
 from .mesh import MeshData
 from .record import Record, plain

@@ -105,7 +105,7 @@ def picture(name: str, caption: str, draw: Callable[[], Figure], live: str = "",
 
 def pictures_of(result, captions: dict[str, str]) -> tuple[Picture, ...]:
     """Pictures of a result by the names of its figures, in its units; those that it does not have are left out."""
-    drawers = dict(result.drawers())
+    drawers = result.drawers()
     return tuple(
         picture(name, caption, drawers[name], units=result.case.units)
         for name, caption in captions.items()

@@ -9,7 +9,7 @@ from functools import cached_property
 
 import numpy as np
 
-from eigen import ColumnSolver
+from eigen.columns import ColumnSolver
 
 from ..case.damping import LARGEST_LOSS
 from ..case.describe import numeric_limits, quantity_of

@@ -27,9 +27,9 @@ from ..materials.fatigue import (
     shipped_growth,
 )
 from ..record.table import Column, Shown, document_of, printed_head, printed_row
-from ..shell import Shell
 from ..shell.recovery import face_strains, interlaminar_shear, stress_at
 from ..shell.reference import thickness_over_radius
+from ..shell.shell import Shell
 from .state import StateSteps
 
 #: Instants of a period at which a cycle is looked at; a peak between two of them is missed by 0.1 %.

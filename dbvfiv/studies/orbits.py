@@ -8,20 +8,20 @@ from functools import cached_property
 
 import numpy as np
 
-from continuation import ContinuationError, ContinuationOptions, OrbitOptions
+from continuation.amplitude import AmplitudeEquation, amplitude_equation
 from continuation.cycle_branch import CycleTracer
 from continuation.cycle_points import CyclePoint
 from continuation.cycles import Cycle, CycleSolver, cycles_beside_onset
 from continuation.harmonics import Harmonics
-from continuation.normal_form import AmplitudeEquation, amplitude_equation
+from continuation.options import ContinuationError, ContinuationOptions, OrbitOptions
 from continuation.periodic import PeriodicMotion
 
 from ..case.parameters import PARAMETERS, Mu
 from ..errors import SolveError
 from ..flow.stepping import MovingFluid
-from ..model import ValveModel
 from ..model.forms import ValveForms
 from ..model.state import LipCentre
+from ..model.valve import ValveModel
 from ..motion.periodic import PeriodicValve
 from .case import Case
 from .stability.place import models_of

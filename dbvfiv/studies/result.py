@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 import inspect
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from functools import cached_property
+from importlib import import_module
+from importlib.util import find_spec
 from pathlib import Path
+from types import ModuleType
 from typing import Any, ClassVar, Literal
 
 from ..drawing.style import draw_figures, write_figures
 from ..errors import CaseError
-from ..model import ValveModel
+from ..model.valve import ValveModel
 from ..record.files import Header
 from ..record.mesh import MeshData, WholeValve
 from ..record.record import Record, copy_record, tabulate
@@ -22,8 +25,8 @@ from .session import Session, find_study
 class StudyResult:
     """A finished or interrupted run; nothing is computed again.
 
-    Derived classes set `kind` and define `summary` and `lines`, and `drawers` and `steps` if they have something to
-    show.
+    Derived classes set `kind` and define `summary` and `lines`, and `steps` if they have something to show; their
+    figures are those that the function ``draw`` of the study yields, see `drawing`.
 
     Parameters
     ----------
@@ -163,9 +166,20 @@ class StudyResult:
         copy_record(self.record, find_study(self.kind).tables(self.mesh), path)
         return Path(path)
 
-    def drawers(self) -> Iterator[tuple[str, Callable[[], Any]]]:
-        """Names of figures and functions that draw them; may take keyword choices such as ``pressure`` or ``mode``."""
-        return iter(())
+    @property
+    def drawing(self) -> ModuleType:
+        """Module with the function ``draw`` of the study: `figures` beside it, or its own."""
+        module = type(self).__module__
+        beside = f"{module.rpartition('.')[0]}.figures"
+        return import_module(beside if find_spec(beside) else module)
+
+    def drawers(self, **choices: Any) -> dict[str, Callable[[], Any]]:
+        """Functions that draw figures, by name; choices such as ``pressure`` go to studies that take them."""
+        draw = getattr(self.drawing, "draw", None)
+        if draw is None:
+            return {}
+        taken = inspect.signature(draw).parameters
+        return dict(draw(self, **{name: value for name, value in choices.items() if name in taken}))
 
     def figures(self, only: Sequence[str] = (), **choices: Any) -> dict[str, Any]:
         """Figures by name.
@@ -176,7 +190,7 @@ class StudyResult:
             For a name that the result has no figure of, or a result without anything to draw.
         """
         return draw_figures(
-            self._drawers(choices), only, f"{self.kind} result of {self.header.name!r}", self.case.units
+            self.drawers(**choices), only, f"{self.kind} result of {self.header.name!r}", self.case.units
         )
 
     def plot(
@@ -188,11 +202,7 @@ class StudyResult:
     @property
     def drawable(self) -> bool:
         """True where there is anything to draw."""
-        return bool(self._drawers({}))
-
-    def _drawers(self, choices: dict[str, Any]) -> dict[str, Callable[[], Any]]:
-        taken = inspect.signature(self.drawers).parameters
-        return dict(self.drawers(**{name: value for name, value in choices.items() if name in taken}))
+        return bool(self.drawers())
 
     def steps(self, valve: WholeValve) -> Sequence[Step]:
         """Fields on the valve for ParaView; empty if the result has none."""

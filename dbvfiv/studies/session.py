@@ -12,7 +12,6 @@ from typing import Any
 from ..case.materials import HIGHEST_LEVEL
 from ..case.parameters import PARAMETERS
 from ..errors import CaseError
-from ..model import ValveModel
 from ..model.equilibria import (
     find_equilibrium,
     operating_pressure,
@@ -24,6 +23,7 @@ from ..model.equilibria import (
 from ..model.sizes import hoop_strain
 from ..model.state import SteadyState
 from ..model.strain_level import SettledLevels, settle_levels
+from ..model.valve import ValveModel
 from ..observer import Observer
 from ..record.files import Header, check_writable, kind_of
 from ..record.mesh import MeshData

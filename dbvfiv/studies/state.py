@@ -10,15 +10,14 @@ from typing import Any
 
 import numpy as np
 
-from eigen import CoupledPencil
+from eigen.operator import CoupledPencil
 
 from ..case.parameters import Mu
 from ..errors import SolveError
-from ..exchange.files import state_name, write_shapes
-from ..model import ValveModel
 from ..model.dynamics import linearise
 from ..model.equilibria import LoadPath, SteadyOptions
 from ..model.state import SteadyState
+from ..model.valve import ValveModel
 from ..record.mesh import WholeValve
 from ..record.record import GrowingRecord
 from ..record.states import read_layers, read_states, restart_row, restore_path, state_row, summarise
@@ -155,8 +154,7 @@ class State(SteadyState):
         --------
         >>> state.export_shapes("cad", "step", ["fluid", "wall"])     # doctest: +SKIP
         """
-        name = state_name(self.results.header.name, self.pressure)
-        return write_shapes(self.results.mesh, self.nodal, folder, name, format, shapes, quarter)
+        return gather_states(self.results, [self]).export_shapes(folder, format, shapes, quarter)
 
 
 def sensitivity_keys(of: str | Sequence[str], mode: int | None) -> dict[str, Any]:

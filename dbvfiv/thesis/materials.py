@@ -12,7 +12,9 @@ from ..fit.rubber import uniaxial_stress
 from ..materials.laws import fibre_ply, ply_from_constituents
 from ..materials.shipped import published_rubber, strain_levels
 from ..report.parts import picture
-from ..shell import Layer, Section, Shell, ShellMesh
+from ..shell.mesh import ShellMesh
+from ..shell.section import Layer, Section
+from ..shell.shell import Shell
 from .entry import Number, Workshop, entry
 
 _RUBBERS = ("SBR", "CR", "EPDM")

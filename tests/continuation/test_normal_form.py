@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 
 from continuation import ContinuationOptions, NotABifurcation, continue_branch, hopf_normal_form
+from continuation.amplitude import amplitude_equation
 from continuation.first_order import FirstOrderSystem
 from continuation.jax_system import JaxSystem
-from continuation.normal_form import SystemForms, amplitude_equation
+from continuation.normal_form import SystemForms
 from tests.systems.brusselator import brusselator
 from tests.systems.normal_forms import bautin, stuart_landau, warped_stuart_landau
 

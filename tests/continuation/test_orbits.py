@@ -22,9 +22,10 @@ from continuation import (
     orbits_from_hopf,
     resume,
 )
+from continuation.amplitude import amplitude_equation
 from continuation.first_order import DirectLinearisation, FirstOrderSystem
 from continuation.harmonics import Harmonics
-from continuation.normal_form import SystemForms, amplitude_equation
+from continuation.normal_form import SystemForms
 from continuation.periodic import PeriodicMotion
 from tests.systems.brusselator import brusselator, brusselator_1d
 from tests.systems.literature import fitzhugh_nagumo

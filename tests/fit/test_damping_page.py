@@ -8,7 +8,7 @@ import tomllib
 import numpy as np
 import pytest
 
-from dbvfiv.fit.prony import fit_constant
+from dbvfiv.materials.prony import fit_constant
 from tests.pages import ROOT, agrees, table_of
 
 BAND = (1.0, 200.0)

@@ -111,7 +111,7 @@ def test_paraview_sees_one_continuous_valve(four):
 
 
 def test_every_class_has_its_figures(four):
-    drawers = dict(four.drawers())
+    drawers = four.drawers()
     assert {"mode-shapes", "winding", "winding-SA", "winding-AS", "winding-AA"} <= set(drawers)
     lines = {name for name in drawers if name.startswith("centre-line")}
     leading = [mode for mode in four.modes[:3] if SYMMETRIES[mode.symmetry].signs[0] > 0]

@@ -53,7 +53,7 @@ def test_stretches_are_those_of_all_classes(onset):
 def test_onsets_come_back_from_a_file(onset, tmp_path):
     stored = dbvfiv.load_result(onset.save(tmp_path / "onset.h5"))
     assert stored.summary() == onset.summary() and stored.lines() == onset.lines()
-    assert "onset" in dict(stored.drawers())
+    assert "onset" in stored.drawers()
 
 
 def test_a_crossing_inside_what_another_class_has_unstable_is_no_edge():

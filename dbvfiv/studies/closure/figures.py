@@ -26,16 +26,18 @@ from ...drawing.style import (
     pressure_colours,
     some_of,
 )
-from ...drawing.views import COLOURS, ValveSkin, draw_skin, faces, unrolled
-from ..comparing import MEASURED, Compared, draw_curve, draw_runs, labels
+from ...drawing.views import COLOURS, ValveSkin, draw_layers, draw_skin, faces, unrolled
+from ..comparing import MEASURED, Compared, draw_curve, draw_runs, draw_shapes, labels
 from ..result import StudyResult
 
 #: Passage, mm2, below which a valve is shut for any purpose.
 _SHUT = 0.01
 
 
-def draw(result: StudyResult) -> Iterator[tuple[str, Callable[[], Figure]]]:
-    """Figures of a closure result, each with its name."""
+def draw(result: StudyResult, pressure: float | None = None) -> Iterator[tuple[str, Callable[[], Figure]]]:
+    """Figures over the pressure, and of one state: that of the highest pressure unless another is chosen."""
+    if not result.states:
+        return
     yield "side-views", lambda: side_views(result)
     if any(state.contact_nodes for state in result.states):
         yield "contact-map", lambda: contact_map(result)
@@ -46,6 +48,8 @@ def draw(result: StudyResult) -> Iterator[tuple[str, Callable[[], Figure]]]:
     yield "passage", lambda: passage(result)
     if result.measured.area is not None:
         yield "measured-passage", lambda: measured_passage(result)
+    yield from draw_shapes(result.measured.shapes)
+    yield from draw_layers(result, pressure)
 
 
 def side_views(result: StudyResult) -> Figure:

@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from functools import cached_property, partial
 from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
-from matplotlib.figure import Figure
 
 from ...case.measured import AREA, SHAPE
-from ...drawing import views
 from ...model.closed import ClosedValve, Passage
 from ...model.symmetry import equilibria_of
 from ...record.mesh import MeshData, WholeValve
@@ -35,7 +33,7 @@ from ...record.states import (
 from ...record.table import TEXT, Column, Shown, TableSpec, document_of, printed_head, printed_row
 from ...record.vtkhdf import Step
 from ...shell.recovery import LayerFields
-from ..comparing import Compared, Comparison, draw_shapes
+from ..comparing import Compared, Comparison
 from ..measured import PASSAGE, Measured, keep_measured
 from ..result import StudyResult
 from ..session import Session, Study, print_rows
@@ -399,14 +397,6 @@ class ClosureResult(StudyResult):
 
     # -- in space
     # ----
-
-    def drawers(self, pressure: float | None = None) -> Iterator[tuple[str, Callable[[], Figure]]]:
-        """Figures over the pressure, and of one state: that of the highest pressure unless another is chosen."""
-        if not self.states:
-            return
-        yield from figures.draw(self)
-        yield from draw_shapes(self.measured.shapes)
-        yield from views.draw_layers(self, pressure)
 
     def steps(self, valve: WholeValve) -> Sequence[Step]:
         """States in the order of their pressures, as ParaView wants its times."""

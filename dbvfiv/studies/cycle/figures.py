@@ -34,6 +34,8 @@ INSTANTS = 12
 
 def draw(result: StudyResult) -> Iterator[tuple[str, Callable[[], Figure]]]:
     """Figures of a branch, each with its name."""
+    if not result.points:
+        return
     yield "branch", lambda: branch(result)
     yield "envelope", lambda: envelope(result)
     yield "phase-plane", lambda: phase_plane(result)

@@ -11,7 +11,7 @@ from continuation.periodic import PeriodicMotion
 
 from ...case.parameters import PARAMETERS, Mu
 from ...errors import CaseError, SolveError
-from ...model import ValveModel
+from ...model.valve import ValveModel
 from ...motion.equations import ValveMotion
 from ...motion.scheme import scheme
 from ...motion.stepper import StepFailure, Stepper, consistent_state

@@ -2,27 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
-from matplotlib.figure import Figure
 
-from continuation import Reason
 from continuation.cycle_branch import CycleTracer
 from continuation.cycle_points import CyclePoint, SpecialCycle
 from continuation.cycles import Cycle
 from continuation.harmonics import Harmonics
 from continuation.hill import Exponents
-from continuation.options import Said
+from continuation.options import Reason, Said
 from continuation.periodic import PeriodicMotion
 
 from ...case.parameters import PARAMETERS, Mu
 from ...errors import CaseError, SolveError
-from ...model import ValveModel
+from ...model.valve import ValveModel
 from ...motion.periodic import check_periodic
 from ...record.mesh import MeshData, WholeValve
 from ...record.record import GrowingRecord, Record
@@ -36,7 +34,6 @@ from ..session import Session, Study, print_rows
 from ..stability.place import check_scan, describe_fixed, fixed_conditions, models_of
 from ..stability.verdict import Verdict
 from ..stability.walk import StabilityWalk
-from . import figures
 from .start import find_onset, given_motion
 
 CYCLES, SERIES, SPECIAL, ENDED, VERDICT = "cycles", "series", "special", "ended", "verdict"
@@ -495,10 +492,6 @@ class CycleResult(StudyResult):
 
     def shortfall(self) -> str | None:
         return "The branch could not be followed to the end of the range" if self.failures else None
-
-    def drawers(self) -> Iterator[tuple[str, Callable[[], Figure]]]:
-        if self.points:
-            yield from figures.draw(self)
 
     def lines(self) -> list[str]:
         rows = [printed_row(COLUMNS, point) for point in self.points]

@@ -25,7 +25,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from eigen import Spectrum, leading_modes
+from eigen.search import leading_modes
+from eigen.spectrum import Spectrum
 
 from ...case.parameters import DESIGN, PARAMETERS, Mu
 from ...case.quantity import Quantity

@@ -364,9 +364,6 @@ class DesignResult(StudyResult):
             lines.append(f"The case itself on the finer mesh: {self.evidence(CASE)}.")
         return lines
 
-    def drawers(self) -> Iterator[tuple[str, Callable[[], Figure]]]:
-        yield from draw(self)
-
     def shortfall(self) -> str | None:
         missed = [number for number, design in self.best.items() if not design.holds]
         missing = len(self.bounds) - len(self.best)

@@ -366,10 +366,6 @@ class IdentifyResult(StudyResult):
             "valves": int(self.record.column(VALVES, "sample").max(initial=-1)) + 1,
         } | self.ending()
 
-    def drawers(self) -> Iterator[tuple[str, Callable[[], Figure]]]:
-        if self.found:
-            yield from draw(self)
-
     def lines(self) -> list[str]:
         if not self.found:
             return ["Too few valves were computed to learn from."]
@@ -461,6 +457,8 @@ def distribution_text(prior: Distribution, scores: np.ndarray) -> str:
 
 def draw(result: StudyResult) -> Iterator[tuple[str, Callable[[], Figure]]]:
     """Figures of an identification, each with its name."""
+    if not result.found:
+        return
     yield "inputs", lambda: inputs(result)
     if result.onset is not None:
         yield "onset", lambda: onset(result)

@@ -11,7 +11,7 @@ import numpy as np
 from scipy.interpolate import PchipInterpolator
 from scipy.optimize import brentq, linear_sum_assignment
 
-from eigen import ColumnSolver
+from eigen.columns import ColumnSolver
 
 from ...case.parameters import DESIGN, PARAMETERS, Mu
 from ...case.quantity import head_of

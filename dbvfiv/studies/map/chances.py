@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from eigen import ColumnSolver
+from eigen.columns import ColumnSolver
 
 from ...case.parameters import PARAMETERS, Mu
 from ...errors import CaseError, SolveError

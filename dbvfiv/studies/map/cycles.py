@@ -8,8 +8,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from continuation import Reason
 from continuation.cycle_points import CyclePoint, SpecialCycle
+from continuation.options import Reason
 
 from ...case.parameters import PARAMETERS
 from ...errors import SolveError

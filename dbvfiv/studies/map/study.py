@@ -4,18 +4,17 @@ the full pencil; their storage, and what can be read off a run or its file.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import asdict, dataclass, field
 from functools import cached_property
 from typing import Any
 
 import numpy as np
-from matplotlib.figure import Figure
 
 from eigen.columns import DIRECT, MISSING
 
 from ...errors import SolveError
-from ...fit import outside_band
+from ...fit.cards import outside_band
 from ...record.mesh import MeshData
 from ...record.record import GrowingRecord, Record
 from ...record.table import Column, TableSpec
@@ -27,7 +26,7 @@ from ..stability.place import check_scan, describe_fixed, fixed_conditions
 from ..stability.samples import SAMPLE_TABLE, SAMPLES, Sample, keep_samples, read_samples
 from ..stability.verdict import DIVERGES, FLUTTERS, NOT_VALID, OUTCOMES, STABLE, Verdict
 from ..stability.walk import StabilityWalk
-from . import chances, cycles, figures
+from . import chances, cycles
 from .column import ColumnPool, ColumnTask, MapColumn, MapPlan, grid_of
 from .curves import OnsetCurve, Web, doubts, linked
 
@@ -444,9 +443,6 @@ class MapResult(StudyResult):
     def shortfall(self) -> str | None:
         gaps = len(self.failures)
         return f"{gaps} of {len(self.columns)} columns were not reached" if gaps else None
-
-    def drawers(self) -> Iterator[tuple[str, Callable[[], Figure]]]:
-        yield from figures.draw(self)
 
     def lines(self) -> list[str]:
         lines = [f"At {describe_fixed(self.case, *self.moved)}:"]

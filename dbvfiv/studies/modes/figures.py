@@ -43,6 +43,8 @@ def draw(result: StudyResult, mode: int | None = None) -> Iterator[tuple[str, Ca
 
     In a motion that is antisymmetric about it the line x = 0 does not swing in y and has no figure.
     """
+    if result.certificate is None:
+        return
     if result.modes:
         yield "eigenvalues", lambda: eigenvalues(result)
     if mode is not None:

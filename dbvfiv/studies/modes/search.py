@@ -10,23 +10,18 @@ from typing import Any
 import numpy as np
 from scipy.optimize import brentq
 
-from eigen import (
-    CertifiedSpectrum,
-    CoupledPencil,
-    SearchOptions,
-    Spectrum,
-    TransferBasis,
-    certified_spectrum,
-    leading_modes,
-)
+from eigen.basis import TransferBasis
+from eigen.certificate import CertifiedSpectrum, certified_spectrum
+from eigen.operator import CoupledPencil
+from eigen.search import leading_modes
+from eigen.spectrum import SearchOptions, Spectrum
 
 from ...case.parameters import PARAMETERS, Mu
 from ...errors import CaseError
-from ...model import ValveModel
 from ...model.equilibria import require_equilibrium
 from ...model.state import SteadyState
 from ...model.symmetry import EQUILIBRIA, SYMMETRIES, Symmetry, symmetry_named
-from ...model.valve import GRAZING
+from ...model.valve import GRAZING, ValveModel
 from ...observer import Observer
 from ...record.table import Column
 from ...texts import shortly

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from matplotlib.figure import Figure
 
 from ...case.parameters import Mu
 from ...errors import CaseError, NotValidError, SolveError
@@ -26,8 +25,6 @@ from ..stability.dimensions import Variant, compare_states, own_variant, variant
 from ..stability.verdict import Verdict
 from ..stability.walk import StabilityWalk
 from ..state import State, states_of
-from . import figures
-from .figures import animate_mode
 from .search import CURVE, MODE, Certificate, FoundModes, ModeShape, ModesOptions, critical_damping_factor, run_modes
 
 STATE, MODES, COUNT = "state", "modes", "count"
@@ -341,15 +338,9 @@ class ModesResult(StudyResult):
         """The modes one after the other, or one cycle of one of them."""
         return _ModeSteps(self, valve) if mode is None else _CycleSteps(self, valve, self.mode(mode), phases)
 
-    def drawers(self, mode: int | None = None) -> Iterator[tuple[str, Callable[[], Figure]]]:
-        """Eigenvalues, shapes, centre lines and the independent count; of one mode alone if it is named."""
-        if self.certificate is None:
-            return
-        yield from figures.draw(self, mode)
-
     def animate(self, path: str | Path, mode: int = 1, frames: int = 24) -> Path:
         """Write a GIF of one cycle of a mode."""
-        return animate_mode(self, self.mode(mode), path, frames)
+        return self.drawing.animate_mode(self, self.mode(mode), path, frames)
 
 
 def side_by_side(own: str, modes: Sequence[ModeShape], law: str, others: Sequence[ModeShape]) -> list[str]:

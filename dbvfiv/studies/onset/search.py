@@ -9,12 +9,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from continuation import ContinuationError
 from continuation.normal_form import hopf_normal_form_of
+from continuation.options import ContinuationError
 
 from ...case.parameters import DESIGN, PARAMETERS, Mu
 from ...errors import SolveError
-from ...fit import outside_band
+from ...fit.cards import outside_band
 from ...model.forms import ValveForms
 from ...observer import Observer
 from ..case import Case

@@ -236,9 +236,6 @@ class OnsetResult(StudyResult):
         failed = len(self.failures)
         return f"Parts of the range were not reached: {failed} states failed" if failed else None
 
-    def drawers(self) -> Iterator[tuple[str, Callable[[], Figure]]]:
-        yield from draw(self)
-
     def lines(self) -> list[str]:
         fixed = f"At {describe_fixed(self.case, self.parameter)}:"
         if self.other_law is not None:

@@ -18,8 +18,8 @@ import jax.numpy as jnp
 import numpy as np
 from matplotlib.figure import Figure
 
-from eigen import SingularShiftError, Workspace
 from eigen.basis import orthonormal
+from eigen.factor import SingularShiftError, Workspace
 from eigen.family import DenseOperator
 from eigen.operator import real_apply
 from eigen.pairs import all_eigenvalues
@@ -27,10 +27,10 @@ from eigen.pairs import all_eigenvalues
 from ...case.parameters import PARAMETERS, PIPES, Mu
 from ...drawing.style import ACCENT, COMPUTED, headline, new_figure, parameter_label, some_of
 from ...errors import CaseError, SolveError
-from ...flow import FlowMotion
-from ...model import ValveModel
+from ...flow.law import FlowMotion
 from ...model.dynamics import LinearisedState
 from ...model.state import LipCentre
+from ...model.valve import ValveModel
 from ...record.mesh import MeshData
 from ...record.record import GrowingRecord, Record
 from ...record.table import Column, TableSpec
@@ -409,9 +409,6 @@ class ResponseResult(StudyResult):
     def shortfall(self) -> str | None:
         lost = len(self.failures)
         return f"There is no response at {lost} of the states" if lost else None
-
-    def drawers(self) -> Iterator[tuple[str, Callable[[], Figure]]]:
-        yield from draw(self)
 
     def lines(self) -> list[str]:
         row = PARAMETERS[self.parameter]

@@ -10,7 +10,8 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
-from eigen import Mode, leading_modes
+from eigen.search import leading_modes
+from eigen.spectrum import Mode
 
 from ...case.parameters import PARAMETERS, Mu
 from ...drawing.style import STABLE, UNSTABLE, headline, new_figure
@@ -193,10 +194,6 @@ class SensitivityResult(StudyResult):
         lost = len(self.failures)
         return f"The eigenvalue was not differentiated by {lost} of the parameters" if lost else None
 
-    def drawers(self) -> Iterator[tuple[str, Callable[[], Figure]]]:
-        if any(found.value for found in self.sensitivities):
-            yield "sensitivity", lambda: draw_bars(self)
-
     def lines(self) -> list[str]:
         if not self.record.notes(MODE):
             return ["The run ended before its mode was found."]
@@ -226,7 +223,13 @@ def _line(result: SensitivityResult, found: Sensitivity) -> str:
 MOST = 24
 
 
-def draw_bars(result: StudyResult) -> Figure:
+def draw(result: StudyResult) -> Iterator[tuple[str, Callable[[], Figure]]]:
+    """Figures of sensitivities, each with its name."""
+    if any(found.value for found in result.sensitivities):
+        yield "sensitivity", lambda: bars(result)
+
+
+def bars(result: StudyResult) -> Figure:
     """Change of growth rate and frequency of the mode for one percent more of each parameter, the largest on top."""
     known = [found for found in result.sensitivities if found.value]
     shown = sorted(known, key=lambda found: abs(found.relative), reverse=True)[:MOST]

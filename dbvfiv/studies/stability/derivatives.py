@@ -21,14 +21,16 @@ from functools import cached_property
 
 import numpy as np
 
-from eigen import CoupledPencil, Mode, eigenvalue_derivative
+from eigen.operator import CoupledPencil
+from eigen.pairs import eigenvalue_derivative
+from eigen.spectrum import Mode
 
 from ...case.parameters import DESIGN, PARAMETERS, SURROUNDINGS, Mu
 from ...errors import CaseError, SolveError
-from ...model import ValveModel, linearise
-from ...model.dynamics import LinearisedState
+from ...model.dynamics import LinearisedState, linearise
 from ...model.sizes import ValveSizes
 from ...model.state import describe_state
+from ...model.valve import ValveModel
 from ..case import Case
 from .place import design_value, is_surrounding, key_of, redesigned, require_parameter
 

@@ -12,7 +12,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from eigen import Cell, Column, ReducedColumn, Spectrum
+from eigen.columns import Cell, Column, ReducedColumn
+from eigen.spectrum import Spectrum
 
 from ...case.axis import Level
 from ...case.parameters import Mu

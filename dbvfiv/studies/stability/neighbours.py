@@ -16,9 +16,9 @@ from typing import Any
 
 import numpy as np
 
-from eigen import Cell, FamilyReduction
 from eigen.basis import orthonormal, outside
-from eigen.columns import cell_beside
+from eigen.columns import Cell, cell_beside
+from eigen.reduction import FamilyReduction
 
 from ...case.parameters import Mu
 from ...model.dynamics import linearise

@@ -16,7 +16,7 @@ from ...case.quantity import Quantity
 from ...case.section import Section
 from ...case.valve import Valve
 from ...errors import CaseError, SolveError
-from ...model import ValveModel
+from ...model.valve import ValveModel
 from ..case import Case
 
 #: Lengths of the parts of a valve, from the lip on.

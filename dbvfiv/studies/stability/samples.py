@@ -13,8 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from eigen import Cell
-from eigen.columns import DIRECT, MISSING
+from eigen.columns import DIRECT, MISSING, Cell
 
 from ...record.record import GrowingRecord, Record
 from ...record.table import Column, TableSpec

@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from eigen import Certificate
+from eigen.certificate import Certificate
 
 from ...case.parameters import PARAMETERS
 from ...texts import shortly

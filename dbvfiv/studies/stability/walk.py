@@ -11,25 +11,16 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from scipy.optimize import root_scalar
 
-from eigen import (
-    Cell,
-    Column,
-    ColumnSolver,
-    CoupledPencil,
-    PencilFamily,
-    Relaxation,
-    SearchOptions,
-    Spectrum,
-    Workspace,
-    lowest_frequencies,
-)
-from eigen.family import Reach
-from eigen.operator import edge_of
+from eigen.basis import lowest_frequencies
+from eigen.columns import Cell, Column, ColumnSolver
+from eigen.factor import Workspace
+from eigen.family import PencilFamily, Reach
+from eigen.operator import CoupledPencil, Relaxation, edge_of
+from eigen.spectrum import SearchOptions, Spectrum
 
 from ...case.parameters import Mu
 from ...case.quantity import GRAVITY
 from ...errors import CaseError, NotValidError, SolveError
-from ...model import ValveModel
 from ...model.classes import linearise_class
 from ...model.dynamics import LinearisedState
 from ...model.equilibria import LoadPath, SteadyOptions
@@ -37,6 +28,7 @@ from ...model.leading import LeadingSearch, select_search
 from ...model.material_stability import material_stability
 from ...model.state import SteadyState
 from ...model.symmetry import Symmetry, equilibria_of
+from ...model.valve import ValveModel
 from ...observer import Observer
 from ..case import Case
 from .place import flow_law, moving_surroundings, rebuilder

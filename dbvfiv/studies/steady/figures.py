@@ -23,14 +23,16 @@ from ...drawing.style import (
     pressure_name,
     some_of,
 )
-from ...drawing.views import closed_section, faces, mark_pieces
+from ...drawing.views import closed_section, draw_deformed, draw_layers, faces, mark_pieces
 from ..case import Case
-from ..comparing import MEASURED, draw_curve, draw_runs, labels
+from ..comparing import MEASURED, draw_curve, draw_runs, draw_shapes, labels
 from ..result import StudyResult
 
 
-def draw(result: StudyResult) -> Iterator[tuple[str, Callable[[], Figure]]]:
-    """Figures of a steady result, each with its name."""
+def draw(result: StudyResult, pressure: float | None = None) -> Iterator[tuple[str, Callable[[], Figure]]]:
+    """Figures over the pressure, and of one state: that of the highest pressure unless another is chosen."""
+    if not result.states:
+        return
     if result.case.drive.kind == "flow":
         yield "head-discharge", lambda: head_discharge(result)
         yield "area-discharge", lambda: area_discharge(result)
@@ -44,6 +46,9 @@ def draw(result: StudyResult) -> Iterator[tuple[str, Callable[[], Figure]]]:
     yield "centre-line", lambda: centre_line(result)
     if result.case.drive.kind == "flow":
         yield "passage", lambda: passage(result)
+    yield from draw_shapes(result.measured.shapes)
+    yield from draw_deformed(result, pressure)
+    yield from draw_layers(result, pressure)
 
 
 def ordered(result: StudyResult) -> list[Any]:

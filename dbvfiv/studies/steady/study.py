@@ -7,22 +7,21 @@ which carries nothing.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Iterable, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from functools import cache, cached_property, partial
+from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
-from matplotlib.figure import Figure
 from scipy.interpolate import PchipInterpolator
 from scipy.optimize import brentq
 
 from ...case.measured import AREA, DISCHARGE, SHAPE, TAPS
 from ...case.quantity import head_of
-from ...drawing import views
 from ...errors import CaseError, SolveError
-from ...model import ValveModel
+from ...exchange.files import state_name, write_shapes
 from ...model.equilibria import (
     LoadPath,
     SteadyOptions,
@@ -33,13 +32,14 @@ from ...model.equilibria import (
 )
 from ...model.load_curve import LimitPoint
 from ...model.state import SteadyState, parted_width
+from ...model.valve import ValveModel
 from ...record.mesh import MeshData, WholeValve
 from ...record.record import GrowingRecord
 from ...record.states import PATH_RESTART, shown_summary, state_table
 from ...record.table import Column, Shown, TableSpec, printed_head, printed_row
 from ...record.vtkhdf import Step
 from ..case import Case
-from ..comparing import Compared, Comparison, draw_shapes
+from ..comparing import Compared, Comparison
 from ..measured import FLOW, LIP_AREA, Measured, keep_measured
 from ..result import StudyResult
 from ..session import Session, Study, print_rows
@@ -389,18 +389,21 @@ class SteadyResult(StudyResult):
         kept = f"; those states are kept in {self.path}" if self.path else ""
         return f"{len(self.states)} of {len(self.case.steady.pressures)} pressures were reached{kept}"
 
-    def drawers(self, pressure: float | None = None) -> Iterator[tuple[str, Callable[[], Figure]]]:
-        """Figures over the pressure, and of one state: that of the highest pressure unless another is chosen."""
-        if not self.states:
-            return
-        yield from figures.draw(self)
-        yield from draw_shapes(self.measured.shapes)
-        yield from views.draw_deformed(self, pressure)
-        yield from views.draw_layers(self, pressure)
-
     def steps(self, valve: WholeValve) -> Sequence[Step]:
         """States in the order of their pressures, as ParaView wants its times."""
         return pressure_steps(self.states, valve, rows=("pressure", "velocity"))
+
+    def export_shapes(
+        self, folder: str | Path = ".", format: str = "stl", shapes: Sequence[str] = (), quarter: bool = False
+    ) -> list[Path]:
+        """Write faces of the wall, the wall and the fluid inside of each state as STL (m) or STEP (mm); see
+        `dbvfiv.exchange.files.write_shapes`.
+        """
+        written = []
+        for state in self.states:
+            name = state_name(self.header.name, state.pressure)
+            written += write_shapes(self.mesh, state.nodal, folder, name, format, shapes, quarter)
+        return written
 
 
 #: What is said of a further equilibrium.

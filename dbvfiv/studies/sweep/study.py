@@ -3,20 +3,23 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
 import numpy as np
-from matplotlib.figure import Figure
 
-from eigen import Branches, CoupledPencil, SearchOptions, Spectrum, TrackOptions, Workspace, leading_modes, track
+from eigen.factor import Workspace
+from eigen.operator import CoupledPencil
+from eigen.search import leading_modes
+from eigen.spectrum import SearchOptions, Spectrum
+from eigen.tracking import Branches, TrackOptions, track
 
 from ...case.axis import Axis
 from ...case.parameters import PARAMETERS, Mu
 from ...errors import CaseError, SolveError
-from ...fit import outside_band
+from ...fit.cards import outside_band
 from ...model.equilibria import require_equilibrium
 from ...model.leading import growth_floor
 from ...model.state import SteadyState
@@ -33,7 +36,6 @@ from ..stability.place import is_surrounding, require_parameter
 from ..stability.samples import SAMPLE_TABLE, SAMPLES, Sample, SampleKey, keep_samples, read_samples
 from ..stability.verdict import Verdict, not_valid_at
 from ..stability.walk import StabilityWalk, name_state_in_failures
-from . import figures
 
 #: Writing branches so far may take this share of the time; a sweep of small cost is written once.
 _KEEPING = 0.05
@@ -501,9 +503,6 @@ class SweepResult(StudyResult):
 
     def remarks(self) -> list[str]:
         return self.lines()[2 + len(self.values) :]
-
-    def drawers(self) -> Iterator[tuple[str, Callable[[], Figure]]]:
-        yield from figures.draw(self)
 
     def lines(self) -> list[str]:
         crossings = [crossing_line(self, crossing) for crossing in self.crossings()]

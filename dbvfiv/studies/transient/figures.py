@@ -31,6 +31,8 @@ from ..result import StudyResult
 
 def draw(result: StudyResult) -> Iterator[tuple[str, Callable[[], Figure]]]:
     """Figures of a transient result, each with its name."""
+    if not result.begun:
+        return
     flow = result.case.drive.kind == "flow"
     yield "history", lambda: history(result)
     yield "energies", lambda: energies(result)

@@ -12,8 +12,8 @@ import numpy as np
 
 from ...errors import CaseError
 from ...flow.stepping import FluidState, packed_size
-from ...model import ValveModel
 from ...model.state import LipCentre
+from ...model.valve import ValveModel
 from ...motion.control import RunOptions
 from ...motion.equations import ValveMotion
 from ...motion.stepper import MotionState, StepResult
@@ -21,7 +21,7 @@ from ...record.mesh import MeshData
 from ...record.record import GrowingRecord, Record
 from ...record.states import LIP, NODAL, OPENING, STATION_AREA, by_node, by_row, by_unknown
 from ...record.table import Column, TableSpec
-from ...shell import WallMemory
+from ...shell.memory import WallMemory
 from ..case import Case
 
 HISTORY, STATES, RESTART = "history", "states", "restart"

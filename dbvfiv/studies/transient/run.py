@@ -11,9 +11,9 @@ from typing import Any
 import numpy as np
 
 from ...errors import CaseError
-from ...model import ValveModel
 from ...model.equilibria import model_warnings
 from ...model.material_stability import material_stability
+from ...model.valve import ValveModel
 from ...motion.control import Drive, RunOptions, step_control
 from ...motion.equations import ValveMotion
 from ...motion.start import first_state, steady_fluid

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -270,9 +270,6 @@ class TransientResult(StudyResult):
             return None
         end = float(self.history["time"][-1])
         return max(end - 1.0 / frequency, float(self.history["time"][0])), end
-
-    def drawers(self) -> Iterator[tuple[str, Callable[[], Figure]]]:
-        return figures.draw(self) if self.begun else iter(())
 
     def steps(self, valve: WholeValve) -> Sequence[Step]:
         return StateSteps(self.states, lambda state: _step(state, self.mesh, valve))

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from eigen import ColumnSolver
+from eigen.columns import ColumnSolver
 
 from ...case.parameters import Mu
 from ...errors import CaseError, SolveError

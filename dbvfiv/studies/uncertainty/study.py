@@ -8,7 +8,6 @@ from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
-from matplotlib.figure import Figure
 
 from ...case.parameters import PARAMETERS, Mu
 from ...errors import CaseError, SolveError
@@ -25,7 +24,6 @@ from ..stability.place import check_scan, describe_fixed, fixed_conditions
 from ..stability.verdict import DIVERGES, FLUTTERS, NOT_VALID, OUTCOMES, STABLE, UNDECIDED
 from ..stability.walk import StabilityWalk
 from ..workers import Lost, Work, Workers, require_answer
-from . import figures
 from .sampling import Found, Sampler, Shifted, Start, approach, shares, subset, weighted
 
 SAMPLES, NUMBERS = "samples", "numbers"
@@ -501,9 +499,6 @@ class UncertaintyResult(StudyResult):
         same = sum(int((a[: len(b)] == b[: len(a)]).sum()) for a, b in pairs)
         count = sum(min(len(a), len(b)) for a, b in pairs)
         return f"Under {law} {same} of {count} samples have the outcome of {self.case.fluid.continuity}."
-
-    def drawers(self) -> Iterator[tuple[str, Callable[[], Figure]]]:
-        yield from figures.draw(self)
 
     def lines(self) -> list[str]:
         row = PARAMETERS[self.parameter]

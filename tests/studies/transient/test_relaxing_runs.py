@@ -53,7 +53,7 @@ def test_figures_and_words_say_what_materials_dissipate(tmp_path, valve):
     lost = run.summary()["last"]["dissipated"]
     assert set(lost) == {"Rayleigh damping", *run.mesh.relaxing}
     assert all(f"J in {name}" in run.lines()[-1] for name in run.mesh.relaxing)
-    energies = dict(run.drawers())["energies"]()
+    energies = run.drawers()["energies"]()
     drawn = [line.get_label() for axes in energies.axes for line in axes.get_lines()]
     assert [f"lost in\n{name}" in drawn for name in run.mesh.relaxing] == [True] * len(run.mesh.relaxing)
 
