@@ -11,7 +11,7 @@ import scipy.linalg as la
 import scipy.sparse as sp
 import scipy.sparse.linalg as spla
 
-from .factor import SingularShiftError, Workspace
+from .factor import Workspace
 from .operator import CoupledPencil
 
 #: Squares of lengths that rounding leaves, relative to one; negative ones beyond its root are more than that.
@@ -298,14 +298,10 @@ def _lowest_by_inverse(stiffness, mass, count, workspace):
     shift = 1e-8 * np.median(stiffness.diagonal()) / np.median(mass.diagonal())
     structure = CoupledPencil(M=mass, C=sp.csr_matrix(mass.shape), K=stiffness)
     # a little below zero; where that is an eigenvalue, a little farther
-    for _ in range(6):
-        try:
-            factor = workspace.factored(structure, float(np.sqrt(shift)))
-            break
-        except SingularShiftError:
-            shift *= 3.7
+    places = (float(np.sqrt(shift * 3.7**k)) for k in range(6))
+    place, factor = workspace.beside(workspace.factored, structure, places)
     n = mass.shape[0]
     inverse = spla.LinearOperator((n, n), matvec=lambda x: factor.solve(np.ravel(x)).real)
     start = np.random.default_rng(5).standard_normal(n)
     kept = min(n, max(2 * count + 1, FEW))
-    return spla.eigsh(stiffness, count, mass, sigma=-shift, OPinv=inverse, v0=start, tol=1e-9, ncv=kept)
+    return spla.eigsh(stiffness, count, mass, sigma=-(place**2), OPinv=inverse, v0=start, tol=1e-9, ncv=kept)

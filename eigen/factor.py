@@ -9,8 +9,9 @@ real MUMPS refactorisation, the equivalent real form of twice the size 6 times.
 from __future__ import annotations
 
 import weakref
-from contextlib import suppress
+from collections.abc import Callable, Iterable
 from functools import cache, cached_property
+from typing import Any
 
 import numpy as np
 import scipy.linalg as la
@@ -413,10 +414,24 @@ class Workspace:
             If it is singular with that, too.
         """
         typical = pencil.typical_frequency
-        for share in (0.0, 1e-4):
-            with suppress(SingularShiftError):
-                return self.factored(pencil, share * typical)
-        return self.factored(pencil, 1e-3 * typical)
+        return self.beside(self.factored, pencil, (share * typical for share in (0.0, 1e-4, 1e-3)))[1]
+
+    @staticmethod
+    def beside(factor: Callable, pencil: CoupledPencil, shifts: Iterable[complex]) -> tuple[complex, Any]:
+        """First of some shifts that is no eigenvalue, and the factor there, by `shifted` or `factored`.
+
+        Raises
+        ------
+        SingularShiftError
+            If all of them are.
+        """
+        singular = SingularShiftError("No shift is given.")
+        for shift in shifts:
+            try:
+                return shift, factor(pencil, shift)
+            except SingularShiftError as error:
+                singular = error
+        raise singular
 
 
 class ShiftedPencil:

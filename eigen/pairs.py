@@ -2,6 +2,7 @@ r"""Eigenpairs from a solver to a result: all of a small pencil; verified, refin
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import cached_property
 
@@ -245,11 +246,9 @@ def factored_beside(pencil: CoupledPencil, eigenvalue, workspace: Workspace):
 
     Returns None if no such place was found.
     """
-    for nudge in (1e-8, 1e-6, 1e-4):
-        try:
-            return workspace.shifted(pencil, eigenvalue * (1 + nudge) if eigenvalue else nudge)
-        except SingularShiftError:
-            continue
+    places = (eigenvalue * (1 + nudge) if eigenvalue else nudge for nudge in (1e-8, 1e-6, 1e-4))
+    with suppress(SingularShiftError):
+        return workspace.beside(workspace.shifted, pencil, places)[1]
     return None
 
 
