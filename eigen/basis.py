@@ -298,10 +298,10 @@ def _lowest_by_inverse(stiffness, mass, count, workspace):
     shift = 1e-8 * np.median(stiffness.diagonal()) / np.median(mass.diagonal())
     structure = CoupledPencil(M=mass, C=sp.csr_matrix(mass.shape), K=stiffness)
     # a little below zero; where that is an eigenvalue, a little farther
-    places = (float(np.sqrt(shift * 3.7**k)) for k in range(6))
-    place, factor = workspace.beside(workspace.factored, structure, places)
+    squares = {float(np.sqrt(square)): square for square in shift * 3.7 ** np.arange(6.0)}
+    place, factor = workspace.beside(workspace.factored, structure, squares)
     n = mass.shape[0]
     inverse = spla.LinearOperator((n, n), matvec=lambda x: factor.solve(np.ravel(x)).real)
     start = np.random.default_rng(5).standard_normal(n)
     kept = min(n, max(2 * count + 1, FEW))
-    return spla.eigsh(stiffness, count, mass, sigma=-(place**2), OPinv=inverse, v0=start, tol=1e-9, ncv=kept)
+    return spla.eigsh(stiffness, count, mass, sigma=-squares[place], OPinv=inverse, v0=start, tol=1e-9, ncv=kept)
