@@ -225,8 +225,8 @@ class OutsideFluid:
         return self._flow(self.equilibria).all_panels(self.panels(q))
 
     def shape_derivative(self, q: np.ndarray, left: np.ndarray, right: np.ndarray) -> ShapeDerivative:
-        """Derivative of the product of the added mass with two motions (n,), complex, of equilibria's class, by what
-        changes the shape; that of E is not in it.
+        """Derivative of the sum of the products of the added mass with motions (n, m) and (n, m), complex, of
+        equilibria's class, by what changes the shape; that of E is not in it.
         """
         fluxes = self.face.fluxes(self.shell.dofs.expand(q))
         count = len(self.shell.mesh.quads), self._opening

@@ -5,6 +5,8 @@ Strengths s of all panels, moving or not, follow from A s = D b with fluxes b, D
 
     d (a' S b) = -(1/2) [ a' dP s_b - r_a' dA s_b + r_a' dD b ] - (the same with a and b exchanged),    A' r_a = P' a.
 
+A sum of such products costs no more than one: they differ in columns alone.
+
 A and P are sums over pairs of panels. What is integrated by points has its derivatives by all places in one sweep over
 the pairs; panels that are near enough to be integrated exactly are few, and are summed anew for each shape.
 """
@@ -101,8 +103,14 @@ def _sum_near(pairs, panels, sides, signs, weights):
     return total
 
 
+def _apart(apply, x: np.ndarray) -> np.ndarray:
+    """A real linear function of the columns (k, m) of a complex array: of real and imaginary parts side by side."""
+    real, imaginary = np.hsplit(apply(np.hstack([x.real, x.imag])), 2)
+    return real + 1j * imaginary
+
+
 class ShapeDerivative:
-    """Derivative of a' S b by the shape, with S the impedance of panels.
+    """Derivative of a sum of products a_i' S b_i by the shape, with S the impedance of panels.
 
     Parameters
     ----------
@@ -111,13 +119,13 @@ class ShapeDerivative:
     moving : Panels
     wet, open_count : int
         See `PotentialFlow.impedance`.
-    a, b : (wet,) complex arrays
+    a, b : (wet, m) complex arrays
         Fluxes.
 
     Attributes
     ----------
-    pressures : (2, wet) complex array
-        S a and S b.
+    pressures : (2, wet, m) complex array
+        S a_i and S b_i.
     """
 
     def __init__(self, flow: PotentialFlow, moving: Panels, wet: int, open_count: int, a, b):
@@ -135,13 +143,14 @@ class ShapeDerivative:
         matrix = np.where(held[:, None], velocity, potential)
         matrix[np.flatnonzero(held), np.flatnonzero(held)] += (flow.closed - flux / areas)[held]
         factor = la.lu_factor(matrix, overwrite_a=True, check_finite=False)
-        fluxes = np.zeros((count, 2), complex)
-        fluxes[:wet] = np.column_stack([a, b])
-        sources = la.lu_solve(factor, fluxes / areas[:, None], check_finite=False)
-        received = la.lu_solve(factor, potential.T @ fluxes, trans=1, check_finite=False)
-        self.pressures = -0.5 * (potential @ sources + received / areas[:, None])[:wet].T
+        fluxes = np.zeros((count, a.shape[1] + b.shape[1]), complex)
+        fluxes[:wet] = np.hstack([a, b])
+        sources = _apart(lambda x: la.lu_solve(factor, x, check_finite=False), fluxes / areas[:, None])
+        received = _apart(lambda x: la.lu_solve(factor, potential.T @ x, trans=1, check_finite=False), fluxes)
+        pressures = -0.5 * (_apart(potential.__matmul__, sources) + received / areas[:, None])[:wet]
+        self.pressures = np.stack(np.hsplit(pressures, 2))
         # weights of potentials and velocities as sums of products of columns; sources in the order b, a
-        other = -0.5 * sources[:, ::-1]
+        other, crossed = (-0.5 * np.roll(x, a.shape[1], axis=1) for x in (sources, fluxes))
         own = np.where(held, (received * other).sum(axis=1) / areas, 0.0)
         left = [
             np.where(held[:, None], fluxes, fluxes - received),
@@ -149,11 +158,11 @@ class ShapeDerivative:
         ]
         right = [other, np.column_stack([other, own])]
         self._right = np.hstack(right)
-        self._back = np.hstack([raw_potential.T @ left[0], raw_velocity.T @ left[1]])
+        self._back = np.hstack([_apart(raw.T.__matmul__, x) for raw, x in zip((raw_potential, raw_velocity), left)])
         self._weights = tuple(x @ (self._strength @ y).T for x, y in zip(left, right))
         self._slopes = self._swept()
         self._slopes["areas"] += velocity @ own - own * flux / areas
-        self._slopes["areas"] -= (received * (-0.5 * fluxes[:, ::-1])).sum(axis=1) / areas**2
+        self._slopes["areas"] -= (received * crossed).sum(axis=1) / areas**2
         self._slopes["bend"] = np.diag(self._weights[1])
         near = self._near()
         still = np.minimum(near[:, 0], near[:, 2]) >= len(moving)
@@ -180,7 +189,7 @@ class ShapeDerivative:
         return np.concatenate(found)
 
     def between(self, below: Panels, above: Panels) -> complex:
-        """Difference of a' S b between two shapes next to this one, of all panels.
+        """Difference of the sum between two shapes next to this one, of all panels.
 
         Raises
         ------

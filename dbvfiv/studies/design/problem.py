@@ -267,18 +267,18 @@ class DesignProblem:
         q, model = walk.equilibrium(place), walk.built(place).model  # from rest: it depends on no other state
         modes = self._modes(walk, place) if margin else ()
         linear = walk.family(place).linear if margin else None
-        beside = Neighbourhood(model, q, pressure, place, modes, self.case.sensitivity.step, linear)
+        eigenvalues = np.array([mode.eigenvalue for mode in modes])
+        margin_here, coefficients = smooth_margin(eigenvalues)
+        beside = Neighbourhood(model, q, pressure, place, modes, self.case.sensitivity.step, linear, coefficients[None])
         found = {name: beside.performance[theirs] for name, theirs in _PERFORMANCE.items()}
         if not np.isfinite(found["loss coefficient"]):
             raise SolveError(f"Nothing flows at {pressure:.6g} Pa.")
         slopes, reserve = {name: [] for name in found}, 0.0
-        eigenvalues = np.array([mode.eigenvalue for mode in modes])
         if margin:
-            found["margin"], weights = _aggregate(eigenvalues)
-            slopes["margin"] = []
+            found["margin"], slopes["margin"] = margin_here, []
 
         def of_margin(slope) -> float:
-            return float(weights @ _of_ratio(eigenvalues, np.array(slope.eigenvalues)))
+            return slope.derivative.real if modes else 0.0
 
         for one, value in zip(self.variables, values):
             slope = beside.slope(one.name)
@@ -338,26 +338,23 @@ def _ratios(eigenvalues: np.ndarray) -> np.ndarray:
     return -eigenvalues.real / np.abs(eigenvalues)
 
 
-def _of_ratio(eigenvalues: np.ndarray, slopes: np.ndarray) -> np.ndarray:
-    """Derivatives of damping ratios from those of eigenvalues."""
-    rate, turn, size = eigenvalues.real, eigenvalues.imag, np.abs(eigenvalues)
-    return -(turn**2 * slopes.real - rate * turn * slopes.imag) / size**3
-
-
 def least_ratio(spectrum: Spectrum) -> float:
     """Least damping ratio of the modes that oscillate; NaN of none."""
     ratios = spectrum.damping_ratio[oscillates(spectrum.eigenvalues)]
     return float(ratios.min()) if len(ratios) else np.nan
 
 
-def _aggregate(eigenvalues: np.ndarray) -> tuple[float, np.ndarray]:
-    """Smooth least damping ratio, and the weights of the modes in its derivative; 1 where nothing oscillates."""
+def smooth_margin(eigenvalues: np.ndarray) -> tuple[float, np.ndarray]:
+    """Smooth least damping ratio, 1 where nothing oscillates, and complex coefficients: the sum of their products with
+    the derivatives of the eigenvalues has its derivative for its real part.
+    """
     if not len(eigenvalues):
         return 1.0, np.zeros(0)
     ratios = _ratios(eigenvalues)
     least = ratios.min()
     shares = np.exp(-SHARPNESS * (ratios - least))
-    return float(least - np.log(shares.sum()) / SHARPNESS), shares / shares.sum()
+    of_ratios = -1j * eigenvalues.imag * eigenvalues.conj() / np.abs(eigenvalues) ** 3
+    return float(least - np.log(shares.sum()) / SHARPNESS), shares / shares.sum() * of_ratios
 
 
 def together(statement: Statement, found: Sequence[AtHead], reserves: Sequence[float] = ()) -> tuple[float, np.ndarray]:

@@ -9,8 +9,8 @@ with left and right vectors of the coupled pencil (`eigen.eigenvalue_derivative`
 along the same line. Neither a further equilibrium nor a further eigenvalue search is needed: a parameter costs a
 back-substitution and two linearisations, whatever the number of modes and of other quantities.
 
-Of the fluid outside, dT x sees the added mass of x alone; its derivative by all shapes comes from one further solve a
-mode (`flow.outside.ShapeDerivative`).
+Of the fluid outside, dT x sees the added mass of x alone; the derivative of a sum of eigenvalues by all shapes comes
+from one further solve, however many modes are in it (`flow.outside.ShapeDerivative`).
 """
 
 from __future__ import annotations
@@ -27,6 +27,7 @@ from eigen.spectrum import Mode
 
 from ...case.parameters import DESIGN, PARAMETERS, SURROUNDINGS, Mu
 from ...errors import CaseError, SolveError
+from ...flow.outside.shape import ShapeDerivative
 from ...model.dynamics import LinearisedState, linearise
 from ...model.sizes import ValveSizes
 from ...model.state import describe_state
@@ -55,7 +56,7 @@ class Sensitivity:
     value : float
         SI; angles in degrees.
     eigenvalues : tuple of complex
-        1/s per unit of the parameter, of each mode: growth rate and angular frequency.
+        1/s per unit of the parameter, of each mode, or each sum of them: growth rate and angular frequency.
     performance : dict of float
         Per unit of the parameter, by the names of `PERFORMANCE`.
     """
@@ -113,6 +114,8 @@ class Neighbourhood:
         Relative size of the central differences; of a parameter that is zero, its absolute size.
     linear : LinearisedState, optional
         Of the state, where it is known.
+    sums : (k, modes) complex array, optional
+        Coefficients of sums of eigenvalues whose derivatives are asked, in place of those of each.
     """
 
     def __init__(
@@ -124,8 +127,10 @@ class Neighbourhood:
         modes: Sequence[Mode] = (),
         step: float = 2e-5,
         linear: LinearisedState | None = None,
+        sums: np.ndarray | None = None,
     ):
         self.model, self.q, self.pressure, self.mu, self.modes, self.step = model, q, pressure, mu, tuple(modes), step
+        self.sums = np.eye(len(self.modes)) if sums is None else np.asarray(sums)
         if linear is not None:
             self._linear = linear
 
@@ -195,38 +200,44 @@ class Neighbourhood:
         if not self.modes:
             return ()
         below, above = (self._linearised(end, q).pencil(end[2]) for end, q in zip(ends, places))
-        outside = [0.0] * len(self.modes)
-        if self.model.outside is not None and places[0] is not places[1]:
-            outside = self._resisting_change(ends, places)
-        found = []
-        for mode, resisting in zip(self.modes, outside):
+        each = []
+        for mode in self.modes:
             x = mode.eigenvalue, mode.q, mode.u
             (f, g), (f_below, g_below) = above.apply(*x), below.apply(*x)
-            change = (f - f_below + mode.eigenvalue**2 * resisting) / apart, (g - g_below) / apart
-            found.append(eigenvalue_derivative(self._pencil, mode, change))
-        return tuple(found)
+            each.append(eigenvalue_derivative(self._pencil, mode, ((f - f_below) / apart, (g - g_below) / apart)))
+        found = self.sums @ np.array(each)
+        if self.model.outside is not None and places[0] is not places[1]:
+            found = found + self._resisting_change(ends, places) / apart
+        return tuple(map(complex, found))
 
-    def _resisting_change(self, ends, places) -> list[np.ndarray]:
-        """Forces (n,) of each mode, whose products with its left vector are those of the difference that two shapes
-        make to the resistance of the fluid outside.
-        """
-        density = self.model.case.outside.density(self.mu["density"])
+    def _resisting_change(self, ends, places) -> np.ndarray:
+        """Differences (k,) that two shapes make to the sums by the resistance of the fluid outside."""
         below, above = (model.outside.all_panels(q) for (model, _, _), q in zip(ends, places))
         first, second = (model.outside.face.fluxes(model.nodal(q)) for (model, _, _), q in zip(ends, places))
         swept, found = second - first, []
-        for mode, slope in zip(self.modes, self._shape_derivatives):
-            left = mode.left_q.conj()
+        for slope, left, right in self._resisting:
             try:
                 change = slope.between(below, above)
             except ValueError as error:
                 raise SolveError(str(error)) from error
-            change += (swept @ left) @ slope.pressures[1] + slope.pressures[0] @ (swept @ mode.q)
-            found.append(density * change * mode.left_q / np.vdot(mode.left_q, mode.left_q).real)
-        return found
+            moved = (swept @ left) * slope.pressures[1] + slope.pressures[0] * (swept @ right)
+            found.append(change + moved.sum())
+        return np.array(found)
 
     @cached_property
-    def _shape_derivatives(self) -> list:
-        return [self.model.outside.shape_derivative(self.q, mode.left_q.conj(), mode.q) for mode in self.modes]
+    def _resisting(self) -> list[tuple[ShapeDerivative, np.ndarray, np.ndarray]]:
+        """Resistance of the fluid outside in each sum by the shape, with its motions (n, m), left ones and right."""
+        density, factors = self.model.case.outside.density(self.mu["density"]), []
+        for mode in self.modes:  # by the product of the left vector, the added mass of unit density and the right one
+            force = density * mode.eigenvalue**2 * mode.left_q / np.vdot(mode.left_q, mode.left_q).real
+            factors.append(eigenvalue_derivative(self._pencil, mode, (force, 0.0 * mode.u)))
+        left = np.stack([mode.left_q.conj() for mode in self.modes], axis=1)
+        right, found = np.stack([mode.q for mode in self.modes], axis=1), []
+        for row in self.sums * np.array(factors):
+            used = np.flatnonzero(row)
+            motions = left[:, used], right[:, used] * row[used]
+            found.append((self.model.outside.shape_derivative(self.q, *motions), *motions))
+        return found
 
     def _linearised(self, end, q: np.ndarray):
         """Linearised state beside this one, with the added mass of this one."""

@@ -196,18 +196,20 @@ def test_varying_strengths_add_up():
 
 @pytest.mark.parametrize("lips", ["closed", "open"])
 def test_derivative_by_the_shape_is_that_of_changed_shapes(lips):
-    """Derivatives of a valve in a pipe, for complex fluxes, where the wall bends, against extrapolated differences."""
+    """Derivatives of a valve in a pipe, summed over complex fluxes, where the wall bends, against extrapolated
+    differences.
+    """
     outside = make_valve({"outside.fluid": "same", "outside.pipe_diameter": "330 mm", "outside.lips": lips}).outside
     mesh, dofs, rng = outside.shell.mesh, outside.shell.dofs, np.random.default_rng(3)
     bent = np.sin(20 * mesh.nodes[:, 2:] + 5 * mesh.nodes[:, :1]) * np.sin(np.arange(5))
     way, rest = dofs.restrict(np.where(dofs.free, bent, 0.0)), np.zeros(dofs.size)
-    left, right = rng.standard_normal((2, dofs.size)) + 1j * rng.standard_normal((2, dofs.size))
+    left, right = rng.standard_normal((2, dofs.size, 3)) + 1j * rng.standard_normal((2, dofs.size, 3))
     found, here = outside.shape_derivative(rest, left, right), outside.panels(rest)
-    a, b = (outside.face.fluxes(dofs.expand(rest)) @ np.stack([left, right]).T).T
+    a, b = (outside.face.fluxes(dofs.expand(rest)) @ motions for motions in (left, right))
 
     def product(h):
         impedance = outside.impedance(h * way, here)
-        return a @ (impedance @ b.real + 1j * (impedance @ b.imag))
+        return (a * (impedance @ b.real + 1j * (impedance @ b.imag))).sum()
 
     near, far = ((product(h) - product(-h)) / (2 * h) for h in (2e-6, 4e-6))
     slope = found.between(*(outside.all_panels(h * way) for h in (-1e-7, 1e-7))) / 2e-7

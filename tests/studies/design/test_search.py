@@ -6,7 +6,7 @@ from scipy.optimize import brentq
 
 from dbvfiv.case.statement import parse_statement
 from dbvfiv.errors import SolveError
-from dbvfiv.studies.design.problem import AtHead, DesignProblem, Variable, _aggregate, _of_ratio
+from dbvfiv.studies.design.problem import AtHead, DesignProblem, Variable, smooth_margin
 from dbvfiv.studies.design.search import Search, starts_of
 
 HEAD = 1e4
@@ -82,8 +82,8 @@ def panel(x, load):
     (h,), step = x, 1e-6
     here = eigenvalues(h)
     slopes = (eigenvalues(h + step) - eigenvalues(h - step)) / (2 * step)
-    value, weights = _aggregate(here)
-    return {"mass": h, "margin": value}, {"mass": [1.0], "margin": [weights @ _of_ratio(here, slopes)]}
+    value, coefficients = smooth_margin(here)
+    return {"mass": h, "margin": value}, {"mass": [1.0], "margin": [(coefficients @ slopes).real]}
 
 
 @pytest.mark.parametrize("start", [0.0, 0.5, 1.0])

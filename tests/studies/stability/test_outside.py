@@ -63,9 +63,9 @@ def test_sensitivities_are_slopes_of_the_eigenvalue():
             if near is not None
             else int(np.argmax(found.frequency > 0))
         )
-        return q, found.mode(i)
+        return q, found.mode(i), found
 
-    q, mode = leading(pressure, 200.0)
+    q, mode, every = leading(pressure, 200.0)
     here = Neighbourhood(model, q, pressure, conditions, [mode])
     found = [here.slope(name) for name in ("pressure", "density")]
     for sensitivity, h in zip(found, (8.0, 0.2)):
@@ -76,6 +76,11 @@ def test_sensitivities_are_slopes_of_the_eigenvalue():
         ]  # fmt: skip
         slope = (ends[0] - ends[1]) / (2 * h)
         assert abs(sensitivity.derivative - slope) < 1e-4 * abs(slope)
+    modes, share = [every.mode(i) for i in range(3)], np.array([2 - 1j, 0.0, 0.5j])
+    each, sums = Neighbourhood(model, q, pressure, conditions, modes), [share, [0.0, 1.0, 0.0]]
+    together = Neighbourhood(model, q, pressure, conditions, modes, sums=np.array(sums))
+    several = each.slope("pressure").eigenvalues
+    assert together.slope("pressure").eigenvalues == pytest.approx((share @ several, several[1]), rel=1e-9)
 
 
 @pytest.mark.slow
