@@ -90,7 +90,11 @@ class Chances:
         checks = rows(near[TAKEN:], np.linspace(0.0, 1.0, CHECKS + 2)[1:-1])
         own = StabilityWalk(plan.case)
         start = own.equilibrium(plan.place(value, along.values[0], law))
-        shared = find_neighbours(at, origin, scales, start, taken, checks)
+
+        def far(scores: np.ndarray) -> np.ndarray:
+            return rows(scores[:, :-1], np.clip(0.5 + scores[:, -1], 0.0, 1.0))
+
+        shared = find_neighbours(at, origin, scales, start, taken, checks, far)
         beside, (flutters, undecided) = Beside(at, shared), np.zeros((2, len(along.values)), int)
         for row in rows(quasi_random(count, d, plan.case.uncertainty.seed), np.full(count, 0.5)):
             try:

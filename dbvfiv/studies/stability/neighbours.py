@@ -2,9 +2,10 @@
 
 States and added mass are linear in the numbers that tell the valves apart, from one back-substitution and one
 difference each. A state is made exact by Newton's method; the linearised equations of every valve are its own, but for
-the added mass, whose error is of second order and measured on further valves. They project on one space of the leading
-motions of several of these valves; what that lacks of a valve is told by a correction with its full matrices and the
-factors of the first one (`eigen.columns.cell_beside`). Growth rates decide where they are clear of both errors.
+the added mass, whose error is of second order and measured on further valves, two of them far off to either side in the
+direction in which states move most: in a narrow pipe around the wall it grows fast. They project on one space of the
+leading motions of several of these valves; what that lacks of a valve is told by a correction with its full matrices
+and the factors of the first one (`eigen.columns.cell_beside`). Growth rates decide where they are clear of both errors.
 """
 
 from __future__ import annotations
@@ -36,6 +37,8 @@ Share = Callable[[Callable[..., Any], "Neighbours", Sequence[np.ndarray]], Seque
 #: Valves that a space is made of, and that its error is measured on, with the seed of their inputs, which no samples
 #: have.
 TAKEN, CHECKS, NEAR_SEED = 6, 4, 2**31 + 1
+#: Standard deviations to the two far valves: 99 of 100 lie nearer in their direction.
+FAR = 2.5
 #: Parts at most in which the numbers of a valve, and the valves that an error is measured on, are shared.
 PARTS = 4
 #: Step of differences over the scale of a number.
@@ -111,6 +114,7 @@ def find_neighbours(
     start: np.ndarray,
     taken: np.ndarray,
     checks: np.ndarray,
+    numbers: Callable[[np.ndarray], np.ndarray],
     share: Share | None = None,
 ) -> Neighbours:
     """Find the neighbours of a valve: their first-order states and added mass, and the space that they share.
@@ -124,6 +128,8 @@ def find_neighbours(
         Displacements next to those of the first valve.
     taken, checks : (s, d), (c, d) arrays
         Numbers of the valves whose leading motions the space has, and of those that the error is measured on.
+    numbers : callable
+        Numbers (m, d) of valves from standard scores (m, d), for two more of these.
     share : callable, optional
         Where several workers find them.
 
@@ -144,6 +150,8 @@ def find_neighbours(
     near = replace(near, slopes=slopes, images=images)
     others = share(_leading_vectors, near, taken)
     near = replace(near, space=_joint_space(first, [first.leading_vectors(place, MODES), *others]))
+    direction = np.linalg.svd(near.slopes, full_matrices=False)[0][:, 0]
+    checks = np.vstack([checks, numbers(np.outer((-FAR, FAR), direction))])
     errors = share(_error, near, np.array_split(checks, min(len(checks), PARTS)))
     return replace(near, error=max(errors))
 

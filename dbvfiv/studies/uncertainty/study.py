@@ -177,9 +177,9 @@ def _neighbours(plan: Plan, states: list[Start | None], record: GrowingRecord, t
         if state is None:
             continue
         where = f"{value / row.scale:.4g} {row.shown_unit}".rstrip()
-        record.progress(f"space that samples share at {where}, of {1 + len(near)} valves")
+        record.progress(f"space that samples share at {where}, of {3 + len(near)} valves")
         try:
-            valves = origin, ahead, state.q, near[:TAKEN], near[TAKEN:]
+            valves = origin, ahead, state.q, near[:TAKEN], near[TAKEN:], plan.numbers
             found[i] = find_neighbours(sampler.walks(i), *valves, partial(shared, i))
             record.note(_SPACE, law=plan.law, value=value, error=found[i].error)
         except (SolveError, CaseError, ArithmeticError, ValueError) as error:
