@@ -11,7 +11,7 @@ import scipy.linalg as la
 import scipy.sparse as sp
 import scipy.sparse.linalg as spla
 
-from .factor import Workspace
+from .factor import Workspace, first_regular
 from .operator import CoupledPencil
 
 #: Squares of lengths that rounding leaves, relative to one; negative ones beyond its root are more than that.
@@ -299,7 +299,7 @@ def _lowest_by_inverse(stiffness, mass, count, workspace):
     structure = CoupledPencil(M=mass, C=sp.csr_matrix(mass.shape), K=stiffness)
     # a little below zero; where that is an eigenvalue, a little farther
     squares = {float(np.sqrt(square)): square for square in shift * 3.7 ** np.arange(6.0)}
-    place, factor = workspace.beside(workspace.factored, structure, squares)
+    place, factor = first_regular(workspace.factored, structure, squares)
     n = mass.shape[0]
     inverse = spla.LinearOperator((n, n), matvec=lambda x: factor.solve(np.ravel(x)).real)
     start = np.random.default_rng(5).standard_normal(n)

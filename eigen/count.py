@@ -13,7 +13,7 @@ from .operator import CoupledPencil
 
 @dataclass(frozen=True)
 class CountOptions:
-    """How closely the phase of the determinant f is followed; found by trying on valves with few and many modes.
+    """Steps by which the phase of the determinant f is followed, found by trying on valves with few and many modes.
 
     Attributes
     ----------

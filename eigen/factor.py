@@ -414,24 +414,24 @@ class Workspace:
             If it is singular with that, too.
         """
         typical = pencil.typical_frequency
-        return self.beside(self.factored, pencil, (share * typical for share in (0.0, 1e-4, 1e-3)))[1]
+        return first_regular(self.factored, pencil, (share * typical for share in (0.0, 1e-4, 1e-3)))[1]
 
-    @staticmethod
-    def beside(factor: Callable, pencil: CoupledPencil, shifts: Iterable[complex]) -> tuple[complex, Any]:
-        """First of some shifts that is no eigenvalue, and the factor there, by `shifted` or `factored`.
 
-        Raises
-        ------
-        SingularShiftError
-            If all of them are.
-        """
-        singular = SingularShiftError("No shift is given.")
-        for shift in shifts:
-            try:
-                return shift, factor(pencil, shift)
-            except SingularShiftError as error:
-                singular = error
-        raise singular
+def first_regular(factor: Callable, pencil: CoupledPencil, shifts: Iterable[complex]) -> tuple[complex, Any]:
+    """First of some shifts that is no eigenvalue, and the factor there, by `Workspace.shifted` or `Workspace.factored`.
+
+    Raises
+    ------
+    SingularShiftError
+        If all of them are.
+    """
+    singular = SingularShiftError("No shift is given.")
+    for shift in shifts:
+        try:
+            return shift, factor(pencil, shift)
+        except SingularShiftError as error:
+            singular = error
+    raise singular
 
 
 class ShiftedPencil:

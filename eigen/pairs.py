@@ -10,7 +10,7 @@ import numpy as np
 import scipy.linalg as la
 import scipy.sparse.linalg as spla
 
-from .factor import SingularShiftError, Workspace
+from .factor import SingularShiftError, Workspace, first_regular
 from .operator import CoupledPencil, real_apply
 from .spectrum import Mode, Oval, SearchedRegion
 
@@ -248,7 +248,7 @@ def factored_beside(pencil: CoupledPencil, eigenvalue, workspace: Workspace):
     """
     places = (eigenvalue * (1 + nudge) if eigenvalue else nudge for nudge in (1e-8, 1e-6, 1e-4))
     with suppress(SingularShiftError):
-        return workspace.beside(workspace.shifted, pencil, places)[1]
+        return first_regular(workspace.shifted, pencil, places)[1]
     return None
 
 

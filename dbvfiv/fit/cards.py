@@ -6,7 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, partial
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
@@ -41,7 +41,7 @@ _CONSTITUENTS = ("fibre_fraction", "fibre_modulus", "matrix_modulus", "fibre_poi
 
 
 def _of_tests(module: str, name: str, *given: Any) -> Any:
-    """What a module of this folder makes of measured data; loaded where a card names some."""
+    """Value of a function of a module of this folder that fits tests; loaded where a card names some."""
     return getattr(import_module(f"dbvfiv.fit.{module}"), name)(*given)
 
 
@@ -199,16 +199,15 @@ def _of_series(name: str, card: Relaxing, band, branches: int) -> MaterialDampin
     return MaterialDamping(name, f"Prony series of {len(times)}, given", Prony(strengths, times))
 
 
-def _of_table(name: str, card: Relaxing, band, branches: int) -> MaterialDamping:
-    read = "series_of_loss_table" if card.loss_data else "series_of_relaxation"
+def _of_table(read: str, name: str, card: Relaxing, band, branches: int) -> MaterialDamping:
     fit, source, data = _of_tests("prony", read, card, band, branches)
     return MaterialDamping(name, source, fit.prony, fit, data)
 
 
 _READERS = {
     "loss_factor": _of_constant,
-    "loss_data": _of_table,
-    "relaxation_data": _of_table,
+    "loss_data": partial(_of_table, "series_of_loss_table"),
+    "relaxation_data": partial(_of_table, "series_of_relaxation"),
     "prony": _of_series,
 }
 
