@@ -28,9 +28,21 @@ def valve(request):
 
 def test_outcomes_are_those_of_the_full_matrices(valve):
     """The first samples of a longer run are those of a shorter one, which makes no space."""
+    point, growth, apart = compare(valve)
+    assert 0.5 * PAYS < point["shared"] <= PAYS
+    assert np.median(apart / growth) < 0.01
+
+
+def test_a_wall_close_to_the_pipe_around_it():
+    """The added mass changes fast with the shape: samples of which first order says too little are found apart."""
+    compare(dbvfiv.load("cases/dbv18.toml", {**MESH, "outside.pipe_diameter": "500 mm", "drive.pressure": 10051.8}))
+
+
+def compare(valve):
+    """Samples on a space beside those without: the point of the run, the sizes of growth rates, their differences."""
     shared, singly = valve.uncertainty(samples=PAYS), valve.uncertainty(samples=SINGLY)
     (point,), (before,) = shared.points, singly.points
-    assert before["shared"] == 0 and 0.5 * PAYS < point["shared"] <= PAYS
+    assert before["shared"] == 0
     value = shared.plan.values[0]
     found, known = shared.at(value), singly.at(value)
     assert np.array_equal(found["inputs"][:SINGLY], known["inputs"])
@@ -38,7 +50,7 @@ def test_outcomes_are_those_of_the_full_matrices(valve):
     assert np.allclose(found["opening"][:SINGLY], known["opening"], rtol=1e-8)
     apart = np.abs(found["growth_rate"][:SINGLY] - known["growth_rate"])
     assert (apart <= 0.2 * np.abs(known["growth_rate"])).all()
-    assert np.median(apart / np.abs(known["growth_rate"])) < 0.01
+    return point, np.abs(known["growth_rate"]), apart
 
 
 class OnSample(Observer):
