@@ -37,7 +37,7 @@ bench: setup
 	@$(PYTHON) -m benchmarks
 
 demo: setup
-	@$(PYTHON) -m dbvfiv report cases/dbv12.toml --set report.heads="2 kPa:18 kPa:4" --workers $(JOBS) -o out/demo/dbv12.html
+	@$(PYTHON) -m dbvfiv report cases/dbv12.toml --set report.heads="2 kPa:18 kPa:4" --set uncertainty.samples=64 --workers $(JOBS) -o out/demo/dbv12.html
 	@echo "The valve in the browser: $(PYTHON) -m dbvfiv app cases/dbv12.toml"
 
 demo-full: setup

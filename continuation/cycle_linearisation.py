@@ -8,7 +8,7 @@ serve all samples in one dense product.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,7 +16,7 @@ import scipy.linalg as la
 from scipy.sparse.linalg import LinearOperator, gmres
 
 from continuation.options import SingularSystem
-from continuation.periodic import PeriodicMotion, PeriodicOperator, ReducedOperator, Term
+from continuation.periodic import PeriodicMotion, PeriodicOperator, ReducedOperator, Term, by_parts
 
 #: Name of omega among free unknowns.
 FREQUENCY = "frequency"
@@ -64,13 +64,6 @@ def units_of(motion: PeriodicMotion, mu: Mapping[str, float], free: Sequence[str
     c = motion.coefficients
     whole = max(float(np.abs(c[1:] / scales).max()), 1e-300)
     return np.append(np.tile(whole * scales, len(c)), np.maximum(np.abs(free_values(motion, mu, free)), 1e-9))
-
-
-def by_parts(linear_map: Callable, x: np.ndarray) -> np.ndarray:
-    """A real linear map of an array that may be complex, whose matrices stay real."""
-    if not np.iscomplexobj(x):
-        return linear_map(x)
-    return linear_map(np.ascontiguousarray(x.real)) + 1j * linear_map(np.ascontiguousarray(x.imag))
 
 
 class CycleLinearisation:

@@ -13,9 +13,9 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 import scipy.linalg as la
 
-from continuation.cycle_linearisation import by_parts
 from continuation.harmonics import Harmonics
 from continuation.linear import SYMMETRIC, factorise
+from continuation.periodic import by_parts
 
 #: Shifts: distance right of the axis, and how far up the band of exponents, both over omega.
 _RIGHT, _UP = 0.1, (0.0, 0.25, 0.5)

@@ -174,6 +174,14 @@ def _parts(x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return np.ascontiguousarray(x.real), np.ascontiguousarray(x.imag)
 
 
+def by_parts(linear_map: Callable[[np.ndarray], np.ndarray], x: np.ndarray) -> np.ndarray:
+    """A real linear map of an array that may be complex, whose matrices stay real."""
+    if not np.iscomplexobj(x):
+        return linear_map(x)
+    real, imaginary = _parts(x)
+    return linear_map(real) + 1j * linear_map(imaginary)
+
+
 def _projected(blocks, basis: np.ndarray, known: DenseBlocks | None, rough: bool) -> DenseBlocks:
     """V^T A V of matrices A at each sample; `known` holds the part of the first columns of V."""
     if isinstance(blocks, SparseBlocks):
@@ -294,7 +302,7 @@ class ReducedOperator(PeriodicOperator):
         h, r, rates = self.motion.harmonics, self.size, self.rates(shift)
         pairs = zip(self.parts, self.between_harmonics)
         weights = [rates.matrix(outer) @ (each @ rates.matrix(f)) for (outer, f, _), each in pairs]
-        total = _by_parts(np.concatenate(weights).reshape(-1, h.size**2).T, self._all_parts)
+        total = by_parts(lambda x: x @ self._all_parts, np.concatenate(weights).reshape(-1, h.size**2).T)
         return total.reshape(h.size, h.size, r, r).transpose(0, 2, 1, 3).reshape(h.size * r, h.size * r)
 
     def quadratic(self, middle: complex) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -307,11 +315,3 @@ class ReducedOperator(PeriodicOperator):
     def shaped(self, vector: np.ndarray) -> np.ndarray:
         """Coefficients (S, r) in a vector of the matrix."""
         return vector.reshape(self.motion.harmonics.size, -1)
-
-
-def _by_parts(left: np.ndarray, right: np.ndarray) -> np.ndarray:
-    """Product of a matrix that may be complex with a real one."""
-    if np.iscomplexobj(left):
-        real, imaginary = _parts(left)
-        return real @ right + 1j * (imaginary @ right)
-    return left @ right

@@ -14,6 +14,7 @@ from .count import Count
 from .factor import SingularShiftError, Workspace
 from .family import PencilFamily, ReducedFamily
 from .operator import CoupledPencil
+from .pairs import acceptable, newton
 from .reduction import OPTIONS, FamilyReduction
 from .search import leading_modes
 from .spectrum import Spectrum
@@ -83,6 +84,15 @@ class ReducedColumn:
         """Newton's correction of an eigenvalue by the full matrices."""
         return complex(self.reduction.correction(self.fine.near(mu, [value]), mu)[0])
 
+    def exact(self, mu: Hashable, value: complex) -> complex:
+        """Eigenvalue of the full matrices next to one of this model, by inverse iteration with them; NaN where that
+        does not converge.
+        """
+        pairs, tolerance = self.fine.near(mu, [value]), self.first.family.search(mu).tolerance
+        start = complex(pairs.values[0]), pairs.q[:, 0], pairs.u[:, 0]
+        found = newton(self.reduction.operator(mu), *start, workspace=self.solver.workspace, tolerance=tolerance)
+        return found[0] if acceptable(*found[3:], tolerance) else complex(np.nan)
+
     def cell(self, mu: Hashable) -> Cell:
         """Cell of any further parameter point."""
         return self.solver.cells(self, [mu])[0]
@@ -139,7 +149,7 @@ class ColumnSolver:
     """Solves families of one pattern after another."""
 
     def __init__(self):
-        self._static, self._stiffened, self._workspace = Workspace(), Workspace(), Workspace()
+        self._static, self._stiffened, self.workspace = Workspace(), Workspace(), Workspace()
         self._last: FamilyReduction | None = None
         self._counter: tuple[ReducedFamily, ReducedFamily, ReducedFamily] | None = None
 
@@ -232,7 +242,7 @@ class ColumnSolver:
         SingularShiftError
             If no usable shift was found.
         """
-        found = leading_modes(family.at(mu), count, family.search(mu), workspace=self._workspace)
+        found = leading_modes(family.at(mu), count, family.search(mu), workspace=self.workspace)
         return _modes_of(family, mu, found)
 
     def _directly(self, reduction: FamilyReduction, points, spectra=None) -> list[Cell]:
@@ -254,7 +264,7 @@ class ColumnSolver:
             key = family.structure(mu)
             if key not in known:
                 known[key] = certified_spectrum(
-                    family.at(mu), OPTIONS.searched, family.search(mu), workspace=self._workspace
+                    family.at(mu), OPTIONS.searched, family.search(mu), workspace=self.workspace
                 )
             listed, own = _modes_of(family, mu, known[key].spectrum).eigenvalues, known[key].certificate
             cells.append(Cell(listed[: OPTIONS.kept], replace(own, certain=own.certain and len(listed) > 0), DIRECT))
@@ -269,9 +279,7 @@ class ColumnSolver:
                 continue
             mu = points[i]
             try:
-                found = certified_spectrum(
-                    family.at(mu), OPTIONS.searched, family.search(mu), workspace=self._workspace
-                )
+                found = certified_spectrum(family.at(mu), OPTIONS.searched, family.search(mu), workspace=self.workspace)
             except (SingularShiftError, np.linalg.LinAlgError):
                 continue
             if len(found.spectrum):

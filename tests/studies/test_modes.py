@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 import scipy.linalg as la
 
+import dbvfiv
 from dbvfiv.case.parameters import Mu
 from dbvfiv.errors import CaseError, SolveError
 from dbvfiv.model import ValveModel
@@ -18,7 +19,7 @@ from dbvfiv.observer import Observer
 from dbvfiv.studies.case import thesis_case
 from dbvfiv.studies.modes.search import ModesOptions, run_modes
 from eigen import SearchOptions
-from eigen.pairs import acceptable
+from eigen.pairs import acceptable, all_eigenvalues
 
 LIGHT = Mu(density=10.0, alpha=0.0, beta=0.003)
 WATER = Mu(density=1000.0, alpha=5.0, beta=0.003)
@@ -164,6 +165,41 @@ def test_an_unstable_pair_is_proof(model, state):
     """Without stiffness damping the band holds some of the unstable modes: unstable, though the counts differ."""
     found = run_modes(model, state, Mu(density=10.0, alpha=5.0, beta=0.0), ModesOptions(3))
     assert found.certificate.unstable_count > 0 and found.stable is False
+
+
+def test_the_critical_damping_of_a_mode_beyond_the_list():
+    """With less damping the first to flutter is a mode at 250 Hz, which the reduced operator of the lower ones has by
+    0.6 % and no search up to their frequencies meets: neutral among all eigenvalues.
+    """
+    pipes = (
+        {"length": 37.12, "diameter": 0.2028},
+        {"length": 0.7186, "diameter": 0.5552, "loss": 5.964},
+        {"length": 3.790, "diameter": 0.3538, "friction": 0.06356},
+    )
+    keys = {
+        "mesh.around": 6,
+        "mesh.along": 8,
+        "fluid.density": 305.8,
+        "fluid.continuity": "quasi-steady",
+        "valve.thickness_factor": 0.8873,
+        "upstream.pieces": pipes,
+        "drive.at": "line",
+        "drive.pressure": 454.5,
+        "downstream.pipe_diameter": 0.7397,
+        "downstream.length": 3.584,
+        "damping.alpha": 0.0,
+        "damping.beta": 3.8145e-4,
+    }
+    valve = dbvfiv.load(thesis_case(), keys)
+    factor = valve.modes().verdict.critical_damping_factor
+    linear, place = linearise(valve.model, LoadPath(valve.model).go_to(454.5).q, 454.5), Mu.of(valve.case)
+
+    def growth(beta):
+        every = all_eigenvalues(linear.pencil(place.at(beta=beta)))
+        return every[every.imag > 1.0].real.max()
+
+    beside = [growth(share * factor * place.beta) for share in (0.999, 1.001)]
+    assert beside[0] > 0 > beside[1] and max(np.abs(beside)) < 0.5, (factor, beside)
 
 
 @pytest.mark.parametrize("density", [1e-3, 2e4])

@@ -8,7 +8,6 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
-from scipy.optimize import brentq
 
 from eigen.basis import TransferBasis
 from eigen.certificate import CertifiedSpectrum, certified_spectrum
@@ -27,6 +26,7 @@ from ...record.table import Column
 from ...texts import shortly
 from ..stability.dimensions import VARIANT
 from ..stability.line import ParameterLine
+from ..stability.scan import Crossing, Scan
 from ..stability.verdict import FLUTTERS, STABLE, UNDECIDED, Verdict, lowered, oscillates
 from ..stability.walk import StabilityWalk, ValveFamily, name_state_in_failures
 from ..state import State
@@ -546,7 +546,8 @@ def critical_damping_factor(walk: StabilityWalk, place: Mu, verdict: Verdict) ->
     Returns
     -------
     float
-        NaN where the wall has no such damping, the verdict is another, or no factor in reach makes the difference.
+        NaN where the wall has no such damping, the verdict is another, no factor in reach makes the difference, or no
+        mode is neutral there by the full matrices.
 
     Raises
     ------
@@ -560,20 +561,20 @@ def critical_damping_factor(walk: StabilityWalk, place: Mu, verdict: Verdict) ->
     factors = LOWER if verdict.outcome == STABLE else HIGHER
     factors = factors[own * factors <= PARAMETERS[name].high]
     line = ParameterLine(walk, place, name, own * factors, snapshots=len(factors), edges=True)
-    if line.column is None:
+    if not line.is_reduced:
         return np.nan
 
-    def growth(values) -> float:
-        values = np.asarray(values)
-        modes = values[oscillates(values)]
-        return float(modes.real.max()) if modes.size else np.nan
+    def flutter(value: float) -> np.ndarray:
+        values = np.asarray(line.column.model.eigenvalues(line.place(value)))
+        return values[oscillates(values)]
 
-    rates = [growth(cell.leading) for cell in line.column.cells]
-    for a, b, low, high in zip(factors[:-1], factors[1:], rates[:-1], rates[1:]):
-        if not (np.isfinite(low) and np.isfinite(high)):
-            return np.nan
-        if low * high <= 0 and line.is_reduced:
-            at = lambda factor: growth(line.column.model.eigenvalues(line.place(own * factor)))  # noqa: E731
-            found = brentq(at, min(a, b), max(a, b), rtol=ACCURACY)
-            return float(f"{found:.8g}")  # rounding of factorisations would part a resumed run from a whole one
+    scan = Scan(flutter)
+    found = [scan.at(value) for value in line.values]
+    for near, far in zip(found, found[1:]):
+        if not (len(near.eigenvalues) and len(far.eigenvalues)):
+            break
+        if (near.pairs > 0) != (far.pairs > 0):
+            onset = line.locate(Crossing(0, *sorted((near, far), key=lambda one: one.value)), ACCURACY, scan=scan)
+            # rounding of factorisations would part a resumed run from a whole one
+            return float(f"{onset.value / own:.8g}") if np.isfinite(onset.residual) else np.nan
     return np.nan

@@ -103,8 +103,10 @@ class OnsetCorrection:
         found = self._small(value, near)
         if found is None:
             return None
-        change = self.model.corrected(self.place(value), found)
-        return found + change if abs(change) < SAME * max(abs(found), 1.0) else None
+        size, change = max(abs(found), 1.0), self.model.corrected(self.place(value), found)
+        if abs(change) > ACCURATE * size:  # one correction leaves up to a fifth of what it changes
+            change = self.model.exact(self.place(value), found) - found
+        return found + change if abs(change) < SAME * size else None
 
     def _by_solving(self, value: float, near: complex) -> complex | None:
         try:

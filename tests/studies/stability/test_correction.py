@@ -23,7 +23,10 @@ def corrected_by(values, shift=SMALL - EXACT):
         found = values(condition)
         return complex(found[np.argmin(np.abs(found - place))]) if found.size else complex(np.nan)
 
-    column = SimpleNamespace(nearest=nearest, corrected=lambda condition, found: complex(3.0 * shift, 0.0))
+    change = complex(3.0 * shift, 0.0)
+    column = SimpleNamespace(
+        nearest=nearest, corrected=lambda condition, found: change, exact=lambda condition, found: found + change
+    )
     return OnsetCorrection(column, lambda value: value, lambda value: pair(value, EXACT))
 
 
