@@ -32,6 +32,7 @@ from .problem import (
     least_ratio,
     margin_spectrum,
     statements_of,
+    together,
     variables_of,
 )
 from .search import LOOK, Design, Search, best_of, starts_of
@@ -268,6 +269,18 @@ class DesignResult(StudyResult):
             found.setdefault(note["design"], []).append(design)
         return {number: best_of(designs, self.statements[0]) for number, designs in found.items()}
 
+    @cached_property
+    def aim_of_case(self) -> float | None:
+        """Aim of the case itself, on the mesh of the search; None where it has no state."""
+        aim, starts = self.statements[0], [one.start for one in self.variables]
+        known = {
+            pressure: found
+            for (values, pressure, _), found in _known(self.record).items()
+            if isinstance(found, AtHead) and aim.quantity in found.values and np.allclose(values, starts, 1e-12, 0.0)
+        }
+        here = [known.get(p) for p in aim.pressures] or [*known.values()][:1]
+        return together(aim, here)[0] if here and None not in here else None
+
     def active(self, number: int = 0) -> list[str]:
         """Bounds and constraints that hold a design back."""
         design, found = self.best[number], []
@@ -331,6 +344,7 @@ class DesignResult(StudyResult):
         return {
             "variables": [asdict(one) for one in self.variables],
             "aim": aim.text,
+            "aim_of_case": self.aim_of_case,
             "constraints": [one.text for one in constraints],
             "designs": [told(number, design) for number, design in best.items()],
             "starts": [{k: v for k, v in note.items() if k != "what"} for note in self.found],
@@ -350,9 +364,11 @@ class DesignResult(StudyResult):
         for number, design in self.best.items():
             lines.append(f"Design {number + 1}{_for(self.bounds[number], self.bounds)}:")
             for one, value in zip(self.variables, design.values):
-                change = f"{100 * (value / one.start - 1):+.1f} %" if one.start else ""
-                lines.append(f"  {one.name:<34}{one.start:12.5g} -> {value:<12.5g}{one.unit:<8}{change}")
-            lines.append(f"  {aim.quantity:<34}{'':12}    {_shown(aim.quantity, design.aim)}")
+                sizes = f"{one.start:.5g}", f"{value:.5g}", one.unit
+                lines.append(_line(one.name, *sizes, _changed(one.start, value)))
+            own = self.aim_of_case
+            start = "" if own is None else _shown(aim.quantity, own)
+            lines.append(_line(aim.quantity, start, _shown(aim.quantity, design.aim), "", _changed(own, design.aim)))
             for one, value in zip(constraints, design.constraints):
                 lines.append(f"  {one.text:<60} {_shown(one.quantity, value)}")
             lines.append(
@@ -370,6 +386,15 @@ class DesignResult(StudyResult):
         if self.complete and missing:
             return f"{missing} of {len(self.bounds)} designs were not found"
         return f"{len(missed)} of {len(self.bounds)} designs miss a constraint" if missed else None
+
+
+def _line(name: str, before: str, after: str, unit: str, change: str) -> str:
+    """A number of the case and of the design, side by side."""
+    return f"  {name:<34}{before:>12} {'->' if before else '  '} {after:<12}{unit:<8}{change}".rstrip()
+
+
+def _changed(before: float | None, after: float) -> str:
+    return f"{100 * (after / before - 1):+.1f} %" if before else ""
 
 
 def _shown(quantity: str, value: float) -> str:

@@ -98,6 +98,13 @@ def test_the_case_file_is_the_design(found):
     assert modes.verdict.damping_ratio == pytest.approx(found.verified(0)["margin"][1], rel=1e-6)
 
 
+def test_the_aim_of_the_case_stands_beside_that_of_the_design(found, valve):
+    """Its loss coefficient, from a steady state of its own."""
+    loss = valve.steady("6 kPa").hydraulics.loss_coefficient
+    assert found.aim_of_case == pytest.approx(loss, rel=1e-6)
+    assert any(line.split()[:3] == ["loss", "coefficient", f"{loss:.5g}"] for line in found.lines())
+
+
 def test_the_file_says_the_same_and_draws(found):
     stored = dbvfiv.load_result(found.path)
     assert stored.summary() == found.summary() and stored.lines() == found.lines()
