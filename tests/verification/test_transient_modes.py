@@ -55,8 +55,6 @@ def three_routes(
         "drive.pressure": pressure,
         "damping.alpha": 0.0,
         "damping.beta": BETA,
-        "transient.start": "kick",
-        "transient.kick_opening": PUSH,
     } | (further or {})
     valve = dbvfiv.load(thesis_case(), changes)
     model = valve.model
@@ -68,24 +66,26 @@ def three_routes(
     # the reduced-order model is made beside the state itself
     column = walk.column([place.at(beta=share * BETA) for share in (0.9, 0.95, 1.05, 1.1)])
     reduced = column.model.nearest(place, eigenvalue)
-    lip = model.shell.dofs.index[model.mesh.rows[0, 0], 1]
-    rings = []
+    rings, limit = rung_in_time(valve, full.frequency, steps, periods)
+    return {"full": eigenvalue, "reduced": complex(reduced), "in time": rings, "limit": limit}
+
+
+def rung_in_time(valve, frequency: float, steps, periods: float = 1.25) -> tuple[list[complex], complex]:
+    """Eigenvalues of a valve's ringing after a push of its lip by `PUSH` along the mode of a frequency, Hz, for numbers
+    of steps a period; and in the limit of small steps, from the last two.
+    """
+    model, rings = valve.model, []
+    q, lip = steady_positions(model, valve.case.drive.pressure), model.shell.dofs.index[model.mesh.rows[0, 0], 1]
     for count in steps:
-        step = 1 / full.frequency / count
-        model.case = valve.case.replace({"transient.step": step, "transient.duration": periods * count * step})
+        step = 1 / frequency / count
+        keys = {"transient.step": step, "transient.duration": periods * count * step}
+        model.case = valve.case.replace({"transient.start": "kick", "transient.kick_opening": PUSH} | keys)
         options = replace(RunOptions.of(model.case), step=StepOptions(tolerance=1e-8, floor=1e-13))
         run = Runner(model, options).start()
         assert not run.failures
-        x = run.history["lip_displacement"] - q[lip]
-        rings.append(ringing(x / PUSH, step))
+        rings.append(ringing((run.history["lip_displacement"] - q[lip]) / PUSH, step))
     first, second = rings[-2:]
-    ratio = (steps[-1] / steps[-2]) ** 2
-    return {
-        "full": eigenvalue,
-        "reduced": complex(reduced),
-        "in time": rings,
-        "limit": second + (second - first) / (ratio - 1),
-    }
+    return rings, second + (second - first) / ((steps[-1] / steps[-2]) ** 2 - 1)
 
 
 def ringing(x: np.ndarray, step: float) -> complex:
