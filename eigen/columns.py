@@ -19,6 +19,8 @@ from .reduction import OPTIONS, FamilyReduction
 from .search import leading_modes
 from .spectrum import Spectrum
 
+#: Relative distance from which on eigenvalues of the reduced and the full operator are not the same.
+APART = 0.02
 #: How a cell was found.
 REDUCED, DIRECT, MISSING = 0, 1, 2
 
@@ -224,6 +226,8 @@ class ColumnSolver:
                 continue  # stays without a certificate
             if len(spectrum):
                 cells[i] = _direct(spectrum, counts[i])
+            if _lacks(spectrum.eigenvalues, values[i], model.error):
+                cells[i] = replace(cells[i], certificate=replace(cells[i].certificate, certain=False))
         return self._recounted(cells, family, points, doubtful)
 
     def _joint(self, first: ReducedFamily, fine: ReducedFamily, anew: bool = False) -> ReducedFamily:
@@ -377,6 +381,14 @@ def _direct(spectrum: Spectrum, found: Count) -> Cell:
     """
     values = spectrum.eigenvalues
     return Cell.of(values, values, found, bool((values.real <= found.line).any()), DIRECT)
+
+
+def _lacks(searched: np.ndarray, listed: np.ndarray, error: float) -> bool:
+    """True where a reduced operator lists an eigenvalue that is unstable within twice its relative error, and a search
+    with the full operator, which ends at a band, has none there.
+    """
+    near = listed[listed.real > -2.0 * error * np.abs(listed)]
+    return bool((np.abs(near[:, None] - searched).min(axis=1, initial=np.inf) > APART * np.abs(near)).any())
 
 
 def _unstable(values: np.ndarray, line: float, band: float) -> int:

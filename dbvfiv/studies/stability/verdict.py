@@ -107,12 +107,15 @@ class Verdict:
         values = np.asarray(eigenvalues, complex)
         values = values[np.isfinite(values.real)]
         agrees = certain and unstable == counted
+        growing = values.real > np.maximum(line, NEUTRAL * np.abs(values))
+        high = np.abs(values.imag[growing]) / (2 * np.pi)
+        if unstable > np.where(high > 0, 2, 1)[high <= band].sum():  # the counts tell of more than the band
+            band = max(band, high.max(initial=0.0))
         statement = statement or Certificate(unstable, counted, certain, line, band).statement
         statement = f"{SEALED} {statement}" if sealed else statement
         if not values.size:
             return cls(UNDECIDED, f"No mode was found in the search, which says nothing of the state. {statement}")
         modes = oscillates(values)
-        growing = values.real > np.maximum(line, NEUTRAL * np.abs(values))
         still = values[growing & ~modes]
         measures = {"certain": bool(agrees), "band": float(band)} | _of_modes(values[modes])
         if growing.any() and (agrees or proven):
