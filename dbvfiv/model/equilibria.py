@@ -22,6 +22,8 @@ from .valve import ValveModel
 
 #: Unbalanced force over pressure force above which a state is no equilibrium of its model.
 _UNBALANCED = 1e-4
+#: Iterations within which load steps of valves of all sizes that keep to their path converge.
+STRAIGHT = 12
 
 
 @dataclass(frozen=True)
@@ -32,7 +34,8 @@ class SteadyOptions(LoadStepOptions):
     def of(cls, case) -> SteadyOptions:
         """Options of a case file."""
         steady = case.steady
-        return cls(NewtonOptions(steady.tolerance, steady.max_iterations), steady.min_step)
+        newton = NewtonOptions(steady.tolerance, steady.max_iterations)
+        return cls(newton, steady.min_step, straight=STRAIGHT)
 
 
 #: Passage at the lips over that of the flange from which on a lost equilibrium is put down to it.

@@ -14,6 +14,8 @@ from .newton import EquilibriumSolver, NewtonOptions, NewtonResult
 
 #: Farthest that an equilibrium of a wall that may snap lies from its prediction, over the mean wall thickness.
 LARGEST_JUMP = 0.15
+#: Share of the way from the first pressure above which a load step is wide.
+WIDE = 1 / 16
 
 
 @dataclass(frozen=True)
@@ -29,6 +31,9 @@ class LoadStepOptions:
         Load step from the start, and the largest; without bounds the whole way is tried at once.
     largest_jump : float, m
         An equilibrium farther from the prediction than this is taken for one on another path, and the step is halved.
+    straight : int, optional
+        Most iterations of a wide step, which is halved then: those that wander longer may end at another equilibrium,
+        and two halves take fewer.
     """
 
     newton: NewtonOptions = NewtonOptions()
@@ -36,6 +41,7 @@ class LoadStepOptions:
     first_step: float = np.inf
     max_step: float = np.inf
     largest_jump: float = np.inf
+    straight: int | None = None
 
 
 @dataclass(frozen=True)
@@ -52,7 +58,7 @@ class LoadSteps:
     """Walks a model from one equilibrium to the next in pressure.
 
     Steps are predicted along the tangent of the equilibrium path, tried whole first, halved when Newton fails and
-    doubled when it succeeds.
+    doubled when it succeeds. A second line search is tried before that, but of wide steps that have to be straight.
 
     Parameters
     ----------
@@ -78,7 +84,7 @@ class LoadSteps:
         self.solver = EquilibriumSolver(self.model, self.options.newton)
         self.fallback = EquilibriumSolver(self.model, replace(self.options.newton, line_search="l2"))
         self.slope: np.ndarray | None = None
-        self.step = self.options.first_step
+        self.step, self.origin = self.options.first_step, self.pressure
 
     def reach(self, target: float) -> LoadStepResult:
         """Walk to a pressure, Pa; `self.pressure` and `self.q` hold the equilibrium.
@@ -134,8 +140,10 @@ class LoadSteps:
 
     def _attempt(self, aim: float) -> NewtonResult:
         start = self.q if self.slope is None else self.q + (aim - self.pressure) * self.slope
-        first = self._judged(self.solver.solve(start, aim), start)
-        if first.converged:
+        wide = abs(aim - self.pressure) > WIDE * max(abs(aim - self.origin), abs(self.pressure - self.origin))
+        straight = self.options.straight if wide else None
+        first = self._judged(self.solver.solve(start, aim, straight), start)
+        if first.converged or straight is not None:
             return first
         result = self._judged(self.fallback.solve(self.q, aim), start)
         return replace(result, iterations=result.iterations + first.iterations)

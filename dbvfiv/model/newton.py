@@ -120,14 +120,16 @@ class EquilibriumSolver:
         # crash at the end of the program
         weakref.finalize(self, snes.destroy)
 
-    def solve(self, start: np.ndarray, pressure: float) -> NewtonResult:
-        """Iterate from a state (n,) to the equilibrium at an inlet pressure, Pa."""
+    def solve(self, start: np.ndarray, pressure: float, most: int | None = None) -> NewtonResult:
+        """Iterate from a state (n,) to the equilibrium at an inlet pressure, Pa; at most so many times, if the options
+        allow more.
+        """
         self._pressure = pressure
         self._scale = max(self.model.force_scale(start, pressure), np.finfo(float).tiny)
         self._rounding = 0.0
         self._error = ""
         self._vector.setArray(start)
-        self._snes.setTolerances(max_it=self.options.max_iterations)
+        self._snes.setTolerances(max_it=min(most or self.options.max_iterations, self.options.max_iterations))
         try:
             self._snes.solve(None, self._vector)
         except PETSc.Error as error:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -18,7 +18,6 @@ from ..errors import SolveError
 from ..model.dynamics import linearise
 from ..model.equilibria import LoadPath, SteadyOptions
 from ..model.leading import select_search
-from ..model.newton import NewtonOptions
 from ..model.valve import ValveModel
 from ..observer import Observer
 from .equations import ValveMotion
@@ -94,7 +93,7 @@ def steady_positions(model: ValveModel, inlet: float, options: SteadyOptions | N
     if inlet <= model.flow.back and model.weight is None:
         return model.rest()
     options = SteadyOptions.of(model.case) if options is None else options
-    path = LoadPath(model, SteadyOptions(NewtonOptions(1e-13, options.newton.max_iterations), options.min_step))
+    path = LoadPath(model, replace(options, newton=replace(options.newton, tolerance=1e-13)))
     path.go_to(max(inlet, model.flow.back))
     return path.q
 

@@ -13,7 +13,8 @@ from dbvfiv.model.load_curve import LimitPoint
 from dbvfiv.model.newton import NewtonOptions
 from dbvfiv.model.state import LipCentre, describe_state
 from dbvfiv.record.states import summarise
-from dbvfiv.studies.case import Case, thesis_case
+from dbvfiv.studies.case import Case, load_case, thesis_case
+from dbvfiv.studies.stability.place import redesigned
 from dbvfiv.studies.steady.study import _met
 
 
@@ -37,6 +38,23 @@ def test_the_way_does_not_matter(model):
     for pressure in (1e3, 60e3, 5e3, 20e3):
         state = walk.go_to(pressure)
     assert np.abs(state.q - at_once.q).max() < 1e-7
+
+
+@pytest.mark.parametrize("thickness", [0.9424, 0.94238, 0.9436])
+def test_the_state_of_a_rising_load_among_several(thickness):
+    """At 2 m this valve has an equilibrium that opens by a third more, and one between that diverges: Newton's method
+    strays to all three from rest, by the fifth digit of the thickness.
+    """
+    case = load_case("cases/dbv6.toml", ["mesh.around=14", "mesh.along=24"])
+    for name, value in {"thickness": thickness, "angle": 30.0, "valve.saddle_length": 0.112}.items():
+        case = redesigned(case, {name: value})
+    model = ValveModel(case)
+    at_once, in_steps = (LoadPath(model, SteadyOptions.of(case)) for _ in range(2))
+    found = at_once.go_to(19613.3)
+    for share in (0.125, 0.25, 0.5, 0.75, 1.0):
+        last = in_steps.go_to(share * 19613.3)
+    assert found.outlet_area == pytest.approx(last.outlet_area, rel=1e-6)
+    assert found.outlet_area == pytest.approx(17.28e-4, rel=2e-3)
 
 
 def test_flow_is_that_of_bernoulli_at_the_outlet(model):

@@ -35,7 +35,7 @@ from .problem import (
     together,
     variables_of,
 )
-from .search import LOOK, Design, Search, best_of, starts_of
+from .search import HELD, LOOK, Design, Search, best_of, starts_of
 
 DESIGNS, VERIFIED, _STATE, _DESIGN, _SHUT = "designs", "verified", "state", "design", "shut"
 #: Number of a design in tables: the case itself.
@@ -163,7 +163,7 @@ def _write(case: Case, path: Path) -> None:
     path.write_text(case_toml(case, comments=False) + "\n")
 
 
-#: Share of a range or a bound within which it is what holds a design back.
+#: Share of a range or a bound within which it is what holds a design back; of an aim, within which optima are one.
 ACTIVE = 1e-3
 #: Difference of an opening between the meshes above which it is said.
 APART = 0.1
@@ -281,6 +281,17 @@ class DesignResult(StudyResult):
         here = [known.get(p) for p in aim.pressures] or [*known.values()][:1]
         return together(aim, here)[0] if here and None not in here else None
 
+    def optima(self, number: int = 0) -> list[tuple[float, int]]:
+        """Aims at which starts ended with all constraints held, the best first, and the number of starts for each."""
+        sign, found = self.statements[0].sign, []
+        ends = (note for note in self.found if note["design"] == number and note["violation"] <= HELD)
+        for aim in sorted((note["aim"] for note in ends), key=lambda aim: -sign * aim):
+            if found and abs(aim - found[-1][0]) <= ACTIVE * abs(aim):
+                found[-1] = found[-1][0], found[-1][1] + 1
+            else:
+                found.append((aim, 1))
+        return found
+
     def active(self, number: int = 0) -> list[str]:
         """Bounds and constraints that hold a design back."""
         design, found = self.best[number], []
@@ -375,6 +386,9 @@ class DesignResult(StudyResult):
                 f"  {'all constraints hold' if design.holds else f'a constraint is missed by {design.violation:.2%}'}"
             )
             lines.append(f"  held back by: {', '.join(self.active(number)) or 'nothing'}")
+            if self.case.design.starts > 1:
+                ends = (f"{_shown(aim.quantity, end)}{f' ({n} starts)' * (n > 1)}" for end, n in self.optima(number))
+                lines.append(f"  optima found: {', '.join(ends) or 'none that holds'}")
             lines.append(f"  on the finer mesh: {self.evidence(number)}")
         if len(self.verified(CASE)["pressure"]):
             lines.append(f"The case itself on the finer mesh: {self.evidence(CASE)}.")

@@ -122,6 +122,7 @@ def test_five_starts_have_one_optimum():
     assert aims == pytest.approx([min(aims)] * 5, rel=1e-4)
     values = np.array([note["values"] for note in result.found])
     assert values == pytest.approx(np.array([result.best[0].values] * 5), rel=0.02)
+    assert [starts for _, starts in result.optima()] == [5]
 
 
 @pytest.mark.slow
