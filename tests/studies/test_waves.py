@@ -34,6 +34,18 @@ def test_modes_along_a_parameter_are_those_of_each_value(over):
     assert growth == pytest.approx(leading({name[over.split("=")[0]]: float(found.values[1])}), rel=1e-6)
 
 
+def test_no_door_calls_a_valve_stable_whose_line_is_too_coarse_for_its_modes():
+    """Two elements resolve waves up to 3 Hz; the wall flutters at 46 Hz, as with sixty."""
+    line = {"upstream.length": 120.0, "upstream.diameter": 0.3, "upstream.wave_speed": 400.0, "upstream.elements": 2}
+    state = {"fluid.density": 30.0, "drive.pressure": 1500.0, "fluid.continuity": "quasi-steady", "damping.beta": 4e-4}
+    valve = load({"mesh.around": 6, "mesh.along": 8, "upstream.loss": 0.0} | line | state)
+    told = [valve.modes().verdict.outcome]
+    told += [verdict["outcome"] for verdict in valve.sweep("beta=4e-4,5e-4").summary()["verdict"]]
+    told += [verdict["outcome"] for verdict in valve.sweep("pressure=1500,1600").summary()["verdict"]]
+    told += [verdict["outcome"] for verdict in valve.onset("beta=4e-4:5e-4:3").summary()["scan"]["verdict"]]
+    assert set(told) == {"undecided"}
+
+
 @pytest.mark.slow
 def test_maps_keep_the_wave_speed_over_the_density():
     """In every cell the compressibility is that of its own density."""

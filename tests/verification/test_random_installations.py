@@ -14,6 +14,7 @@ from dbvfiv.errors import CaseError, SolveError
 from dbvfiv.model import ValveModel, linearise, select_search
 from dbvfiv.model.equilibria import LoadPath
 from dbvfiv.studies.case import thesis_case
+from dbvfiv.studies.stability.walk import StabilityWalk
 from eigen import SearchOptions, TransferBasis, certified_spectrum
 from eigen.pairs import all_eigenvalues
 from tests.verification.test_transient_modes import rung_in_time
@@ -177,6 +178,8 @@ def test_modes_of_many_installations_ring_in_time():
             found = valve.modes(count=8)
         except (CaseError, SolveError):
             continue
+        walk = StabilityWalk(valve.case, model=valve.model)
+        assert walk.verdict(Mu.of(valve.case)).outcome == found.verdict.outcome, keys
         if found.verdict.outcome == "undecided":
             continue
         leading = next(mode for mode in found.modes if mode.frequency > 0)
