@@ -22,8 +22,9 @@ from .valve import ValveModel
 
 #: Unbalanced force over pressure force above which a state is no equilibrium of its model.
 _UNBALANCED = 1e-4
-#: Iterations within which load steps of valves of all sizes that keep to their path converge.
-STRAIGHT = 12
+#: Iterations within which a wide load step ends where many short ones do: of 200 steps of odd valves from rest none of
+#: fewer went astray, and 7 of 20 with more.
+STRAIGHT = 10
 
 
 @dataclass(frozen=True)
