@@ -16,7 +16,7 @@ from matplotlib.colorbar import Colorbar
 from matplotlib.figure import Figure
 from matplotlib.patheffects import withStroke
 from matplotlib.text import Text
-from matplotlib.ticker import FuncFormatter, Locator, LogLocator, MaxNLocator, NullFormatter
+from matplotlib.ticker import FuncFormatter, Locator, LogLocator, MaxNLocator, NullFormatter, NullLocator
 
 from ..case.model import Case
 from ..case.parameters import PARAMETERS
@@ -128,8 +128,8 @@ def some_of(states: list, count: int = 8) -> list:
     return [states[i] for i in np.unique(np.linspace(0, len(states) - 1, count).round().astype(int))]
 
 
-#: Decades of a logarithmic axis below which 2 and 5 of each decade are written too.
-_SHORT, _SHORTEST = 2.6, 0.7
+#: Digits that are written on a logarithmic axis of so many decades at most; of longer ones 1 alone.
+_DIGITS = {0.35: np.arange(1.0, 10.0), 0.7: (1.0, 2.0, 3.0, 5.0, 7.0), 2.6: (1.0, 2.0, 5.0)}
 
 #: White about a text that may lie on a line.
 HALO = (withStroke(linewidth=3.0, foreground="white"),)
@@ -143,11 +143,14 @@ def headline(figure: Figure, text: str) -> None:
 def log_axis(axis: Axis, low: float, high: float) -> None:
     """Make an axis from `low` to `high` logarithmic, with numbers at its ticks however short it is."""
     getattr(axis.axes, f"set_{axis.axis_name}scale")("log")
-    decades = np.log10(high / low) if 0 < low < high else 1.0
-    digits = np.arange(1.0, 10.0) if decades < _SHORTEST else (1.0, 2.0, 5.0) if decades < _SHORT else (1.0,)
-    axis.set_major_locator(LogLocator(subs=digits, numticks=12))
+    axis.set_major_locator(_log_ticks(low, high))
     axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
     axis.set_minor_formatter(NullFormatter())
+
+
+def _log_ticks(low: float, high: float) -> Locator:
+    decades = np.log10(high / low) if 0 < low < high else 1.0
+    return LogLocator(subs=next((digits for most, digits in _DIGITS.items() if decades < most), (1.0,)), numticks=12)
 
 
 def colour_bar(figure: Figure, drawn: Any, axes: Any, label: str, **options: Any) -> Colorbar:
@@ -188,9 +191,10 @@ def put_in_units(figure: Figure, units: Units) -> Figure:
         axis.set_label_text(label)
         if ratio != 1.0 and not isinstance(axis.get_major_locator(), _InUnit):
             even = MaxNLocator(7, steps=[1, 2, 2.5, 5, 10])
-            ticks = even if axis.get_scale() == "linear" else axis.get_major_locator()
+            ticks = even if axis.get_scale() == "linear" else _log_ticks(*axis.get_view_interval())
             axis.set_major_locator(_InUnit(ticks, ratio))
             axis.set_major_formatter(lambda value, _, ratio=ratio: f"{value * ratio:.4g}")
+            axis.set_minor_locator(NullLocator())
     return figure
 
 

@@ -14,7 +14,7 @@ from matplotlib.figure import Figure
 from ...case.parameters import Mu
 from ...case.statement import QUANTITIES, Statement
 from ...case.write import case_toml
-from ...drawing.style import headline, new_figure
+from ...drawing.style import headline, limits, log_axis, new_figure
 from ...errors import CaseError, SolveError
 from ...model.closed import close_valve
 from ...record.mesh import MeshData
@@ -450,7 +450,7 @@ def draw_heads(result: StudyResult) -> Figure:
     for place, (label, _) in zip(axes, _DRAWN.values()):
         place.set_xlabel("Static inlet pressure, kPa")
         place.set_ylabel(label)
-        place.set_xscale("log")
+        log_axis(place.xaxis, *limits(result.verified(CASE)["pressure"] / 1e3, log=True))
     axes[0].axhline(0.0, color="0.25", lw=1.0)
     axes[0].legend(frameon=False, fontsize=8)
     headline(figure, f"{result.header.name}: {result.statements[0].text}")

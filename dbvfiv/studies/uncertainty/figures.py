@@ -8,7 +8,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from ...case.parameters import PARAMETERS
-from ...drawing.style import ACCENT, COMPUTED, REST, headline, new_figure, parameter_label
+from ...drawing.style import ACCENT, COMPUTED, REST, headline, limits, log_axis, new_figure, parameter_label
 from ..result import StudyResult
 from ..stability.place import describe_fixed
 from ..stability.verdict import FLUTTERS, NOT_VALID, OUTCOMES, STABLE
@@ -36,9 +36,10 @@ def _axis(axes, result: StudyResult) -> np.ndarray:
     """Label the range, and its values in the units shown."""
     axis = result.case.uncertainty.axis
     axes.set_xlabel(parameter_label(result.case, result.parameter))
+    values = np.array([point["value"] for point in result.points]) / PARAMETERS[result.parameter].scale
     if axis is not None and axis.log:
-        axes.set_xscale("log")
-    return np.array([point["value"] for point in result.points]) / PARAMETERS[result.parameter].scale
+        log_axis(axes.xaxis, *limits(values, log=True))
+    return values
 
 
 def _under(figure: Figure, result: StudyResult) -> None:
