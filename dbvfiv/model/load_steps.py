@@ -33,7 +33,7 @@ class LoadStepOptions:
         An equilibrium farther from the prediction than this is taken for one on another path, and the step is halved.
     straight : int, optional
         Most iterations of a wide step, which is halved then: those that wander longer may end at another equilibrium,
-        and two halves take fewer.
+        and two halves take fewer. Where the path ends, wide steps may wander.
     """
 
     newton: NewtonOptions = NewtonOptions()
@@ -96,12 +96,12 @@ class LoadSteps:
         """
         smallest = self.options.min_step * max(abs(target), abs(self.pressure))
         step = np.copysign(min(abs(target - self.pressure), self.step, self.options.max_step), target - self.pressure)
-        iterations, steps = 0, 0
+        iterations, steps, straight = 0, 0, self.options.straight
         while True:
             remaining = target - self.pressure
             last = abs(step) >= abs(remaining) * (1 - 1e-12)
             aim = target if last else self.pressure + step
-            result = self._attempt(aim)
+            result = self._attempt(aim, straight)
             iterations += result.iterations
             if result.converged:
                 steps += 1
@@ -116,7 +116,10 @@ class LoadSteps:
             self.observer.progress(
                 f"no equilibrium at {aim:.6g} Pa ({result.reason}), step halved to {abs(step):.3g} Pa"
             )
-            if abs(step) < smallest:
+            if straight is not None and abs(step) < max(smallest, WIDE**2 * abs(target - self.origin)):
+                # the path ends, as at a limit point: what lies beyond is where Newton's method strays to
+                straight, step = None, target - self.pressure
+            elif abs(step) < smallest:
                 raise SolveError(
                     f"No equilibrium was found between {self.pressure:.6g} Pa, the last one, and {aim:.6g} "
                     f"Pa on the way to {target:.6g} Pa: "
@@ -138,12 +141,11 @@ class LoadSteps:
         self._take(result, self.pressure)
         return result
 
-    def _attempt(self, aim: float) -> NewtonResult:
+    def _attempt(self, aim: float, straight: int | None) -> NewtonResult:
         start = self.q if self.slope is None else self.q + (aim - self.pressure) * self.slope
         wide = abs(aim - self.pressure) > WIDE * max(abs(aim - self.origin), abs(self.pressure - self.origin))
-        straight = self.options.straight if wide else None
-        first = self._judged(self.solver.solve(start, aim, straight), start)
-        if first.converged or straight is not None:
+        first = self._judged(self.solver.solve(start, aim, straight if wide else None), start)
+        if first.converged or (wide and straight is not None):
             return first
         result = self._judged(self.fallback.solve(self.q, aim), start)
         return replace(result, iterations=result.iterations + first.iterations)
