@@ -58,7 +58,7 @@ class LoadSteps:
     """Walks a model from one equilibrium to the next in pressure.
 
     Steps are predicted along the tangent of the equilibrium path, tried whole first, halved when Newton fails and
-    doubled when it succeeds. A second line search is tried before that, but of wide steps that have to be straight.
+    doubled when it succeeds. Steps that may wander try a second line search before they are halved.
 
     Parameters
     ----------

@@ -241,7 +241,8 @@ class _Load:
         if not self.changes:
             return options
         largest, jump = self._target(model) / CLOSED_STEPS, LARGEST_JUMP * float(np.mean(model.mesh.thickness))
-        return replace(options, first_step=largest / CLOSED_STEPS, max_step=largest, largest_jump=jump)
+        steps = {"first_step": largest / CLOSED_STEPS, "max_step": largest, "largest_jump": jump}
+        return replace(options, straight=None, **steps)
 
     def _target(self, model: ValveModel) -> float:
         """Pressure of this round, Pa: halves of what is above that at rest."""

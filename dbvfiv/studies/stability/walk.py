@@ -532,7 +532,10 @@ class StabilityWalk:
         whole = solver.reduction(family).first([place]).count(place, cell.leading)
         if whole.certain and not whole.number:
             return 0
-        exact = certified_spectrum(family.at(place), self.case.modes.count, family.search(place))
+        with name_state_in_failures(place.pressure):
+            exact = certified_spectrum(
+                family.at(place), self.case.modes.count, family.search(place), workspace=solver.workspace
+            )
         return 0 if np.isinf(exact.count.band) else max(whole.number, 1)
 
     def verdict(self, place: Mu, spectrum=None) -> Verdict:
