@@ -275,20 +275,44 @@ class ColumnSolver:
         return cells
 
     def _recounted(self, cells: list[Cell], family, points, chosen) -> list[Cell]:
-        """Cells, of which those chosen that still lack agreement have a count of their own, on a basis of structural
-        modes, made finer as far as it takes.
-        """
+        """Cells, of which those chosen that still lack agreement have a count of their own."""
         for i in chosen:
             if cells[i].certificate.agrees:
                 continue
-            mu = points[i]
             try:
-                found = certified_spectrum(family.at(mu), OPTIONS.searched, family.search(mu), workspace=self.workspace)
+                found = self._anew(family, points[i])
             except (SingularShiftError, np.linalg.LinAlgError):
                 continue
-            if len(found.spectrum):
-                cells[i] = Cell(found.spectrum.eigenvalues[: OPTIONS.kept], found.certificate, DIRECT)
+            if len(found.leading):
+                cells[i] = found
         return cells
+
+    def _anew(self, family: PencilFamily, mu: Hashable) -> Cell:
+        """Cell of the full operator, counted on a basis of structural modes, made finer as far as it takes."""
+        found = certified_spectrum(family.at(mu), OPTIONS.searched, family.search(mu), workspace=self.workspace)
+        return Cell(found.spectrum.eigenvalues[: OPTIONS.kept], found.certificate, DIRECT)
+
+    def counted_over_all(self, family: PencilFamily, mu: Hashable, cell: Cell) -> Cell:
+        """The cell of a parameter point; where it is stable up to the end of a band above which more is counted, that
+        of the full operator, or one without agreement.
+
+        Raises
+        ------
+        SingularShiftError
+            If the full operator has no usable shift.
+        """
+        own = cell.certificate
+        if not own.stable or np.isinf(own.band):
+            return cell
+        whole = self.reduction(family).first([mu]).count(mu, cell.leading)
+        if whole.certain and not whole.number:
+            return cell
+        found = self._anew(family, mu)
+        if not found.certificate.stable:
+            return found
+        if np.isinf(found.certificate.band):
+            return cell
+        return replace(cell, certificate=replace(own, counted=max(whole.number, 1), band=np.inf))
 
 
 def cell_beside(reduction: FamilyReduction, mu: Hashable, error: float, safety: float) -> Cell:

@@ -167,6 +167,12 @@ class Case(Section):
                 f"{self.fluid.sound_speed:g} m/s with fluid.continuity = {self.fluid.continuity!r}",
                 "a fluid that is compressed stores mass, so it must be 'storage' then",
             )
+        if not self.fluid.unsteady:
+            raise BrokenRule(
+                "fluid.sound_speed",
+                f"{self.fluid.sound_speed:g} m/s with fluid.unsteady = false, which leaves out that mass is stored",
+                "give it with the unsteady law alone",
+            )
 
     def _check_boiling(self) -> None:
         """Refuse a vapour pressure without waves, or one at which the fluid boils everywhere."""

@@ -77,11 +77,14 @@ def bend_of_lip(surface: Surface) -> float:
     """Normalised arc length from the centre at which the section of the lip has turned by 5 degrees from its direction
     there; on the side where that is nearer."""
     s, found = np.linspace(0.0, 1.0, 2001), [1.0]
+    middle = 0.5 * (s[1:] + s[:-1])
     for side in (1.0,) if surface.part.is_quarter else (1.0, -1.0):
         steps = np.diff(surface.section(surface.breaks[0], side * s)[:, :2], axis=0) * [side, 1.0]
-        turned = np.unwrap(np.arctan2(steps[:, 1], steps[:, 0]))
-        past = np.abs(turned - turned[0]) > BEND
-        found.append(float(s[int(np.argmax(past))]) if past.any() else 1.0)
+        direction = np.unwrap(np.arctan2(steps[:, 1], steps[:, 0]))
+        turned = np.abs(direction - direction[0])
+        if (turned > BEND).any():
+            k = int(np.argmax(turned > BEND))  # between two steps, so that it moves smoothly with the shape
+            found.append(float(np.interp(BEND, turned[k - 1 : k + 1], middle[k - 1 : k + 1])))
     return min(found)
 
 

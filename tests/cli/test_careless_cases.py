@@ -42,6 +42,7 @@ CARELESS = [
     (["mesh.around=0"], "mesh.around"),
     (["upstream.length=-1 m"], "upstream.length"),
     (["upstream.length=30 m", "upstream.wave_speed=1000 m/s", "fluid.unsteady=false"], "wave_speed"),
+    (["fluid.sound_speed=343 m/s", "fluid.continuity=storage", "fluid.unsteady=false"], "sound_speed"),
     (["sweep.over=density=10:1:5"], "start is not below"),
     (["onset.over=pressure=1 kPa:2 kPa"], "not of that form"),
     (["steady.pressures=[]"], "steady.pressures"),

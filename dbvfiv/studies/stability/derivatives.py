@@ -345,7 +345,7 @@ def _value(model, pressure, mu, name) -> float:
     if name == "pressure":
         return pressure
     if name in SURROUNDINGS:
-        return Mu.of(model.case).at(**mu)[name]
+        return getattr(Mu.of(model.case).at(**mu), name)  # of a pipe without length 0
     if name in DESIGN:
         return design_value(model.case, name)
     if not name.startswith("layer "):

@@ -82,7 +82,8 @@ class Sample:
     def of(cls, value: float, cell: Cell, claimed: float, sealed: bool = False) -> Sample:
         """Sample of a cell; `claimed` is the frequency, Hz, up to which the search speaks for the state."""
         own = cell.certificate
-        band, counts = min(own.band, claimed), (own.unstable, own.counted, own.certain)
+        band = min(own.band, claimed) if own.agrees else own.band
+        counts = own.unstable, own.counted, own.certain
         return cls(value, np.asarray(cell.leading)[:KEPT], *counts, own.line, band, sealed, cell.how)
 
     @cached_property

@@ -12,7 +12,6 @@ import numpy as np
 from scipy.optimize import root_scalar
 
 from eigen.basis import lowest_frequencies
-from eigen.certificate import certified_spectrum
 from eigen.columns import Cell, Column, ColumnSolver
 from eigen.factor import Workspace
 from eigen.family import PencilFamily, Reach
@@ -516,27 +515,10 @@ class StabilityWalk:
         """
         if refusal := self.refusal(place):
             return Sample(value, refusal=refusal)
-        sealed = self.family(place).linear.seal is not None
-        sample = Sample.of(value, cell, self.search(place).claimed, sealed)
-        beyond = self._counted_beyond(place, cell)
-        return replace(sample, counted=beyond, band=np.inf) if beyond else sample
-
-    def _counted_beyond(self, place: Mu, cell: Cell) -> int:
-        """Unstable eigenvalues above the band in which a cell is stable: counted on its reduced operator, and not found
-        to be none on a finer one.
-        """
-        own = cell.certificate
-        if not own.stable or np.isinf(own.band):
-            return 0
-        family, solver = self.family(place), self.built(place).solver
-        whole = solver.reduction(family).first([place]).count(place, cell.leading)
-        if whole.certain and not whole.number:
-            return 0
+        family = self.family(place)
         with name_state_in_failures(place.pressure):
-            exact = certified_spectrum(
-                family.at(place), self.case.modes.count, family.search(place), workspace=solver.workspace
-            )
-        return 0 if np.isinf(exact.count.band) else max(whole.number, 1)
+            cell = self.built(place).solver.counted_over_all(family, place, cell)
+        return Sample.of(value, cell, family.leading(place).claimed, family.linear.seal is not None)
 
     def verdict(self, place: Mu, spectrum=None) -> Verdict:
         """Verdict on one place; its leading modes with the full pencil may be known.

@@ -101,6 +101,17 @@ def test_derivatives_in_water(in_water, name):
     check(in_water, name, NEAR_RAYLEIGH, 3e-5)
 
 
+@pytest.mark.parametrize(
+    ("changes", "name"),
+    [
+        ({"valve.lip_rise": 0.0133477, "mesh.inertia": "parabolic"}, "valve.lip_half_width"),  # columns on the bend
+        ({"downstream.pipe_diameter": 0.4, "downstream.loss": 1.0}, "tail_length"),  # a chamber without length behind
+    ],
+)
+def test_derivatives_of_bowed_lips_and_of_a_discharge(changes, name):
+    check(beside({"mesh.around": 6, "mesh.along": 8} | changes, RAYLEIGH, NEAR_RAYLEIGH), name, NEAR_RAYLEIGH, 1e-6)
+
+
 def test_at_the_end_of_its_range_a_parameter_is_stepped_inward(valve):
     """The strain level of 10 %, below which no rubber was tested."""
     found = valve.slope("strain")
