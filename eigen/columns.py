@@ -201,12 +201,13 @@ class ColumnSolver:
         values = [fine.eigenvalues(mu) for mu in points]
         leading = [family.reach(mu).leading(row) for row, mu in zip(values, points)]
         counts: dict[int, Count] = {}
+        leading, trusted = _corrected(model, points, leading)
         cells = [Cell.of(leading[i], values[i], _nobody(family, mu), False, REDUCED) for i, mu in enumerate(points)]
 
         def count(counter, chosen, within_band=False):
             for i in chosen:
                 found = _counted(counter, points[i], leading[i], within_band)
-                cell = Cell.of(leading[i], values[i], found, model.error <= OPTIONS.tolerance, REDUCED)
+                cell = Cell.of(leading[i], values[i], found, trusted[i], REDUCED)
                 if not within_band or cell.certificate.agrees:
                     counts[i], cells[i] = found, cell
             return [i for i in chosen if not cells[i].certificate.agrees]
@@ -302,7 +303,7 @@ class ColumnSolver:
             If the full operator has no usable shift.
         """
         own = cell.certificate
-        if not own.stable or np.isinf(own.band):
+        if not own.stable or np.isinf(own.band) or (cell.leading.real > own.line).any():
             return cell
         whole = self.reduction(family).first([mu]).count(mu, cell.leading)
         if whole.certain and not whole.number:
@@ -372,6 +373,40 @@ def _accurate(reduction: FamilyReduction, points, snapshots: int, count: int):
         if error <= OPTIONS.tolerance:
             break
     return first, fine, error
+
+
+def _corrected(model: ReducedColumn, points, leading: list[np.ndarray]) -> tuple[list[np.ndarray], np.ndarray]:
+    """Leading eigenvalues of a reduced operator, and the points (bool) at which they are accurate.
+
+    The faster the leading modes are, the less the space has of them, since the corrections of its vectors lack the
+    inertia. Those of the fastest are corrected until that changes little; corrections leave their square.
+    """
+    known: dict[int, np.ndarray] = {}
+
+    def change(i) -> np.ndarray:
+        if i not in known:
+            pairs = model.fine.near(points[i], leading[i][: OPTIONS.held])
+            known[i] = model.reduction.correction(pairs, points[i])
+        return known[i]
+
+    def error(i) -> float:
+        return (np.abs(change(i)) / np.maximum(np.abs(leading[i][: OPTIONS.held]), 1.0)).max(initial=0.0)
+
+    found, trusted = list(leading), np.zeros(len(points), bool)
+    if model.error > OPTIONS.tolerance:
+        return found, trusted
+    order = np.argsort([np.abs(row[: OPTIONS.held]).max(initial=0.0) for row in leading])
+    low, high, at = 0, len(points), len(points) - 1
+    while low < high:
+        low, high = (at + 1, high) if error(order[at]) <= OPTIONS.tolerance else (low, at)
+        at = (low + high) // 2
+    trusted[order[:low]] = True
+    for i in order[low:]:
+        listed = leading[i][: OPTIONS.held]
+        exact = listed + change(i)
+        if error(i) <= np.sqrt(OPTIONS.tolerance) and ((exact.real > 0) == (listed.real > 0)).all():
+            found[i], trusted[i] = np.concatenate([exact, leading[i][OPTIONS.held :]]), True
+    return found, trusted
 
 
 def _nobody(family: PencilFamily, mu: Hashable) -> Certificate:

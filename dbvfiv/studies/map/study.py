@@ -63,9 +63,9 @@ def check_cells(
         kept = usable[i].samples[law][cell]
         if kept.is_missing:
             continue
-        spectrum = walk.spectrum(plan.place(usable[i].value, kept.value, plan.laws[law]), 4)
-        leading, true = (complex(v[0]) if len(v) else complex(np.nan) for v in (kept.eigenvalues, spectrum.eigenvalues))
-        error, unstable = abs(leading - true) / max(abs(true), 1.0), spectrum.unstable_count
+        cell = walk.cell(plan.place(usable[i].value, kept.value, plan.laws[law]))
+        leading, true = (complex(v[0]) if len(v) else complex(np.nan) for v in (kept.eigenvalues, cell.leading))
+        error, unstable = abs(leading - true) / max(abs(true), 1.0), cell.certificate.unstable
         x, y = (kept.value, usable[i].value) if plan.transposed else (usable[i].value, kept.value)
         numbers = {"growth_rate": true.real, "frequency": true.imag / (2 * np.pi), "error": float(error)}
         agrees = bool(error <= ACCEPTED and unstable == kept.unstable)

@@ -109,9 +109,13 @@ class Verdict:
         agrees = certain and unstable == counted
         growing = values.real > np.maximum(line, NEUTRAL * np.abs(values))
         high = np.abs(values.imag[growing]) / (2 * np.pi)
-        if unstable > np.where(high > 0, 2, 1)[high <= band].sum():  # the counts tell of more than the band
+        number = np.where(high > 0, 2, 1)
+        if unstable > number[high <= band].sum():  # the counts tell of more than the band
             band = max(band, high.max(initial=0.0))
-        statement = statement or Certificate(unstable, counted, certain, line, band).statement
+        if not statement:
+            statement = Certificate(unstable, counted, certain, line, band).statement
+            if beyond := int(number[high > band].sum()):
+                statement = f"{statement[:-1]}; {beyond} more are listed beyond that band."
         statement = f"{SEALED} {statement}" if sealed else statement
         if not values.size:
             return cls(UNDECIDED, f"No mode was found in the search, which says nothing of the state. {statement}")
