@@ -239,7 +239,8 @@ class Explorer:
         spectrum = self.walk.spectrum(place, self.case.modes.count)
         found = self.walk.sample(place, self.walk.cell(place, spectrum))
         counts, region = (found.unstable, found.counted, found.certain), {"line": found.line, "band": found.band}
-        values = np.asarray(spectrum.eigenvalues)
+        # the count may have pointed to unstable modes beyond the band of the list
+        values = max((spectrum.eigenvalues, found.eigenvalues), key=lambda listed: np.sum(listed.real > 0))
         return Answer(place, state, Verdict.of(values, *counts, **region), values, 0.0, True)
 
     def with_margin(self, answer: Answer) -> Answer:

@@ -9,6 +9,7 @@ import pytest
 
 import dbvfiv
 from dbvfiv.errors import CaseError
+from dbvfiv.studies.case import thesis_case
 from tests.app.server import COARSE as COARSE_SIX
 
 COARSE = {"mesh.around": 6, "mesh.along": 8}
@@ -41,6 +42,16 @@ def test_confirmed_answers_are_those_of_the_command(explorer):
         assert ours[name] == pytest.approx(theirs[name], rel=1e-6), name
     # searched to 1e-4 of itself, so that it depends on what was asked before by a part of that
     assert ours["critical_damping_factor"] == pytest.approx(theirs["critical_damping_factor"], rel=1e-4)
+
+
+def test_an_unstable_mode_far_above_the_list_is_told():
+    """At 489 Hz, where the list of leading modes ends at 113 Hz."""
+    changes = COARSE | {"drive.pressure": 450.0, "damping.beta": 4.64e-4}
+    valve = dbvfiv.load(thesis_case(), changes)
+    answer, modes = valve.explore().confirm(), valve.modes()
+    assert answer.verdict.outcome == modes.verdict.outcome == "flutters"
+    assert answer.verdict.frequency == pytest.approx(modes.verdict.frequency, rel=1e-6)
+    assert answer.verdict.frequency > 400
 
 
 def test_corners_are_prepared(explorer):
