@@ -38,7 +38,9 @@ class CertificateOptions:
     points_beyond : int
         Points of a count over all frequencies where one up to the end of a band can stand in for it.
     distant : int
-        Pairs beyond the band that are looked for at most, and real ones.
+        Oscillating pairs that a list lacks which are looked for at most, and real ones.
+    apart : float
+        Relative distance from which on an eigenvalue on a basis is none of the list.
     steps : int
         Newton steps for one of them, which is known roughly.
     """
@@ -50,6 +52,7 @@ class CertificateOptions:
     distinct: float = 1e-4
     points_beyond: int = 1000
     distant: int = 4
+    apart: float = 0.02
     steps: int = 8
 
 
@@ -114,15 +117,15 @@ class Certificate:
         return text + (f" up to {self.band:.4g} Hz" if np.isfinite(self.band) else "")
 
 
-def distant_pairs(
+def missing_pairs(
     pencil: CoupledPencil,
     spectrum: Spectrum,
     basis: TransferBasis | None,
     line: float,
     options: SearchOptions,
 ) -> Found | None:
-    """Unstable pairs of the full pencil near those that the pencil on a basis has beyond the band of a spectrum, if
-    that was not asked for, and on the real axis, which every band holds; without a basis those of a small pencil.
+    """Unstable pairs of the full pencil near those that the pencil on a basis has and a spectrum lacks: beyond its band
+    too, if that was not asked for, as far as they are resolved; without a basis those of a small pencil.
 
     Each is brought to the full pencil by Newton steps and has to pass the residual test like any other, however far it
     moves on the way: a basis may know it roughly. The fastest growing ones are tried.
@@ -140,11 +143,12 @@ def distant_pairs(
     if spectrum.left_q is not None:
         return None
     values, q, u, _, _ = all_pairs(pencil if basis is None else pencil.projected(basis.V), left=False)
-    unstable = np.flatnonzero(values.real > line)
+    end = 2 * np.pi * (options.whole if options.max_frequency is None else options.max_frequency)
+    apart = np.abs(values[:, None] - spectrum.eigenvalues).min(axis=1, initial=np.inf) > OPTIONS.apart * np.abs(values)
+    unstable = np.flatnonzero((values.real > line) & (values.imag <= end) & apart)
     unstable = unstable[np.argsort(-values.real[unstable])]
-    chosen = list(unstable[values.imag[unstable] == 0][: OPTIONS.distant])
-    if options.max_frequency is None:
-        chosen += list(unstable[values.imag[unstable] > 2 * np.pi * spectrum.band][: OPTIONS.distant])
+    still = values.imag[unstable] == 0
+    chosen = [*unstable[still][: OPTIONS.distant], *unstable[~still][: OPTIONS.distant]]
     starts = [(values[i], q[:, i] if basis is None else basis.V @ q[:, i], u[:, i]) for i in chosen]
     workspace = Workspace()
     pairs = []
@@ -152,7 +156,8 @@ def distant_pairs(
         pair = newton(pencil, *start, workspace=workspace, tolerance=options.tolerance, steps=OPTIONS.steps)
         value, _, _, residual, backward = pair
         known = [abs(value - x) <= SAME * abs(x) for x in (*spectrum.eigenvalues, *(other[0] for other in pairs))]
-        if value.real > line and acceptable(residual, backward, options.tolerance) and not any(known):
+        inside = value.real > line and value.imag <= end
+        if inside and acceptable(residual, backward, options.tolerance) and not any(known):
             pairs.append(pair)
     if not pairs:
         return None
@@ -180,12 +185,14 @@ def joined(spectrum: Spectrum, found: Found, line: float) -> Spectrum:
             f"Motions that grow by {rates} 1/s without oscillating lie far from where modes are searched for; the "
             f"independent count pointed to them."
         )
-    if not real.all():
-        frequencies = ", ".join(f"{value.imag / (2 * np.pi):.4g}" for value in found.values[~real])
-        notes.append(
-            f"Unstable modes at {frequencies} Hz lie beyond the band up to {spectrum.band:.4g} Hz in which the list is "
-            f"complete; the independent count pointed to them."
-        )
+    beyond = found.values.imag > 2 * np.pi * spectrum.band
+    for chosen, where in (
+        (beyond, f"beyond the band up to {spectrum.band:.4g} Hz in which the list is complete"),
+        (~real & ~beyond, "where the search did not reach"),
+    ):
+        if chosen.any():
+            frequencies = ", ".join(f"{value.imag / (2 * np.pi):.4g}" for value in found.values[chosen])
+            notes.append(f"Unstable modes at {frequencies} Hz lie {where}; the independent count pointed to them.")
     return replace(
         spectrum,
         **{name: part[..., order] for name, part in parts.items()},
@@ -292,12 +299,13 @@ def certified_spectrum(
     -------
     CertifiedSpectrum
     """
+    options = options or SearchOptions()
     search = partial(leading_modes, pencil, workspace=workspace or Workspace(), solver=solver)
     spectrum = search(count, options)
     basis = (basis or TransferBasis(pencil)) if pencil.n > dense else None
     asked = pencil, options, search
-    if not whole and options is not None and options.max_frequency is not None and np.isfinite(spectrum.band):
-        found, _ = _judged(*asked, spectrum, basis, within=0.999 * spectrum.band)
+    if not whole and options.max_frequency is not None and np.isfinite(spectrum.band):
+        found, _ = _judged(*asked, spectrum, basis, within=options.inside * spectrum.band)
         if found.agrees:
             return found
     found, basis = _judged(*asked, spectrum, basis)
@@ -327,7 +335,7 @@ def _finer(pencil, basis, found, finer) -> TransferBasis:
 
 def _judged(pencil, options, search, spectrum, basis, finer=0, within=None):
     """A spectrum beside a count, and the basis of the count; both may grow by what the count points to. The count is
-    that of all frequencies, or `within` a band, Hz.
+    that of all that is resolved, or `within` a band, Hz.
     """
     model, scale = pencil, None
     if basis is not None:
@@ -337,7 +345,9 @@ def _judged(pencil, options, search, spectrum, basis, finer=0, within=None):
         # a structure that loses stability by itself has very many modes beyond a band that hardly decay
         beyond = band is None and np.isfinite(spectrum.band) and model is not pencil
         most = {"max_points": OPTIONS.points_beyond} if beyond else {}
-        return unstable_count(model, scale=scale, hints=spectrum.eigenvalues, band=band, **most)
+        end = options.whole if band is None else band
+        end = None if np.isinf(end) else end
+        return unstable_count(model, scale=scale, hints=spectrum.eigenvalues, band=end, **most)
 
     winding = counted(within)
     if (
@@ -349,7 +359,7 @@ def _judged(pencil, options, search, spectrum, basis, finer=0, within=None):
         # all that were asked for are unstable: look at the rest of the unstable ones too
         spectrum = search(winding.number + 2, options)
     if winding.number > listed_unstable(spectrum, winding):
-        distant = distant_pairs(pencil, spectrum, basis, winding.line, options or SearchOptions())
+        distant = missing_pairs(pencil, spectrum, basis, winding.line, options)
         if distant is not None:
             spectrum = joined(spectrum, distant, winding.line)
             if basis is not None:
@@ -359,11 +369,10 @@ def _judged(pencil, options, search, spectrum, basis, finer=0, within=None):
     settled = winding.certain and winding.number == listed_unstable(spectrum, winding)
     if not settled and np.isfinite(spectrum.band):
         # the spectrum, and the basis, speak for a band only; count in the same
-        winding = counted(band=0.999 * spectrum.band)
+        winding = counted(band=options.inside * spectrum.band)
         none_stable = not len(spectrum) or spectrum.growth_rate[-1] > winding.line
         if winding.number > listed_unstable(spectrum, winding) and none_stable:
-            band = SearchOptions() if options is None else options
-            spectrum = search(winding.number + 2, replace(band, max_frequency=spectrum.band))
+            spectrum = search(winding.number + 2, replace(options, max_frequency=spectrum.band))
     listed = listed_unstable(spectrum, winding)
     error = None
     if model is not pencil:

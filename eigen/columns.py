@@ -9,6 +9,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from .certificate import OPTIONS as CERTIFICATES
 from .certificate import Certificate, certified_spectrum
 from .count import Count
 from .factor import SingularShiftError, Workspace
@@ -19,8 +20,6 @@ from .reduction import OPTIONS, FamilyReduction
 from .search import leading_modes
 from .spectrum import Spectrum
 
-#: Relative distance from which on eigenvalues of the reduced and the full operator are not the same.
-APART = 0.02
 #: How a cell was found.
 REDUCED, DIRECT, MISSING = 0, 1, 2
 
@@ -293,27 +292,27 @@ class ColumnSolver:
         found = certified_spectrum(family.at(mu), OPTIONS.searched, family.search(mu), workspace=self.workspace)
         return Cell(found.spectrum.eigenvalues[: OPTIONS.kept], found.certificate, DIRECT)
 
-    def counted_over_all(self, family: PencilFamily, mu: Hashable, cell: Cell) -> Cell:
-        """The cell of a parameter point; where it is stable up to the end of a band above which more is counted, that
-        of the full operator, or one without agreement.
+    def counted_whole(self, family: PencilFamily, mu: Hashable, cell: Cell) -> Cell:
+        """The cell of a parameter point; where it is stable up to the end of a band above which more is counted that is
+        resolved, that of the full operator, or one without agreement.
 
         Raises
         ------
         SingularShiftError
             If the full operator has no usable shift.
         """
-        own = cell.certificate
-        if not own.stable or np.isinf(own.band) or (cell.leading.real > own.line).any():
+        own, end = cell.certificate, family.search(mu).whole
+        if not own.stable or own.band >= end or (cell.leading.real > own.line).any():
             return cell
-        whole = self.reduction(family).first([mu]).count(mu, cell.leading)
+        whole = self.reduction(family).first([mu]).count(mu, cell.leading, None if np.isinf(end) else end)
         if whole.certain and not whole.number:
             return cell
         found = self._anew(family, mu)
         if not found.certificate.stable:
             return found
-        if np.isinf(found.certificate.band):
+        if found.certificate.band >= end:
             return cell
-        return replace(cell, certificate=replace(own, counted=max(whole.number, 1), band=np.inf))
+        return replace(cell, certificate=replace(own, counted=max(whole.number, 1), band=end))
 
 
 def cell_beside(reduction: FamilyReduction, mu: Hashable, error: float, safety: float) -> Cell:
@@ -423,8 +422,10 @@ def _counted(reduced: ReducedFamily, mu: Hashable, leading: np.ndarray, within_b
 
 def _counted_band(family: PencilFamily, mu: Hashable, within_band: bool = False) -> float:
     """Frequency up to which eigenvalues are counted, Hz."""
-    whole = family.relaxation(mu) is not None and not within_band
-    return np.inf if whole else OPTIONS.inside * family.reach(mu).band / (2 * np.pi)
+    options = family.search(mu)
+    if options.max_frequency is None or (family.relaxation(mu) is not None and not within_band):
+        return options.whole
+    return options.inside * options.max_frequency
 
 
 def _beside_changes(leading) -> np.ndarray:
@@ -447,7 +448,8 @@ def _lacks(searched: np.ndarray, listed: np.ndarray, error: float) -> bool:
     with the full operator, which ends at a band, has none there.
     """
     near = listed[listed.real > -2.0 * error * np.abs(listed)]
-    return bool((np.abs(near[:, None] - searched).min(axis=1, initial=np.inf) > APART * np.abs(near)).any())
+    apart = np.abs(near[:, None] - searched).min(axis=1, initial=np.inf)
+    return bool((apart > CERTIFICATES.apart * np.abs(near)).any())
 
 
 def _unstable(values: np.ndarray, line: float, band: float) -> int:

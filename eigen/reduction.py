@@ -55,8 +55,6 @@ class ReductionOptions:
         Directions weaker than these are left out of the space of a count: at first, and where counts disagree.
     beside : int
         Leading modes that are found and corrected beside another operator.
-    inside : float
-        Share of a band up to which eigenvalues are counted, clear of those at its end.
     searched, kept : int
         Leading modes searched for with the full operator, and kept of a cell.
     """
@@ -77,7 +75,6 @@ class ReductionOptions:
     joint: float = 3e-3
     close: float = 1e-5
     beside: int = 6
-    inside: float = 0.999
     searched: int = 6
     kept: int = 8
 

@@ -166,15 +166,15 @@ def next_shift(pencil, found, aim, options, workspace) -> complex:
         if options.max_frequency is None:
             return closer
         return min(closer, first_shift(pencil, aim, replace(options, max_frequency=None), workspace))
+    if options.max_frequency is not None and len(found.shifts) == 1:
+        natural = first_shift(pencil, aim, replace(options, max_frequency=None), workspace)
+        if natural < 0.75 * 2 * np.pi * options.max_frequency:
+            return natural
     if options.limit_point is not None:  # a larger disc hugs the line through the limit point
         last, needed = max(abs(s) for s in found.shifts), holding_shift(options, leading_band(found, aim, options)[0])
         if not needed:
             return 3.0 * last
         return float(np.clip(1.25 * needed, 1.25 * last, 2.0 * last))
-    if options.max_frequency is not None and len(found.shifts) == 1:
-        natural = first_shift(pencil, aim, replace(options, max_frequency=None), workspace)
-        if natural < 0.75 * 2 * np.pi * options.max_frequency:
-            return natural
     if options.max_frequency is not None:
         band = 2 * np.pi * options.max_frequency
     else:

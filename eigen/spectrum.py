@@ -45,6 +45,11 @@ class SearchOptions:
         searched does not depend on small differences in the number asked for.
     max_shifts : int
         Automatic shifts at most.
+    resolved : float
+        Hz, up to which the pencil stands for what it is made of, such as the waves of a line of elements; eigenvalues
+        above it say nothing and are not counted.
+    inside : float
+        Share of a band, or of what is resolved, up to which eigenvalues are counted, clear of those at its end.
     """
 
     max_frequency: float | None = None
@@ -56,6 +61,13 @@ class SearchOptions:
     dense_below: int = 240
     least: int = 6
     max_shifts: int = 4
+    resolved: float = math.inf
+    inside: float = 0.999
+
+    @property
+    def whole(self) -> float:
+        """Frequency, Hz, up to which a count says all; infinite where everything is resolved."""
+        return self.inside * self.resolved
 
     def __post_init__(self):
         if self.max_frequency is not None and not self.max_frequency > 0:

@@ -140,6 +140,8 @@ def select_search(
     -333.3333333333333
     """
     found = _select(options, mu, structural_frequencies, count)
+    if resolved >= min(found.claimed, found.band):  # what is wanted is resolved, and nothing above the waves that are
+        found = replace(found, options=replace(found.options, resolved=resolved))
     if found.band > resolved:
         found = replace(found, options=replace(found.options, max_frequency=resolved), origin=BandOrigin.LINE)
     return replace(found, claimed=min(found.claimed, found.band, resolved))

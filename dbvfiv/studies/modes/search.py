@@ -18,6 +18,7 @@ from eigen.spectrum import SearchOptions, Spectrum
 from ...case.parameters import PARAMETERS, Mu
 from ...errors import CaseError
 from ...model.equilibria import require_equilibrium
+from ...model.leading import LeadingSearch
 from ...model.state import SteadyState
 from ...model.symmetry import EQUILIBRIA, SYMMETRIES, Symmetry, symmetry_named
 from ...model.valve import GRAZING, ValveModel
@@ -398,7 +399,7 @@ def run_modes(
     if symmetry.of_equilibria and not (model.mesh.part.is_quarter or in_vacuo):
         notes = (*notes, _NO_PLUG)
     searched = family.is_searched(certified.spectrum.eigenvalues, place, search.band)
-    verdict = _verdict(certified, searched, search.claimed, linear.seal is not None)
+    verdict = _verdict(certified, searched, search, linear.seal is not None)
     modes = _shapes(model, pencil, linear, certified.spectrum, symmetry, in_vacuo)
     grazing = _one_sided(model, state, pencil, asked, options.count) if symmetry.of_equilibria else {}
     notes = (*notes, *_contact_notes(model, state, linear, modes, symmetry), *_grazing_notes(model, grazing))
@@ -447,7 +448,7 @@ def _grazing_notes(model, grazing: dict[str, Any]) -> list[str]:
     return [f"Grazing: {faces} within {within:.2g} um of parting or meeting; the first mode has {', '.join(said)}."]
 
 
-def _verdict(found: CertifiedSpectrum, searched: np.ndarray, claimed: float, sealed: bool) -> Verdict:
+def _verdict(found: CertifiedSpectrum, searched: np.ndarray, search: LeadingSearch, sealed: bool) -> Verdict:
     """Verdict from the modes in the region that every study searches, up to the frequency that is claimed."""
     count = found.count
     verdict = Verdict.of(
@@ -456,11 +457,11 @@ def _verdict(found: CertifiedSpectrum, searched: np.ndarray, claimed: float, sea
         found.unstable_count_independent,
         found.certificate.certain,
         line=count.line,
-        band=min(count.band, claimed),
+        band=min(count.band, search.claimed),
         statement="" if found.agrees else found.statement,
         sealed=sealed,
     )
-    if np.isinf(count.band) or verdict.outcome != STABLE:
+    if count.band >= search.options.whole or verdict.outcome != STABLE:
         return verdict
     beyond = " Above that the count finds more: modes may be unstable there; modes.max_frequency moves the end."
     return replace(verdict, outcome=UNDECIDED, reason=verdict.reason + beyond)

@@ -517,7 +517,7 @@ class StabilityWalk:
             return Sample(value, refusal=refusal)
         family = self.family(place)
         with name_state_in_failures(place.pressure):
-            cell = self.built(place).solver.counted_over_all(family, place, cell)
+            cell = self.built(place).solver.counted_whole(family, place, cell)
         return Sample.of(value, cell, family.leading(place).claimed, family.linear.seal is not None)
 
     def verdict(self, place: Mu, spectrum=None) -> Verdict:
