@@ -65,13 +65,17 @@ class LeadingSearch:
         return -np.inf if self.options.limit_point is None else CLEAR * self.options.limit_point
 
     @property
+    def end_key(self) -> str:
+        """Key of the case that moves the end of the band."""
+        return "upstream.elements or mesh.along" if self.origin is BandOrigin.LINE else "modes.max_frequency"
+
+    @property
     def note(self) -> str | None:
         """Sentence on the origin and limits of the band, for the reader of a result; None where it needs none."""
         if self.origin is BandOrigin.LINE:
             return (
                 f"The elements of the line, or the rows of the mesh in a fluid that is compressed, resolve waves up to "
-                f"{self.band:.4g} Hz, so the search covers the band up to there; upstream.elements or mesh.along moves "
-                "its end."
+                f"{self.band:.4g} Hz, so the search covers the band up to there; {self.end_key} moves its end."
             )
         if self.origin is not BandOrigin.STRUCTURE:
             return None

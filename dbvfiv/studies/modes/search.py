@@ -463,7 +463,7 @@ def _verdict(found: CertifiedSpectrum, searched: np.ndarray, search: LeadingSear
     )
     if count.band >= search.options.whole or verdict.outcome != STABLE:
         return verdict
-    beyond = " Above that the count finds more: modes may be unstable there; modes.max_frequency moves the end."
+    beyond = f" Above that the count finds more: modes may be unstable there; {search.end_key} moves the end."
     return replace(verdict, outcome=UNDECIDED, reason=verdict.reason + beyond)
 
 
