@@ -156,7 +156,8 @@ class _Walk:
 
     def __init__(self, determinant, max_points, band=None):
         self.f, self.max_points = determinant, max_points
-        self.turn = np.inf if band is None else 2 * np.pi * band
+        self.band = np.inf if band is None else float(band)
+        self.turn = 2 * np.pi * self.band
         self.values: dict[float, complex] = {}
         self.known: list[float] = []
         self.notes: list[str] = []
@@ -303,7 +304,7 @@ class _Walk:
             number=number,
             certain=certain,
             line=self.f.line,
-            band=self.turn / (2 * np.pi),
+            band=self.band,
             distance=distance,
             frequencies=omegas / (2 * np.pi),
             phase=phase,

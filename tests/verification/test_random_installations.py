@@ -165,6 +165,15 @@ def test_a_short_line_resolves_waves_far_above_the_modes(beta):
     assert modes.verdict.outcome == sample.verdict.outcome and modes.verdict.certain
 
 
+def test_a_wall_with_loss_factors_is_counted_as_far_as_waves_are_resolved():
+    keys = {"damping.model": "loss factor", "damping.loss_factor": 1.374, "materials.constants": "stable"}
+    keys |= {"fluid.density": 370.6, "drive.pressure": 1853.8, "fluid.continuity": "storage"}
+    line = {"length": 0.844, "diameter": 0.5124, "wave_speed": 419.054, "elements": 4}
+    valve = dbvfiv.load(thesis_case(), MESH | keys | {f"upstream.{name}": value for name, value in line.items()})
+    modes, walk = valve.modes(count=6), StabilityWalk(valve.case, model=valve.model)
+    assert modes.verdict.outcome == walk.verdict(Mu.of(valve.case)).outcome == "stable" and modes.verdict.certain
+
+
 @pytest.mark.slow
 @pytest.mark.random
 @pytest.mark.parametrize("seed", range(2))
