@@ -380,7 +380,7 @@ def _corrected(model: ReducedColumn, points, leading: list[np.ndarray]) -> tuple
     The faster the leading modes are, the less the space has of them, since the corrections of its vectors lack the
     inertia. Those of the fastest are corrected until that changes little; corrections leave their square.
     """
-    known: dict[int, np.ndarray] = {}
+    known = {i: np.zeros(0) for i, row in enumerate(leading) if not len(row)}
 
     def change(i) -> np.ndarray:
         if i not in known:
