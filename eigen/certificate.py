@@ -110,6 +110,10 @@ class Certificate:
             return f"{listed} are listed; the independent count ({self.counted}) is uncertain."
         return f"{listed} are listed, the independent count finds {self.counted}: they disagree."
 
+    def beside(self, beyond: int) -> str:
+        """Statement with the number of unstable eigenvalues that are listed beyond the band."""
+        return f"{self.statement[:-1]}; {beyond} more are listed beyond that band." if beyond else self.statement
+
     @property
     def where(self) -> str:
         """The region in words, empty for the whole right half-plane."""
@@ -255,9 +259,9 @@ class CertifiedSpectrum:
     @property
     def statement(self) -> str:
         """The verdict in a sentence."""
-        said, beyond = self.certificate.statement, self.spectrum.count_right_of(self.count.line) - self.unstable_count
+        said = self.certificate.statement
         if self.agrees:
-            return said if not beyond else f"{said[:-1]}; {beyond} more are listed beyond that band."
+            return self.certificate.beside(self.spectrum.count_right_of(self.count.line) - self.unstable_count)
         if not self.count.certain:
             return f"{said} {' '.join(self.count.notes)}"
         if not self.certificate.certain:
@@ -346,7 +350,6 @@ def _judged(pencil, options, search, spectrum, basis, finer=0, within=None):
         beyond = band is None and np.isfinite(spectrum.band) and model is not pencil
         most = {"max_points": OPTIONS.points_beyond} if beyond else {}
         end = options.whole if band is None else band
-        end = None if np.isinf(end) else end
         return unstable_count(model, scale=scale, hints=spectrum.eigenvalues, band=end, **most)
 
     winding = counted(within)

@@ -81,9 +81,9 @@ class ReducedColumn:
         """Eigenvalue next to a place."""
         return complex(self.fine.near(mu, [place]).values[0])
 
-    def corrected(self, mu: Hashable, value: complex) -> complex:
-        """Newton's correction of an eigenvalue by the full matrices."""
-        return complex(self.reduction.correction(self.fine.near(mu, [value]), mu)[0])
+    def corrected(self, mu: Hashable, values: Sequence[complex]) -> np.ndarray:
+        """Newton's corrections (k,) of eigenvalues by the full matrices."""
+        return self.reduction.correction(self.fine.near(mu, values), mu)
 
     def exact(self, mu: Hashable, value: complex) -> complex:
         """Eigenvalue of the full matrices next to one of this model, by inverse iteration with them; NaN where that
@@ -304,7 +304,7 @@ class ColumnSolver:
         own, end = cell.certificate, family.search(mu).whole
         if not own.stable or own.band >= end or (cell.leading.real > own.line).any():
             return cell
-        whole = self.reduction(family).first([mu]).count(mu, cell.leading, None if np.isinf(end) else end)
+        whole = self.reduction(family).first([mu]).count(mu, cell.leading, end)
         if whole.certain and not whole.number:
             return cell
         found = self._anew(family, mu)
@@ -384,8 +384,7 @@ def _corrected(model: ReducedColumn, points, leading: list[np.ndarray]) -> tuple
 
     def change(i) -> np.ndarray:
         if i not in known:
-            pairs = model.fine.near(points[i], leading[i][: OPTIONS.held])
-            known[i] = model.reduction.correction(pairs, points[i])
+            known[i] = model.corrected(points[i], leading[i][: OPTIONS.held])
         return known[i]
 
     def error(i) -> float:
@@ -417,7 +416,7 @@ def _counted(reduced: ReducedFamily, mu: Hashable, leading: np.ndarray, within_b
     """Count of unstable eigenvalues: in the band, or of a viscoelastic wall, which damps all, over all frequencies."""
     band = _counted_band(reduced.family, mu, within_band)
     number = max(2, int((leading.real > 0).sum()) + 1)
-    return reduced.count(mu, leading[:number], None if np.isinf(band) else band)
+    return reduced.count(mu, leading[:number], band)
 
 
 def _counted_band(family: PencilFamily, mu: Hashable, within_band: bool = False) -> float:

@@ -90,7 +90,7 @@ def unstable_count(
     pencil: CoupledPencil,
     *,
     line: float | None = None,
-    band: float | None = None,
+    band: float = np.inf,
     hints=(),
     scale: float | None = None,
     max_points: int = OPTIONS.points,
@@ -110,7 +110,7 @@ def unstable_count(
     line : float, optional
         Growth rate, 1/s. Default 0; for a structure without any damping, whose eigenvalues
         may lie on the imaginary axis, a small positive value, which `Count.line` reports.
-    band : float, optional
+    band : float
         Hz. Count only eigenvalues up to this frequency: the path turns off to the right there.
         For structures with hardly any damping, or a pencil that is only good up to there.
     hints : iterable of complex
@@ -154,9 +154,9 @@ def unstable_count(
 class _Walk:
     """The phase along the line, refined until neighbours are close."""
 
-    def __init__(self, determinant, max_points, band=None):
+    def __init__(self, determinant, max_points, band):
         self.f, self.max_points = determinant, max_points
-        self.band = np.inf if band is None else float(band)
+        self.band = float(band)
         self.turn = 2 * np.pi * self.band
         self.values: dict[float, complex] = {}
         self.known: list[float] = []

@@ -229,7 +229,7 @@ class ReducedFamily(PencilFamily):
         """Leading eigenvalues, sorted by growth rate."""
         return self.reach(mu).leading(self.eigenvalues(mu))
 
-    def count(self, mu: Hashable, hints=(), band: float | None = None) -> Count:
+    def count(self, mu: Hashable, hints=(), band: float = np.inf) -> Count:
         """Count of unstable eigenvalues, up to a band in Hz; its coupling is condensed to the patterns that matter."""
         key = self.structure(mu)
         if key not in self._condensed:

@@ -103,7 +103,7 @@ class OnsetCorrection:
         found = self._small(value, near)
         if found is None:
             return None
-        size, change = max(abs(found), 1.0), self.model.corrected(self.place(value), found)
+        size, change = max(abs(found), 1.0), complex(self.model.corrected(self.place(value), [found])[0])
         if abs(change) > ACCURATE * size:  # one correction leaves up to a fifth of what it changes
             change = self.model.exact(self.place(value), found) - found
         return found + change if abs(change) < SAME * size else None

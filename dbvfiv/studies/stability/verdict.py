@@ -113,9 +113,7 @@ class Verdict:
         if unstable > number[high <= band].sum():  # the counts tell of more than the band
             band = max(band, high.max(initial=0.0))
         if not statement:
-            statement = Certificate(unstable, counted, certain, line, band).statement
-            if beyond := int(number[high > band].sum()):
-                statement = f"{statement[:-1]}; {beyond} more are listed beyond that band."
+            statement = Certificate(unstable, counted, certain, line, band).beside(int(number[high > band].sum()))
         statement = f"{SEALED} {statement}" if sealed else statement
         if not values.size:
             return cls(UNDECIDED, f"No mode was found in the search, which says nothing of the state. {statement}")

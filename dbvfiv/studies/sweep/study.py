@@ -125,7 +125,7 @@ class Tracking:
         """Largest relative correction, by the full matrices, of the leading eigenvalues of the reduced-order model."""
         mu, model = self.line.place(value), self.line.column.model
         leading = model.eigenvalues(mu)[: self.options.count]
-        return max((abs(model.corrected(mu, x)) / max(abs(x), 1.0) for x in leading), default=0.0)
+        return max((abs(model.corrected(mu, [x])[0]) / max(abs(x), 1.0) for x in leading), default=0.0)
 
     @property
     def is_reduced(self) -> bool:

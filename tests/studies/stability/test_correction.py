@@ -25,7 +25,9 @@ def corrected_by(values, shift=SMALL - EXACT):
 
     change = complex(3.0 * shift, 0.0)
     column = SimpleNamespace(
-        nearest=nearest, corrected=lambda condition, found: change, exact=lambda condition, found: found + change
+        nearest=nearest,
+        corrected=lambda condition, values: np.full(len(values), change),
+        exact=lambda condition, found: found + change,
     )
     return OnsetCorrection(column, lambda value: value, lambda value: pair(value, EXACT))
 
