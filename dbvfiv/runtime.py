@@ -145,6 +145,21 @@ def _processor() -> str:
         return ""
 
 
+def free_programs() -> None:
+    """Drop the programs that JAX holds where they fill half the memory maps that Linux grants a process.
+
+    A valve of another structure compiles programs of its own, of some hundreds of maps; where no map is left, the
+    process ends without a word.
+    """
+    try:
+        granted = int(Path("/proc/sys/vm/max_map_count").read_text(encoding="ascii"))
+        held = Path("/proc/self/maps").read_bytes().count(b"\n")
+    except (OSError, ValueError):
+        return
+    if held > granted // 2 and "jax" in sys.modules:
+        sys.modules["jax"].clear_caches()
+
+
 def mpi_size() -> int:
     """Processes started by ``mpiexec``, 1 without it."""
     for name in ("OMPI_COMM_WORLD_SIZE", "PMI_SIZE", "MPI_LOCALNRANKS"):

@@ -1,4 +1,4 @@
-"""Short texts of objects that hold arrays and other objects: what `repr` shows of them."""
+"""Short texts: numbers in sentences, and what `repr` shows of objects that hold arrays and other objects."""
 
 from __future__ import annotations
 
@@ -10,6 +10,18 @@ from typing import Any
 
 #: Lines of a text, columns of a line, characters of one value.
 LINES, COLUMNS, VALUE = 10, 118, 60
+
+
+def digits(value: float, count: int = 3, sign: str = "") -> str:
+    """Significant digits of a number, a large one without a power of ten; sign "+" shows that of a positive one too.
+
+    Examples
+    --------
+    >>> digits(99.7, 2), digits(1234.5, sign="+"), digits(0.01234, 2)
+    ('100', '+1230', '0.012')
+    """
+    shown = float(f"{value:.{count}g}")
+    return f"{shown:{sign}.0f}" if 10.0 ** (count - 1) <= abs(shown) < 1e9 else f"{shown:{sign}.{count}g}"
 
 
 def short_repr(thing: Any) -> str:

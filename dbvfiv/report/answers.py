@@ -14,6 +14,7 @@ import numpy as np
 
 from ..materials.shipped import shipped_loss, shipped_loss_names
 from ..studies.closure.safety import BUCKLING, CROSSING, END, SEAL, rated_verdict
+from ..texts import digits
 from .gather import Gathered, second_mesh
 
 YES, NO, UNKNOWN = "yes", "no", "not examined"
@@ -114,7 +115,7 @@ def chatters(found: Gathered) -> Answer:
         kind = "flutters" if worst.outcome == "flutters" else "diverges, without oscillating,"
         text = f"It {kind} at {listed(units.pressure(p, 3) for p in bad)}"
         swings = [verdicts[p].frequency for p in bad if verdicts[p].frequency > 0]
-        ends = dict.fromkeys(f"{end(swings):.3g}" for end in (min, max)) if swings else ()
+        ends = dict.fromkeys(digits(end(swings)) for end in (min, max)) if swings else ()
         text += f", at {' to '.join(ends)} Hz" if ends else ""
         return Answer(question, YES, f"{text}. {_onsets(found)}".strip(), _factor(verdicts), _sure(found, verdicts))
     if unknown:
@@ -125,7 +126,7 @@ def chatters(found: Gathered) -> Answer:
     least = min(verdicts.values(), key=lambda v: v.damping_ratio)
     text = (
         f"Stable at all {len(verdicts)} heads in every symmetry class; the least damped mode has a damping ratio of "
-        f"{100 * least.damping_ratio:.2g} %, at {units.pressure(found.worst, 3)}."
+        f"{digits(100 * least.damping_ratio, 2)} %, at {units.pressure(found.worst, 3)}."
     )
     return Answer(question, NO, text, _factor(verdicts), _sure(found, verdicts))
 
@@ -142,7 +143,7 @@ def _onsets(found: Gathered) -> str:
     for point in (p for p in onset.points if p["edge"]):
         sure = "" if not point["uncertainty"] else f" ± {units.pressure(point['uncertainty'], 1)} (second mesh)"
         word = "begins" if point["gains"] else "ends"
-        said.append(f"{word} at {units.pressure(point['value'], 3)}{sure}, {point['frequency']:.3g} Hz")
+        said.append(f"{word} at {units.pressure(point['value'], 3)}{sure}, {digits(point['frequency'])} Hz")
     return f"Chatter {listed(said)}." if said else ""
 
 
@@ -150,9 +151,9 @@ def _factor(verdicts: dict) -> str:
     """Margin in damping: the factor on the damping of the wall at which the verdict changes, at the worst head."""
     factors = [v.critical_damping_factor for v in verdicts.values() if np.isfinite(v.critical_damping_factor)]
     if any(v.stable is False for v in verdicts.values()):
-        return f"quiet with {max(factors):.2g} times the damping" if factors else "no damping in reach quiets it"
+        return f"quiet with {digits(max(factors), 2)} times the damping" if factors else "no damping in reach quiets it"
     return (
-        f"chatter begins at {max(factors):.2g} times the damping"
+        f"chatter begins at {digits(max(factors), 2)} times the damping"
         if factors
         else "lips stable down to 0.05 times the damping"
     )
@@ -166,8 +167,8 @@ def _sure(found: Gathered, verdicts: dict) -> tuple[str, ...]:
     if other is None:
         said.append(_not_there(found, "mesh", "mesh"))
     else:
-        ratios = f"damping ratio {100 * other.verdict.damping_ratio:.2g} against {100 * own.damping_ratio:.2g} %"
-        said.append(f"second mesh ({_mesh(found)}): {_verdict(other.verdict)}, {ratios}")
+        theirs, ours = (digits(100 * found.damping_ratio, 2) for found in (other.verdict, own))
+        said.append(f"second mesh ({_mesh(found)}): {_verdict(other.verdict)}, damping ratio {theirs} against {ours} %")
     spread = loss_range(found.case)
     factors = [v.critical_damping_factor for v in verdicts.values() if np.isfinite(v.critical_damping_factor)]
     if spread is not None:
@@ -206,9 +207,9 @@ def _chance(found: Gathered) -> str | None:
     if not known:
         return "probability of chatter: no sample was decided"
     most = max(known, key=lambda point: point["probability"])
-    low, high = (100 * end for end in most["interval"])
+    chance, low, high = (digits(100 * x, 2) for x in (most["probability"], *most["interval"]))
     at = found.case.units.parameter(result.parameter).text(most["value"])
-    return f"probability of chatter at {at}: {100 * most['probability']:.2g} % ({low:.2g} to {high:.2g} %)"
+    return f"probability of chatter at {at}: {chance} % ({low} to {high} %)"
 
 
 def loss_range(case) -> tuple[float, float] | None:
@@ -256,7 +257,7 @@ def seals(found: Gathered) -> Answer:
         )
         return Answer(question, UNKNOWN, why)
     still = " at most, as fluid.viscosity is none" if told["leak"] and not case.fluid.dynamic_viscosity else ""
-    text = f"{_seal(told).capitalize()}, leak {plain(told['leak'] * 3.6e6)} L/h{still}."
+    text = f"{_seal(told).capitalize()}, leak {digits(told['leak'] * 3.6e6)} L/h{still}."
     return Answer(question, YES if told["sealed"] else NO, text, _margin(result), _closure_mesh(found))
 
 
@@ -299,7 +300,7 @@ def _closure_mesh(found: Gathered) -> tuple[str, ...]:
     if other is None or other.safety is None:
         return (_not_there(found, "mesh", "mesh"),)
     told = rated_verdict(other)
-    seal = f"{_seal(told)}, leak {plain(told['leak'] * 3.6e6, 2)} L/h, " if told and told["sealed"] is not None else ""
+    seal = f"{_seal(told)}, leak {digits(told['leak'] * 3.6e6, 2)} L/h, " if told and told["sealed"] is not None else ""
     return (f"second mesh ({_mesh(found)}): {seal}{_margin(other)}",)
 
 
@@ -324,15 +325,9 @@ def trade(found: Gathered) -> list[tuple[str, str]]:
     if case.closure.rated_pressure is not None:
         rows += [("rated back pressure", units.pressure(case.closure.rated_pressure, 4))]
         told = None if found.get("closure") is None else rated_verdict(found.get("closure"))
-        leak = "not examined" if told is None or told["leak"] is None else f"{plain(told['leak'] * 3.6e6)} L/h"
+        leak = "not examined" if told is None or told["leak"] is None else f"{digits(told['leak'] * 3.6e6)} L/h"
         rows += [("leak rate there", leak)]
     return rows
-
-
-def plain(value: float, digits: int = 3) -> str:
-    """Digits of a number, a large one without a power of ten."""
-    shown = float(f"{value:.{digits}g}")
-    return f"{shown:.0f}" if 10.0 ** (digits - 1) <= abs(shown) < 1e9 else f"{shown:.{digits}g}"
 
 
 def listed(words: Iterable[str]) -> str:
@@ -347,7 +342,9 @@ def _verdict(verdict) -> str:
 
 def _apart(value: float, base: float) -> str:
     apart = 100 * (value / base - 1) if base else np.nan
-    return "not known" if np.isnan(apart) else f"{apart:+.2g} %" if abs(apart) >= 0.01 else "less than 0.01 %"
+    return (
+        "not known" if np.isnan(apart) else f"{digits(apart, 2, '+')} %" if abs(apart) >= 0.01 else "less than 0.01 %"
+    )
 
 
 def _mesh(found: Gathered) -> str:

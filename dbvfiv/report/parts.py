@@ -20,7 +20,8 @@ from ..fit.cards import describe_damping, law_from_case
 from ..materials.stability import StableRange, stable_range
 from ..model.symmetry import symmetry_named
 from ..record.mesh import MeshData
-from .answers import listed, loss_range, plain
+from ..texts import digits
+from .answers import listed, loss_range
 from .figures import closure_figure, headloss_figure, live_valve, pipe_figure, vibration_figure
 from .gather import Gathered, is_on_own_mesh
 
@@ -158,8 +159,8 @@ def steady_part(found: Gathered) -> Part:
         shown = [f"{value / units.factor(name):.{n}g}" for name, value, n in values]
         if h is None:
             return (*shown, *["-"] * (len(head) - len(shown)))
-        loss = (f"{h.line_loss / units.factor('head'):.3g}",) if found.case.has_line else ()
-        return (*shown, *map(plain, (h.loss_coefficient, h.kv, h.cv)), *loss)
+        loss = (digits(h.line_loss / units.factor("head")),) if found.case.has_line else ()
+        return (*shown, *map(digits, (h.loss_coefficient, h.kv, h.cv)), *loss)
 
     worst = max(s.residual for s in result.states)
     trust = (
@@ -272,7 +273,7 @@ def pipe_part(found: Gathered) -> Part | None:
     lengths = list(next(iter(sweeps.values())).values)
     head = (f"{_pressure_title(found)}", *(f"pipe of {length:.3g} m" for length in lengths))
     rows = tuple(
-        (units.pressure(p, 3), *(f"{v.outcome}, {100 * v.damping_ratio:.2g} %" for v in r.verdicts))
+        (units.pressure(p, 3), *(f"{v.outcome}, {digits(100 * v.damping_ratio, 2)} %" for v in r.verdicts))
         for p, r in sweeps.items()
     )
     caption = "Least damping ratio over the length of the pipe."
@@ -300,7 +301,7 @@ def chance_part(found: Gathered) -> Part | None:
         "not valid, %",
         "undecided",
     )
-    percent = lambda value: "-" if value is None else f"{100 * value:.2g}"  # noqa: E731
+    percent = lambda value: "-" if value is None else digits(100 * value, 2)  # noqa: E731
     rows = tuple(
         (
             f"{p['value'] / row.scale:.4g}",
@@ -371,8 +372,8 @@ def closure_part(found: Gathered) -> Part:
             f"{s.pressure / units.factor('pressure'):.4g}" + (" (beyond the limit)" if s.beyond_limit else ""),
             "yes" if s.closed else "no",
             f"{s.sealed_length / units.factor('size'):.3g}",
-            plain(s.leak * 3.6e6),
-            plain(s.contact_force),
+            digits(s.leak * 3.6e6),
+            digits(s.contact_force),
             f"{s.max_displacement / units.factor('size'):.3g}",
         )
         for s in sorted(result.states, key=lambda s: s.pressure)

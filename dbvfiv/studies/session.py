@@ -29,6 +29,7 @@ from ..record.files import Header, check_writable, kind_of
 from ..record.mesh import MeshData
 from ..record.record import GrowingRecord, Record, StoredRecord
 from ..record.table import Column, TableSpec, printed_head, printed_row
+from ..runtime import free_programs
 from . import KINDS
 from .case import Case, oddities, require_consistent
 
@@ -201,6 +202,7 @@ class Session:
         CaseError
             If the case gives no model, or asks for a pressure that no wall like it bears.
         """
+        free_programs()
         model = _attempt(lambda: ValveModel(self.case))
         for name, pressure in zip(("drive.pressure", "closure.rated_pressure"), self.case.straining_pressures()):
             if pressure and (strain := hoop_strain(model, pressure)) > HIGHEST_LEVEL:

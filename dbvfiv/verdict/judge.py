@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from ..texts import digits
 from .lines import PEAK
 from .series import (
     Cycles,
@@ -248,9 +249,9 @@ def within_noise(series: Series, options: JudgeOptions, residual: float | None, 
     facts = at_end | {"mean": level, "rms": rms, "noise": rms}
     share = rms / abs(level) if level else np.inf
     if rms <= options.noise * abs(level):
-        words = f"It is constant within noise of {rms:.3g} (root mean square, {100 * share:.2g} % of its level)."
+        words = f"It is constant within noise of {rms:.3g} (root mean square, {digits(100 * share, 2)} % of its level)."
         return Verdict("steady", True, words, **facts)
-    size = f"{100 * share:.3g} % of its level" if share < 10 else f"its level is {level:.2g}"
+    size = f"{digits(100 * share)} % of its level" if share < 10 else f"its level is {level:.2g}"
     words = f"It is noise of {rms:.3g} (root mean square, {size}) without a period: too much to call it steady."
     return Verdict("irregular", True, words, **facts)
 
@@ -421,13 +422,13 @@ def _name(
         return _growth(cycles, recent, facts, direction, options)
     enough = (1.5 if error > options.noisy else 4.0) * options.cycles  # swings without a return
     if count < options.cycles and noisy and swings(series) >= enough:
-        return irregular(f"After {swings(series)} swings it still repeats within {100 * error:.2g} % only.")
+        return irregular(f"After {swings(series)} swings it still repeats within {digits(100 * error, 2)} % only.")
     if count < options.cycles:
         return undecided(f"Only {count} cycles have been seen and {options.cycles} are needed.")
     if error > options.noisy:
         return irregular(f"Nothing repeats: the periodicity error is {error:.2g}.")
     if noisy and not _noise_on_cycle(cycles, options):
-        return irregular(f"Cycles differ from one to the next by {100 * error:.2g} %, and not by noise.")
+        return irregular(f"Cycles differ from one to the next by {digits(100 * error, 2)} %, and not by noise.")
     band = max(options.band, 6.0 * trend_of(recent.spread).scatter) if noisy else options.band
     if comes_and_goes(cycles.spread[-max(options.cycles, 3 * count // 4) :], band if noisy else 0.5 * options.band):
         return irregular("The amplitude comes and goes: beats.")
@@ -438,20 +439,20 @@ def _name(
         return undecided("The amplitude still settles.")
     pace = trend_of(cycles.pace()) if count > 6 else None
     if pace is not None and pace.significant and abs(pace.change) > options.drift:
-        return undecided(f"The period still changes by {100 * pace.slope:+.2g} % a cycle.")
+        return undecided(f"The period still changes by {digits(100 * pace.slope, 2, '+')} % a cycle.")
     means = cycles.last(options.cycles).mean
     if np.ptp(means) > max(10 * options.drift, (1.5 if noisy else 0.5) * error) * recent.spread.mean():
         if trend_of(np.exp((means - means.mean()) / np.ptp(means))).significant:
             return undecided("The mean of the cycles still moves.")
         return irregular("The mean of the cycles comes and goes.")
-    words = f"{still} cycles of equal amplitude, repeating within {100 * error:.2g} %"
+    words = f"{still} cycles of equal amplitude, repeating within {digits(100 * error, 2)} %"
     return Verdict("limit cycle", True, words + (", the difference being noise." if noisy else "."), **facts)
 
 
 def _growth(cycles: Cycles, recent: Cycles, facts: dict, direction: str, options: JudgeOptions) -> Verdict:
     """Verdict on cycles whose amplitude grows or decays."""
     count = len(cycles)
-    words = f"The amplitude changes by {100 * facts['amplitude_trend']:+.2g} % a cycle"
+    words = f"The amplitude changes by {digits(100 * facts['amplitude_trend'], 2, '+')} % a cycle"
     if comes_and_goes(cycles.spread, 2.5 * options.band):
         return Verdict("irregular", count >= 2 * options.cycles, words + " after having come and gone before.", **facts)
     if _slackens(recent.spread):

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from scipy.optimize import minimize
 
+from ..texts import digits
 from .judge import FILLED, JudgeOptions, Verdict, judge
 from .lines import (
     LEVEL,
@@ -413,11 +414,11 @@ def _rung(line: Line, part: Series, found: Fit) -> Motion:
     noise = float(np.sqrt(floor.sum() / part.duration))
     change = line.rate * part.duration
     if change > 0:
-        words = f"The amplitude grows by {100 * line.rate / line.frequency:.2g} % a cycle."
+        words = f"The amplitude grows by {digits(100 * line.rate / line.frequency, 2)} % a cycle."
         return Motion("growing", words, (line,), start=part.start, noise=noise)
     end = float(np.exp(change))
     died = ", to its end" if end < _DIED or (end * line.amplitude < noise and end < 0.3) else ""
-    words = f"It rings down by {-100 * line.rate / line.frequency:.2g} % a cycle{died}."
+    words = f"It rings down by {digits(-100 * line.rate / line.frequency, 2)} % a cycle{died}."
     return Motion("decayed", words, (line,), start=part.start, noise=noise)
 
 

@@ -41,3 +41,25 @@ def test_what_the_user_has_set_stays():
     asked = os.environ | {"OPENBLAS_CORETYPE": "Nehalem"}
     code = "import os, dbvfiv; print(os.environ['OPENBLAS_CORETYPE'])"
     assert subprocess.check_output([sys.executable, "-c", code], env=asked, text=True).strip() == "Nehalem"
+
+
+MAPS = """
+import mmap
+import jax
+from dbvfiv.runtime import free_programs
+
+double = jax.jit(lambda x: 2 * x)
+double(1.0)
+free_programs()
+kept = double._cache_size()
+granted = int(open("/proc/sys/vm/max_map_count").read())
+# neighbours of other rights are maps of their own
+pages = [mmap.mmap(-1, 4096, prot=mmap.PROT_READ | mmap.PROT_WRITE * (i % 2)) for i in range(granted // 2)]
+free_programs()
+print(kept, double._cache_size(), float(double(2.0)))
+"""
+
+
+@pytest.mark.skipif(not os.path.exists("/proc/sys/vm/max_map_count"), reason="Linux grants maps, others do not count")
+def test_programs_are_dropped_before_memory_maps_run_out():
+    assert subprocess.check_output([sys.executable, "-c", MAPS], text=True).split() == ["1", "0", "4.0"]

@@ -10,6 +10,7 @@ import numpy as np
 from ...model.supports import HELD_LIPS
 from ...model.symmetry import EQUILIBRIA, symmetry_named
 from ...record.record import Record
+from ...texts import digits
 from ..result import StudyResult
 from .walk import BUCKLED_CLASS, CROSSED, LOWEST
 
@@ -143,7 +144,7 @@ def rated_sentence(result: StudyResult) -> str | None:
     if told["sealed"] is not None:
         ideal = told["leak"] > 0 and not result.case.fluid.dynamic_viscosity
         still = " at most, as fluid.viscosity is none" if ideal else ""
-        seal = f"{'shut' if told['shut'] else 'open'}, leak {told['leak'] * 3.6e6:.3g} L/h{still}"
+        seal = f"{'shut' if told['shut'] else 'open'}, leak {digits(told['leak'] * 3.6e6)} L/h{still}"
         seal = "sealed, leak 0 L/h" if told["sealed"] else seal
     buckles = (
         f"no buckling up to {told['examined_to'] / 1e3:.6g} kPa" if at is None else f"buckles at {at / 1e3:.6g} kPa"

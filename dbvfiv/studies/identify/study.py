@@ -20,6 +20,7 @@ from ...errors import CaseError, SolveError
 from ...record.mesh import MeshData
 from ...record.record import GrowingRecord, Record
 from ...record.table import TableSpec
+from ...texts import digits
 from ..case import Case
 from ..inputs import Plan
 from ..result import StudyResult
@@ -395,7 +396,7 @@ class IdentifyResult(StudyResult):
         return f"{row.amount(float(f'{value:.4g}'))}{self.places.head(row.name, value)}"
 
     def _further_said(self, row: dict[str, Any]) -> str:
-        where = f"the mode near {row['frequency']:.3g} Hz at {self._value(row['value'])}"
+        where = f"the mode near {digits(row['frequency'])} Hz at {self._value(row['value'])}"
         if row["remaining"] > 0.9:
             return f"No further record over the range would tell much of {row['target']}; measure it by itself."
         return f"A record of {where} would leave {100 * row['remaining']:.0f} % of what is open of {row['target']}."

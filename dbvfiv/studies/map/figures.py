@@ -23,6 +23,7 @@ from ...drawing.style import (
     new_figure,
     parameter_label,
 )
+from ...texts import digits
 from ..result import StudyResult
 from ..stability.place import describe_fixed
 from ..stability.verdict import NOT_VALID, OUTCOMES
@@ -260,7 +261,7 @@ def _ticks_along(axes, points: np.ndarray, frequency: np.ndarray) -> None:
         step = unit[min(i + 1, len(unit) - 1)] - unit[max(i - 1, 0)]
         rising = step[0] * step[1] > 0  # the text lies right of the curve, below where it rises
         axes.annotate(
-            f"{frequency[i]:.3g} Hz",
+            f"{digits(frequency[i])} Hz",
             points[i],
             xytext=(8, -6) if rising else (8, 4),
             textcoords="offset points",

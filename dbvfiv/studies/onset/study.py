@@ -17,6 +17,7 @@ from ...observer import Observer
 from ...record.mesh import MeshData
 from ...record.record import GrowingRecord, Record
 from ...record.table import TableSpec
+from ...texts import digits
 from ..result import StudyResult
 from ..session import Session, Study
 from ..stability.dimensions import Variant, compare_ranges, leading_class, own_variant, variants
@@ -456,7 +457,7 @@ def _mark(row: dict, scale: float, parameter: str, top, bottom) -> None:
         reach = row["uncertainty"] / scale
         top.plot([x - reach, x + reach], [0, 0], color=ACCENT, lw=3.5, alpha=0.75, zorder=4, solid_capstyle="butt")
     kind = {"super": "supercritical", "sub": "subcritical"}.get(row["criticality"], "")
-    words = f"{x:.4g}{_unit(parameter)}\n{row['frequency']:.3g} Hz" + (f"\n{kind}" if kind else "")
+    words = f"{x:.4g}{_unit(parameter)}\n{digits(row['frequency'])} Hz" + (f"\n{kind}" if kind else "")
     # on the side of the mark that the curve leaves free
     place = {"xytext": (9, -8), "va": "top"} if row["gains"] else {"xytext": (9, 8), "va": "bottom"}
     look = {"textcoords": "offset points", "fontsize": 8.5, "color": PUBLISHED, "path_effects": HALO}

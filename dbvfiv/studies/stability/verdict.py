@@ -17,7 +17,7 @@ import numpy as np
 from eigen.certificate import Certificate
 
 from ...case.parameters import PARAMETERS
-from ...texts import shortly
+from ...texts import digits, shortly
 
 STABLE, FLUTTERS, DIVERGES, NOT_VALID, UNDECIDED = "stable", "flutters", "diverges", "not valid", "undecided"
 #: Outcomes, the one that decides about several motions of a state first.
@@ -176,7 +176,7 @@ class Verdict:
         """The margin as a sentence; empty where nothing is known of it."""
         if not self.holds or not np.isfinite(self.damping_ratio):
             return ""
-        said = f"The least damped mode has a damping ratio of {100 * self.damping_ratio:.2g} %"
+        said = f"The least damped mode has a damping ratio of {digits(100 * self.damping_ratio, 2)} %"
         factor = self.critical_damping_factor
         if np.isfinite(factor):
             begins = "flutter would begin" if self.outcome == STABLE else "flutter would end"

@@ -26,6 +26,7 @@ from ...drawing.style import (
     log_axis,
     new_figure,
 )
+from ...texts import digits
 from ..result import StudyResult
 
 #: Confidence below which a match is drawn as doubtful.
@@ -100,7 +101,7 @@ def _mark_crossing(axes, crossing: Any, result: StudyResult, x: np.ndarray) -> N
     at = factor * crossing.value
     axes.plot(at, 0.0, "D", color=UNSTABLE, ms=6, zorder=4)
     side = -1 if _share(at, x, result.axis.log) > 0.7 else 1
-    swing = f"{crossing.frequency:.2g} Hz" if crossing.frequency > 0 else "no oscillation"
+    swing = f"{digits(crossing.frequency, 2)} Hz" if crossing.frequency > 0 else "no oscillation"
     look = {"textcoords": "offset points", "fontsize": 9, "color": UNSTABLE, "path_effects": HALO}
     look["ha"] = "left" if side > 0 else "right"
     axes.annotate(f"≈ {at:.3g} {unit}, {swing}", (at, 0.0), (7 * side, 7), **look)

@@ -16,6 +16,7 @@ from ...motion.control import RunOptions
 from ...record.mesh import MeshData, WholeValve
 from ...record.record import GrowingRecord, Record
 from ...record.vtkhdf import Step
+from ...texts import digits
 from ..comparing import labels
 from ..result import StudyResult
 from ..session import Session, Study
@@ -251,8 +252,8 @@ class TransientResult(StudyResult):
             lines += [
                 "",
                 f"{chatter['shuttings']} shuttings, {chatter['rate']:.4g} a second (scatter of the intervals "
-                f"{100 * chatter['interval_scatter']:.2g} %), shut {100 * chatter['shut_share']:.0f} % of the time; "
-                f"mean flow {chatter['mean_flow']:.4g} kg/s",
+                f"{digits(100 * chatter['interval_scatter'], 2)} %), shut {100 * chatter['shut_share']:.0f} % of the "
+                f"time; mean flow {chatter['mean_flow']:.4g} kg/s",
                 f"opening before them {1e3 * chatter['opening']:.3g} mm (largest "
                 f"{1e3 * chatter['largest_opening']:.3g} mm), a lip meets the other at "
                 f"{chatter['impact_speed']:.3g} m/s (at most {chatter['largest_impact_speed']:.3g} m/s)",

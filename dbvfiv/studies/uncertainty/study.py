@@ -14,6 +14,7 @@ from ...errors import CaseError, SolveError
 from ...record.mesh import MeshData
 from ...record.record import GrowingRecord, Record
 from ...record.table import Column, TableSpec
+from ...texts import digits
 from ..case import Case
 from ..inputs import CONFIDENCE, Plan, Probability, counted, quasi_random
 from ..result import StudyResult
@@ -524,7 +525,7 @@ class UncertaintyResult(StudyResult):
         flutters, invalid = (point["outcomes"][name]["probability"] for name in (FLUTTERS, NOT_VALID))
         said, never = ("-" if one is None else f"{one:.3g}" for one in (flutters, invalid))
         interval = "{:.2g} to {:.2g}".format(*point["interval"])
-        spread = "-" if middle is None else f"{100 * middle:.3g} ({100 * low:.3g} to {100 * high:.3g})"
+        spread = "-" if middle is None else "{} ({} to {})".format(*(digits(100 * x) for x in (middle, low, high)))
         value = point["value"] / PARAMETERS[self.parameter].scale
         counts = f"{never:>10}{point['undecided']:10d}{point['samples']:9d}"
         return f"{value:16.6g}{said:>10}  {interval:<17}{counts}  {spread}"
@@ -540,7 +541,7 @@ class UncertaintyResult(StudyResult):
         lines = [f"Share of the variance of the least damping ratio at {where}: {', '.join(parts)}."]
         known = self.measured(point["value"], first, 0.1)
         if known is not None:
-            now, then = (f"{100 * spread[0]:.2g} to {100 * spread[2]:.2g} %" for spread in known)
+            now, then = (f"{digits(100 * spread[0], 2)} to {digits(100 * spread[2], 2)} %" for spread in known)
             lines.append(
                 f"Measure {first} to 10 %: the 95 % interval of the least damping ratio shrinks from {now} to {then} "
                 "(if it has its median)."
