@@ -1,6 +1,9 @@
-"""The faces of the package in a script: names at the top, texts of results, the operator of a state."""
+"""The faces of the package in a script: names at the top, examples, texts of results, the operator of a state."""
 
+import doctest
+import importlib
 import textwrap
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -14,6 +17,13 @@ from tests.systems.beam import fluid_conveying_pipe
 from tests.systems.brusselator import brusselator
 
 LINES, WIDTH = 10, 200
+ROOT = Path(__file__).parent.parent
+WITH_EXAMPLES = [
+    str(path.relative_to(ROOT).with_suffix("")).removesuffix("/__init__").replace("/", ".")
+    for package in ("dbvfiv", "continuation", "eigen")
+    for path in sorted((ROOT / package).rglob("*.py"))
+    if ">>> " in path.read_text(encoding="utf-8")
+]
 
 
 def is_short(thing):
@@ -30,6 +40,11 @@ def test_results_are_named_at_the_top():
     for name in dbvfiv.__all__:
         assert getattr(dbvfiv, name).__doc__, name
     assert {"State", "SteadyResult", "ModesResult", "ClosureResult", "CycleResult"} <= set(dbvfiv.__all__)
+
+
+@pytest.mark.parametrize("name", WITH_EXAMPLES)
+def test_examples_give_what_they_show(name):
+    assert doctest.testmod(importlib.import_module(name)).failed == 0
 
 
 def test_pencil_of_a_state_has_the_eigenvalues_of_its_modes(state):

@@ -60,7 +60,7 @@ def rubber(name: str, strain_level: float = 0.10, *, density: float | None = Non
     Examples
     --------
     >>> round(rubber("CR", 0.10).small_strain_shear_modulus, -3)
-    1307000.0
+    1339000.0
     """
     mu_inf, mu_0, knee, c, c_3 = _at_level("stable", name, strain_level, ("mu_inf", "mu_0", "x_0", "c", "c_3"))
     return SofteningRubber(mu_inf, mu_0, knee, c, read_toml("rubbers")["density"] if density is None else density, c_3)
