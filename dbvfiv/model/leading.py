@@ -11,6 +11,7 @@ import numpy as np
 from eigen.spectrum import CLEAR, SearchOptions
 
 from ..case.parameters import Mu
+from ..texts import digits
 
 #: Room above the highest structural frequency that a band is made for.
 ROOM = 1.05
@@ -75,14 +76,14 @@ class LeadingSearch:
         if self.origin is BandOrigin.LINE:
             return (
                 f"The elements of the line, or the rows of the mesh in a fluid that is compressed, resolve waves up to "
-                f"{self.band:.4g} Hz, so the search covers the band up to there; {self.end_key} moves its end."
+                f"{digits(self.band, 4)} Hz, so the search covers the band up to there; {self.end_key} moves its end."
             )
         if self.origin is not BandOrigin.STRUCTURE:
             return None
         why = "Loss factors damp all frequencies alike and" if self.creeps else "Without stiffness damping"
         return (
             f"{why} growth rates do not order the modes, so the search covers the band up "
-            f"to {self.band:.4g} Hz, which holds {self.frequencies} structural frequencies in vacuo; "
+            f"to {digits(self.band, 4)} Hz, which holds {self.frequencies} structural frequencies in vacuo; "
             f"modes.max_frequency chooses another."
         )
 

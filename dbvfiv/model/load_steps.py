@@ -10,6 +10,7 @@ import numpy as np
 
 from ..errors import SolveError
 from ..observer import Observer
+from ..texts import digits
 from .newton import EquilibriumSolver, NewtonOptions, NewtonResult
 
 #: Farthest that an equilibrium of a wall that may snap lies from its prediction, over the mean wall thickness.
@@ -114,7 +115,7 @@ class LoadSteps:
                 continue
             step = (aim - self.pressure) / 2
             self.observer.progress(
-                f"no equilibrium at {aim:.6g} Pa ({result.reason}), step halved to {abs(step):.3g} Pa"
+                f"no equilibrium at {aim:.6g} Pa ({result.reason}), step halved to {digits(abs(step))} Pa"
             )
             if straight is not None and abs(step) < max(smallest, WIDE**2 * abs(target - self.origin)):
                 # the path ends, as at a limit point: what lies beyond is where Newton's method strays to
@@ -123,7 +124,7 @@ class LoadSteps:
                 raise SolveError(
                     f"No equilibrium was found between {self.pressure:.6g} Pa, the last one, and {aim:.6g} "
                     f"Pa on the way to {target:.6g} Pa: "
-                    f"{result.reason}; load steps down to {2 * abs(step):.3g} Pa and two line searches were tried."
+                    f"{result.reason}; load steps down to {digits(2 * abs(step))} Pa and two line searches were tried."
                 )
 
     def settle(self) -> NewtonResult:

@@ -22,6 +22,7 @@ from ..case.quantity import head_of
 from ..case.section import BrokenRule, Section, key
 from ..case.write import case_toml
 from ..errors import CaseError
+from ..texts import digits
 from . import KINDS
 
 
@@ -306,7 +307,7 @@ def _gas(case: Case) -> Iterator[str]:
     if case.units.heads:
         yield (
             f"Heads are those of the fluid of {density:g} kg/m3, a gas, of which {case.units.pressure(over)} carry "
-            f'{over:.4g} Pa; give "1 mH2O" for heads of water, or fluid.density = 1000 for water.'
+            f'{digits(over, 4)} Pa; give "1 mH2O" for heads of water, or fluid.density = 1000 for water.'
         )
     jet = math.sqrt(2.0 * max(over, 0.0) / density)
     if case.fluid.sound_speed is None and jet > _FAST * _SOUND_OF_AIR:

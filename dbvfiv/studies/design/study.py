@@ -20,6 +20,7 @@ from ...model.closed import close_valve
 from ...record.mesh import MeshData
 from ...record.record import GrowingRecord, Record
 from ...record.table import Column, TableSpec
+from ...texts import digits
 from ..case import Case
 from ..result import StudyResult
 from ..session import Session, Study
@@ -320,11 +321,11 @@ class DesignResult(StudyResult):
         """Verdicts on a design on the finer mesh, as a sentence."""
         rows = self.verified(number)
         shut = {note["pressure"]: note["left"] for note in self.record.notes(_SHUT) if note["design"] == number}
-        gaps = "".join(f", gap left at {p:.4g} Pa {left:.3g} of that at rest" for p, left in shut.items())
+        gaps = "".join(f", gap left at {digits(p, 4)} Pa {left:.3g} of that at rest" for p, left in shut.items())
         if not len(rows["pressure"]):
             return gaps.removeprefix(", ") or "not verified"
         unstable = [
-            f"{OUTCOMES[outcome]} at {p:.4g} Pa"
+            f"{OUTCOMES[outcome]} at {digits(p, 4)} Pa"
             for p, outcome in zip(rows["pressure"], rows["outcome"])
             if OUTCOMES[outcome] != STABLE
         ]
@@ -371,7 +372,9 @@ class DesignResult(StudyResult):
         if self.case.uncertainty.inputs:
             lines.append("Margins are those that 95 % of valves with the inputs of [uncertainty] have, to first order.")
         if self.band:
-            lines.append(f"Modes up to {self.band:.4g} Hz count in margins; modes.max_frequency chooses another end.")
+            lines.append(
+                f"Modes up to {digits(self.band, 4)} Hz count in margins; modes.max_frequency chooses another end."
+            )
         for number, design in self.best.items():
             lines.append(f"Design {number + 1}{_for(self.bounds[number], self.bounds)}:")
             for one, value in zip(self.variables, design.values):

@@ -18,6 +18,7 @@ from ...fit.cards import outside_band
 from ...record.mesh import MeshData
 from ...record.record import GrowingRecord, Record
 from ...record.table import Column, TableSpec
+from ...texts import digits
 from ..case import Case
 from ..result import StudyResult
 from ..session import Session, Study
@@ -168,8 +169,8 @@ def _doubts(plan: MapPlan, columns: Iterable[MapColumn], checks: Iterable[dict[s
     bands = [c.band for c in solved if np.isfinite(c.band)]
     if bands:
         said.append(
-            f"Verdicts hold for modes up to {min(bands):.4g} Hz"
-            + (f" to {max(bands):.4g} Hz, by the column" if max(bands) > min(bands) else "")
+            f"Verdicts hold for modes up to {digits(min(bands), 4)} Hz"
+            + (f" to {digits(max(bands), 4)} Hz, by the column" if max(bands) > min(bands) else "")
             + "; modes.max_frequency chooses another end."
         )
     for check in checks:

@@ -17,6 +17,7 @@ from ...errors import SolveError
 from ...fit.cards import outside_band
 from ...model.forms import ValveForms
 from ...observer import Observer
+from ...texts import digits
 from ..case import Case
 from ..stability.dimensions import Variant, own_variant
 from ..stability.line import ParameterLine
@@ -153,7 +154,9 @@ class OnsetSearch:
             )
         bands = [s.verdict.band for s in self.line.samples.values() if np.isfinite(s.verdict.band)]
         if bands:
-            said.append(f"Verdicts hold for modes up to {min(bands):.4g} Hz; modes.max_frequency chooses another end.")
+            said.append(
+                f"Verdicts hold for modes up to {digits(min(bands), 4)} Hz; modes.max_frequency chooses another end."
+            )
         return said
 
     @property

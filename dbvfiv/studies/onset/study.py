@@ -295,7 +295,7 @@ class OnsetResult(StudyResult):
             )
         state = "unstable" if self.leading["growth_rate"][0] > 0 else "stable"
         band = min(verdict.band for verdict in self.verdicts)
-        scanned += f" for modes up to {band:.4g} Hz" if np.isfinite(band) else ""
+        scanned += f" for modes up to {digits(band, 4)} Hz" if np.isfinite(band) else ""
         which = f" in classes {', '.join([self._own, *(c['symmetry'] for c in self.classes)])}" if self.classes else ""
         return f"No onset: the valve is {state} {scanned}{which}."
 

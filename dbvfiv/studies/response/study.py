@@ -34,6 +34,7 @@ from ...model.valve import ValveModel
 from ...record.mesh import MeshData
 from ...record.record import GrowingRecord, Record
 from ...record.table import Column, TableSpec
+from ...texts import digits
 from ..case import Case
 from ..result import StudyResult
 from ..session import Session, Study
@@ -440,7 +441,7 @@ class ResponseResult(StudyResult):
         asked = self.case.response
         if asked.spectrum is not None:
             return f"pressure noise of {asked.spectrum.name}"
-        return f"white pressure noise of {asked.noise:.4g} Pa up to {asked.max_frequency:.4g} Hz"
+        return f"white pressure noise of {digits(asked.noise, 4)} Pa up to {digits(asked.max_frequency, 4)} Hz"
 
 
 _SHOWN = (("lip_displacement", 1e9, "Lip, um per kPa"), ("flow", 1e6, "Flow, L/s per kPa"))

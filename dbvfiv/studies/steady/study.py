@@ -38,6 +38,7 @@ from ...record.record import GrowingRecord
 from ...record.states import PATH_RESTART, shown_summary, state_table
 from ...record.table import Column, Shown, TableSpec, printed_head, printed_row
 from ...record.vtkhdf import Step
+from ...texts import digits
 from ..case import Case
 from ..comparing import Compared, Comparison
 from ..measured import FLOW, LIP_AREA, Measured, keep_measured
@@ -121,7 +122,7 @@ def _met(limits: Sequence[LimitPoint], rising: bool) -> list[float]:
 
 def _told(pressures: Sequence[float]) -> str:
     if len(pressures) > 2:
-        return f"{len(pressures)} pressures from {pressures[0]:.4g} to {pressures[-1]:.4g} Pa"
+        return f"{len(pressures)} pressures from {digits(pressures[0], 4)} to {digits(pressures[-1], 4)} Pa"
     return " and ".join(f"{p:.4g}" for p in pressures) + " Pa"
 
 
@@ -152,14 +153,14 @@ class Cracking(NamedTuple):
             return f"Cracking: not up to {highest / 1e3:.4g} kPa; the faces press on each other and nothing flows."
         if self.sealed:
             return (
-                f"Cracking pressure: {self.pressure:.4g} Pa ({1e3 * self.head:.3g} mm of the fluid) over that "
+                f"Cracking pressure: {digits(self.pressure, 4)} Pa ({1e3 * self.head:.3g} mm of the fluid) over that "
                 "downstream; before it the faces press on each other and nothing flows."
             )
         if self.pressure is None:
             return f"Cracking: not up to {highest / 1e3:.4g} kPa, where the lips leave less than {grown}."
         return (
-            f"Cracking pressure: {self.pressure:.4g} Pa ({1e3 * self.head:.3g} mm of the fluid) over that downstream, "
-            f"where the lips leave {grown}; they leave a gap at rest, so some fluid passes before."
+            f"Cracking pressure: {digits(self.pressure, 4)} Pa ({1e3 * self.head:.3g} mm of the fluid) over that "
+            f"downstream, where the lips leave {grown}; they leave a gap at rest, so some fluid passes before."
         )
 
 
@@ -350,8 +351,8 @@ class SteadyResult(StudyResult):
     def _parted_sentences(self) -> list[str]:
         part = [note for note in self.record.notes(PARTED) if 0 < note["width"] < note["pressed"] * (1 - 1e-9)]
         return [
-            f"At {note['pressure']:.4g} Pa {1e3 * note['width']:.3g} of the {1e3 * note['pressed']:.3g} mm of the lips "
-            "that touch at rest have parted; the rest is pressed."
+            f"At {digits(note['pressure'], 4)} Pa {1e3 * note['width']:.3g} of the {1e3 * note['pressed']:.3g} mm of "
+            "the lips that touch at rest have parted; the rest is pressed."
             for note in part
         ]
 
@@ -366,8 +367,8 @@ class SteadyResult(StudyResult):
         rows = ""
         if len(high) > 1 and len(low) > 1 and self.case.valve.is_preset:
             rows = (
-                f" There are {len(high)} such pairs between {min(low):.4g} and {max(high):.4g} Pa, as the faces part "
-                "row by row of the mesh; a finer one has fewer."
+                f" There are {len(high)} such pairs between {digits(min(low), 4)} and {digits(max(high), 4)} Pa, as "
+                "the faces part row by row of the mesh; a finer one has fewer."
             )
         said = [
             f"Limit points: a pressure that rises leaves the curve of equilibria at {up} and jumps "
@@ -375,7 +376,7 @@ class SteadyResult(StudyResult):
         ]
         for note in self.record.notes(FURTHER):
             said.append(
-                f"At {note['pressure']:.4g} Pa there is another equilibrium, with a lip opening of "
+                f"At {digits(note['pressure'], 4)} Pa there is another equilibrium, with a lip opening of "
                 f"{1e3 * note['lip_opening']:.3g} mm, {note['mass_flow']:.4g} kg/s and displacements up to "
                 f"{1e3 * note['max_displacement']:.3g} mm."
             )
