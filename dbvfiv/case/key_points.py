@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import csv
 import math
 import re
 from dataclasses import dataclass
 from pathlib import Path
 
 from .quantity import Quantity
-from .tables import numbered_lines
+from .tables import cells_of, numbered_lines
 
 #: A file of bare numbers of this many lines holds nine profiles of fifteen points, as the thesis's program reads them.
 _BARE = 9, 15
@@ -110,7 +109,7 @@ def is_whole(profile: KeyProfile) -> bool:
 
 
 def _bare(numbered: list[tuple[int, str]]) -> list[KeyProfile]:
-    points = [_numbers(line.replace(",", " ").split(), number) for number, line in numbered]
+    points = [_numbers(" ".join(cells_of(line)).split(), number) for number, line in numbered]
     count, each = _BARE
     if len(points) == count * each:
         groups = [points[i * each : (i + 1) * each] for i in range(count)]
@@ -120,8 +119,7 @@ def _bare(numbered: list[tuple[int, str]]) -> list[KeyProfile]:
 
 
 def _table(numbered: list[tuple[int, str]]) -> list[KeyProfile]:
-    head, mark = numbered[0][1], _mark(numbered[0][1])
-    columns = [_COLUMN.fullmatch(word) for word in _words(head, mark)]
+    columns = [_COLUMN.fullmatch(word) for word in cells_of(numbered[0][1])]
     names = [match[1].lower() if match else "" for match in columns]
     for name in ("x", "y", "z"):
         if names.count(name) != 1:
@@ -137,7 +135,7 @@ def _table(numbered: list[tuple[int, str]]) -> list[KeyProfile]:
             raise ValueError(f"whose column {name} has no unit of length; {_HEADER}") from None
     points, labels, joints = [], [], []
     for number, line in numbered[1:]:
-        words = _words(line, mark)
+        words = cells_of(line)
         if len(words) != len(names):
             raise ValueError(f"whose line {number} has {len(words)} entries and not {len(names)}")
         row = dict(zip(names, words))
@@ -153,16 +151,6 @@ def _table(numbered: list[tuple[int, str]]) -> list[KeyProfile]:
         KeyProfile(tuple(group), tuple(i for i in range(1, len(group) - 1) if mark[i]), smooth="joint" in names)
         for group, mark in zip(groups, marks)
     ]
-
-
-def _mark(line: str) -> str | None:
-    return next((mark for mark in ";\t," if mark in line), None)
-
-
-def _words(line: str, mark: str | None) -> list[str]:
-    if mark is None:
-        return re.sub(r"\s+([\[(])", r"\1", line).split()
-    return [word.strip() for word in next(csv.reader([line], delimiter=mark))]
 
 
 def _numbers(words: list[str], number: int, units: list[str] | None = None) -> tuple[float, float, float]:

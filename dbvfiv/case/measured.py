@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import math
 import re
 from collections.abc import Collection, Mapping
@@ -14,7 +13,7 @@ from pydantic import ValidationInfo
 
 from .quantity import Quantity
 from .section import Described
-from .tables import numbered_lines
+from .tables import cells_of, numbered_lines
 
 _PRESSURE, _VOLUME, _MASS = Quantity("Pa", "kPa", head=True), Quantity("m^3/s", "L/s"), Quantity("kg/s", "kg/s")
 _LENGTH, _AREA = Quantity("m", "mm"), Quantity("m^2", "cm^2")
@@ -123,7 +122,7 @@ def _read_header(line: str, density: float) -> list[tuple[str, str, Quantity | N
         twice = next(name for name in names if names.count(name) > 1)
         raise ValueError(f"whose columns are not told, because two are {_CALLED[twice]}; {_HEADER}")
     divided = any(mark in line for mark in _SEPARATORS)
-    if (divided and len(_cells(line)) != len(columns)) or not any(_makes(kind, set(names)) for kind in _NEEDED):
+    if (divided and len(cells_of(line)) != len(columns)) or not any(_makes(kind, set(names)) for kind in _NEEDED):
         raise ValueError(f"whose columns are not told; {_HEADER}")
     return columns
 
@@ -152,13 +151,8 @@ def _measures(quantity: Quantity, unit: str, density: float) -> bool:
     return True
 
 
-def _cells(line: str) -> list[str]:
-    separator = next((mark for mark in _SEPARATORS if mark in line), None)
-    return line.split() if separator is None else next(csv.reader([line], delimiter=separator))
-
-
 def _read_row(line: str, number: int, columns: list[tuple[str, str, Quantity | None]], density: float) -> list[Any]:
-    words = [word.strip() for word in _cells(line)]
+    words = cells_of(line)
     if len(words) != len(columns):
         allowed = " and ".join(_CALLED[name] for name, _, _ in columns)
         raise ValueError(f"whose line {number} is not {allowed}")

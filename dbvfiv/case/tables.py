@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 import math
 import re
 from pathlib import Path
@@ -37,6 +38,23 @@ def numbered_lines(path: Path) -> list[tuple[int, str]]:
     return [(i, line) for i, line in lines if line]
 
 
+def cells_of(line: str) -> list[str]:
+    """Cells of a line of a table: what stands between tabs, semicolons, commas or, without any of these, blanks.
+
+    Between tabs or semicolons numbers may have decimal commas, as spreadsheets of half the world write them.
+
+    Examples
+    --------
+    >>> cells_of("0,5; 10,25 kPa"), cells_of("0.5, 10"), cells_of("x [mm] y [mm]")
+    (['0.5', '10.25 kPa'], ['0.5', '10'], ['x[mm]', 'y[mm]'])
+    """
+    mark = next((mark for mark in "\t;," if mark in line), None)
+    if mark is None:
+        return re.sub(r"\s+([\[(])", r"\1", line).split()
+    cells = (cell.strip() for cell in next(csv.reader([line], delimiter=mark)))
+    return [cell if mark == "," else _DECIMAL_COMMA.sub(r"\1.\2", cell) for cell in cells]
+
+
 def existing_file(path: Path, info: ValidationInfo) -> Path:
     """Full name of a file that a key names; as it is where files are not to be looked for.
 
@@ -62,6 +80,7 @@ def existing_file(path: Path, info: ValidationInfo) -> Path:
 ExistingFile = Annotated[Path, AfterValidator(existing_file)]
 
 _TIME, _PRESSURE = Quantity("s", "s"), Quantity("Pa", "kPa", head=True)
+_DECIMAL_COMMA = re.compile(r"^([+-]?\d+),(\d+)")
 _UNIT = re.compile(r"[\[(]\s*([^\])]+?)\s*[\])]")
 
 
@@ -106,7 +125,7 @@ def read_pairs(path: Path, kinds: tuple[Quantity, Quantity], words: str) -> list
     """
     units, rows = [kind.si for kind in kinds], []
     for number, line in numbered_lines(path):
-        found = _words(line)
+        found = [cell for cell in cells_of(line) if cell]
         if not found:
             continue
         if not rows and re.match(r"[A-Za-z]", found[0]):
@@ -118,14 +137,6 @@ def read_pairs(path: Path, kinds: tuple[Quantity, Quantity], words: str) -> list
     if not rows:
         raise ValueError("which holds no rows")
     return rows
-
-
-def _words(line: str) -> list[str]:
-    line = line.strip()
-    for separator in ",;\t":
-        if separator in line:
-            return [word.strip().strip('"') for word in line.split(separator) if word.strip()]
-    return line.split()
 
 
 def _header_units(line: str, number: int, kinds: tuple[Quantity, Quantity]) -> list[str]:

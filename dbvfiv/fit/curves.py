@@ -17,7 +17,6 @@ between the ends of strain: tan delta = A / (pi E' e0^2), E' = (stress at the la
 
 from __future__ import annotations
 
-import csv
 import math
 import re
 from collections.abc import Iterator
@@ -27,7 +26,8 @@ from zipfile import BadZipFile
 
 import numpy as np
 
-from dbvfiv.materials.laws import MaterialError
+from ..case.tables import cells_of
+from ..materials.laws import MaterialError
 
 STRAIN_UNITS = {"-": 1.0, "1": 1.0, "mm/mm": 1.0, "m/m": 1.0, "%": 0.01, "percent": 0.01}
 STRESS_UNITS = {"Pa": 1.0, "kPa": 1e3, "MPa": 1e6, "GPa": 1e9, "N/mm^2": 1e6, "N/mm2": 1e6, "psi": 6894.757293168361}
@@ -224,8 +224,7 @@ def _rows(path: Path) -> list[tuple[int, list[str]]]:
     lines = [(number, line) for number, line in numbered if line.strip() and not line.lstrip().startswith("#")]
     if not lines:
         raise MaterialError(f"Tension test {path} is empty.")
-    delimiter = "\t" if sheet else max(",;\t", key=lines[0][1].count)
-    return [(number, next(csv.reader([line], delimiter=delimiter))) for number, line in lines]
+    return [(number, cells_of(line)) for number, line in lines]
 
 
 def _sheet(path: Path) -> str:

@@ -14,8 +14,12 @@ import pytest
 from dbvfiv.case import Case as PhysicsCase
 from dbvfiv.case import CaseError, make_case, parse_axis
 from dbvfiv.case.describe import SYNONYMS, explain, page, walk
+from dbvfiv.case.key_points import read_key_points
 from dbvfiv.case.materials import shear_modulus_of
+from dbvfiv.case.measured import read_measured
+from dbvfiv.case.tables import read_drive_table, read_pump_table
 from dbvfiv.case.write import case_toml
+from dbvfiv.fit.curves import read_curves
 from dbvfiv.studies import KINDS
 from dbvfiv.studies.case import THESIS, Case, load_case, thesis_case
 
@@ -126,6 +130,31 @@ def test_own_and_built_in_materials():
     assert materials.card("fibre").fibre_modulus == 3460e6 and materials.card("fibre").density == 1270
     with pytest.raises(KeyError):
         materials.card("teflon")
+
+
+SPREADSHEETS = [
+    (read_drive_table, "time [s], pressure [kPa]\n0.0, 1.5\n0.25, 2.75\n1, 12.5 kPa\n"),
+    (read_pump_table, "flow [L/s], head [m]\n0, 12.5\n50.5, 9.25\n"),
+    (read_measured, "pressure [kPa], flow [L/s]\n1.5, 10.25\n2.5, 15\n"),
+    (read_measured, "pressure [kPa], z [mm], face, x [mm], y [mm]\n1.5, 0.5, outer, -0.25, 10.125\n"),
+    (
+        read_key_points,
+        "x [mm], y [mm], z [mm]\n" + "".join(f"0, 9.5, {z}\n7.5, 7.25, {z}\n9.5, 0, {z}\n" for z in "09"),
+    ),
+    (read_curves, "engineering_strain [%], nominal_stress [MPa]\n0.0, 0.0\n10.5, 0.25\n20.5, 0.375\n"),
+]
+
+
+@pytest.mark.parametrize(("read", "text"), SPREADSHEETS, ids=lambda x: getattr(x, "__name__", ""))
+@pytest.mark.parametrize("mark", [";", "\t"])
+def test_tables_may_have_decimal_commas(read, text, mark, tmp_path):
+    """What a spreadsheet writes in half the world: semicolons or tabs between, commas within numbers."""
+    file = tmp_path / "table.csv"
+    file.write_text(text)
+
+    expected = repr(read(file))
+    file.write_text(text.replace(",", mark).replace(".", ","))
+    assert repr(read(file)) == expected
 
 
 def test_key_points_are_found_beside_the_case_file(tmp_path):
