@@ -15,6 +15,11 @@ from .newton import EquilibriumSolver, NewtonOptions, NewtonResult
 
 #: Farthest that an equilibrium of a wall that may snap lies from its prediction, over the mean wall thickness.
 LARGEST_JUMP = 0.15
+#: Ratio of the slopes at the ends of a step and of its chord up to which it follows its path: next to a limit point,
+#: where slopes rise without bound and lie small again on the other path, a step of any size may cross over unseen.
+ALIKE = 4.0
+#: Motion, over the largest jump, below which a step need not be resolved.
+SMALL = 0.1
 #: Share of the way from the first pressure above which a load step is wide.
 WIDE = 1 / 16
 
@@ -31,7 +36,8 @@ class LoadStepOptions:
     first_step, max_step : float, Pa
         Load step from the start, and the largest; without bounds the whole way is tried at once.
     largest_jump : float, m
-        An equilibrium farther from the prediction than this is taken for one on another path, and the step is halved.
+        An equilibrium farther from the prediction than this is taken for one on another path, and the step is halved;
+        so is one whose path from the last one is not resolved, see `ALIKE`.
     straight : int, optional
         Most iterations of a wide step, which is halved then: those that wander longer may end at another equilibrium,
         and two halves take fewer. Where the path ends, wide steps may wander.
@@ -145,23 +151,39 @@ class LoadSteps:
     def _attempt(self, aim: float, straight: int | None) -> NewtonResult:
         start = self.q if self.slope is None else self.q + (aim - self.pressure) * self.slope
         wide = abs(aim - self.pressure) > WIDE * max(abs(aim - self.origin), abs(self.pressure - self.origin))
-        first = self._judged(self.solver.solve(start, aim, straight if wide else None), start)
+        first = self._judged(self.solver.solve(start, aim, straight if wide else None), start, aim)
         if first.converged or (wide and straight is not None):
             return first
-        result = self._judged(self.fallback.solve(self.q, aim), start)
+        result = self._judged(self.fallback.solve(self.q, aim), start, aim)
         return replace(result, iterations=result.iterations + first.iterations)
 
-    def _judged(self, result: NewtonResult, predicted: np.ndarray) -> NewtonResult:
-        """The result, refused if it lies far from the prediction."""
+    def _judged(self, result: NewtonResult, predicted: np.ndarray, pressure: float) -> NewtonResult:
+        """The result, refused if it lies far from the prediction or if the path to it is not resolved."""
         limit = self.options.largest_jump
         if not result.converged or self.slope is None or not np.isfinite(limit):
             return result
-        jump = float(np.abs(self.model.nodal(result.q - predicted)[:, :3]).max())
-        if jump <= limit:
-            return result
-        return replace(
-            result, converged=False, reason=f"the equilibrium found lies {jump:.2g} m from the predicted one"
-        )
+        jump = self._size(result.q - predicted)
+        reason = f"the equilibrium found lies {jump:.2g} m from the predicted one" if jump > limit else ""
+        if not reason and self._is_unresolved(result, pressure):
+            reason = "the path to the equilibrium found is not resolved"
+        return replace(result, converged=False, reason=reason) if reason else result
+
+    def _is_unresolved(self, result: NewtonResult, pressure: float) -> bool:
+        """True where slopes at both ends of a step and its chord differ more than those of one path may."""
+        move, slope = result.q - self.q, self._slope_at(result, pressure)
+        if slope is None or self._size(move) <= SMALL * self.options.largest_jump:
+            return False
+        sizes = [self._size(along) for along in (self.slope, slope, move / (pressure - self.pressure))]
+        return max(sizes) > ALIKE * min(sizes)
+
+    def _size(self, q: np.ndarray) -> float:
+        """Largest displacement of a state, or of a motion."""
+        return float(np.abs(self.model.nodal(q)[:, :3]).max())
+
+    def _slope_at(self, result: NewtonResult, pressure: float) -> np.ndarray | None:
+        """dq/dP at an equilibrium just found; None where it was one before the first iteration."""
+        used = self.solver if self.solver.last is result.q else self.fallback
+        return None if used.tangent is None else used.sensitivity(result.q, pressure)
 
     def _accept(self, result: NewtonResult, pressure: float) -> None:
         self._take(result, pressure)
@@ -170,9 +192,8 @@ class LoadSteps:
 
     def _take(self, result: NewtonResult, pressure: float) -> None:
         self.q, self.pressure = result.q, pressure
-        used = self.solver if self.solver.last is result.q else self.fallback
-        if used.tangent is not None:
-            self.slope = used.sensitivity(self.q, pressure)
+        slope = self._slope_at(result, pressure)
+        self.slope = self.slope if slope is None else slope
 
 
 class Loading:
