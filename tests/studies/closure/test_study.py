@@ -194,7 +194,7 @@ def test_work_and_energies_balance_the_better_the_smaller_the_steps(case):
 
 
 def test_no_load_step_crosses_a_limit_point():
-    """At 52 046.7 Pa the wall snaps by 5 mm, a seventh of its thickness; just below it a step of 31 Pa ended behind it,
+    """At 52 046.7 Pa the wall snaps by 5 mm, a third of its thickness; just below it a step of 31 Pa ended behind it,
     no farther from its prediction than steps may, and the valve was sealed at 58 kPa with no buckling.
     """
     rated = 58249.24460623593
