@@ -119,10 +119,14 @@ def chatters(found: Gathered) -> Answer:
         text += f", at {' to '.join(ends)} Hz" if ends else ""
         return Answer(question, YES, f"{text}. {_onsets(found)}".strip(), _factor(verdicts), _sure(found, verdicts))
     if unknown:
-        p = unknown[0]
-        why = verdicts[p].reason if p in verdicts else _missing_head(found, p)
-        at = listed(units.pressure(p, 3) for p in unknown)
-        return Answer(question, UNKNOWN, f"No certain verdict at {at}: {why}", _factor(verdicts))
+        reasons: dict[str, list[float]] = {}
+        for p in unknown:
+            why = verdicts[p].reason if p in verdicts else _missing_head(found, p)
+            reasons.setdefault(why, []).append(p)
+        said = (
+            f"No certain verdict at {listed(units.pressure(p, 3) for p in at)}: {why}" for why, at in reasons.items()
+        )
+        return Answer(question, UNKNOWN, " ".join(said), _factor(verdicts))
     least = min(verdicts.values(), key=lambda v: v.damping_ratio)
     text = (
         f"Stable at all {len(verdicts)} heads in every symmetry class; the least damped mode has a damping ratio of "

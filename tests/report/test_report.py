@@ -27,6 +27,7 @@ from dbvfiv.report.answers import UNKNOWN, answers
 from dbvfiv.report.gather import following, heads_of, planned
 from dbvfiv.report.parts import heads_part, steady_part
 from dbvfiv.studies.case import load_case
+from dbvfiv.studies.stability.verdict import Verdict
 from dbvfiv.studies.workers import Lost, Workers
 from tests.child import start
 from tests.small_valves import THESIS_SET
@@ -104,6 +105,24 @@ def test_chatter_holds_while_one_head_chatters_at_the_most_damping(made, monkeyp
     monkeypatch.setattr("dbvfiv.report.answers.loss_range", lambda _: (0.01, end * factor))
     told = next(one.uncertainty for one in answers(found) if "chatter" in one.question)
     assert any(word in line for line in told)
+
+
+@pytest.mark.parametrize(
+    "reasons, text",
+    [
+        (
+            ("Nothing flows.", "Rubber."),
+            "No certain verdict at 2 kPa: Nothing flows. No certain verdict at 6 kPa: Rubber.",
+        ),
+        (("Nothing flows.",) * 2, "No certain verdict at 2 kPa and 6 kPa: Nothing flows."),
+    ],
+)
+def test_each_head_without_a_verdict_has_its_own_reason(made, monkeypatch, reasons, text):
+    found, _ = made
+    results = {p: SimpleNamespace(verdict=Verdict.undecided(why)) for p, why in zip(found.heads, reasons)}
+    monkeypatch.setattr(type(found), "modes", property(lambda _: results))
+    told = next(one for one in answers(found) if "chatter" in one.question)
+    assert (told.answer, told.text) == (UNKNOWN, text)
 
 
 def test_heads_at_which_a_verdict_is_one_on_the_fit_of_the_rubber_are_named(tmp_path):
