@@ -41,13 +41,15 @@ def numbered_lines(path: Path) -> list[tuple[int, str]]:
 def cells_of(line: str) -> list[str]:
     """Cells of a line of a table: what stands between tabs, semicolons, commas or, without any of these, blanks.
 
-    Between tabs or semicolons numbers may have decimal commas, as spreadsheets of half the world write them.
+    Between tabs or semicolons numbers may have decimal commas, as spreadsheets of half the world write them. A tab
+    beside a comma or a semicolon is a blank.
 
     Examples
     --------
-    >>> cells_of("0,5; 10,25 kPa"), cells_of("0.5, 10"), cells_of("x [mm] y [mm]")
+    >>> cells_of("0,5; 10,25 kPa"), cells_of("0.5,\\t10"), cells_of("x [mm] y [mm]")
     (['0.5', '10.25 kPa'], ['0.5', '10'], ['x[mm]', 'y[mm]'])
     """
+    line = _ALIGNING_TAB.sub(" ", line)
     mark = next((mark for mark in "\t;," if mark in line), None)
     if mark is None:
         return re.sub(r"\s+([\[(])", r"\1", line).split()
@@ -80,6 +82,7 @@ def existing_file(path: Path, info: ValidationInfo) -> Path:
 ExistingFile = Annotated[Path, AfterValidator(existing_file)]
 
 _TIME, _PRESSURE = Quantity("s", "s"), Quantity("Pa", "kPa", head=True)
+_ALIGNING_TAB = re.compile(r"(?<=[;,])\t+|\t+(?=[;,])")
 _DECIMAL_COMMA = re.compile(r"^([+-]?\d+),(\d+)")
 _UNIT = re.compile(r"[\[(]\s*([^\])]+?)\s*[\])]")
 
