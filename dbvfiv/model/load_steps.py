@@ -108,11 +108,13 @@ class LoadSteps:
             remaining = target - self.pressure
             last = abs(step) >= abs(remaining) * (1 - 1e-12)
             aim = target if last else self.pressure + step
-            result = self._attempt(aim, straight)
+            result, slope = self._attempt(aim, straight)
             iterations += result.iterations
             if result.converged:
                 steps += 1
-                self._accept(result, aim)
+                self._take(result, aim, slope)
+                if self.accepted is not None:
+                    self.accepted(aim, self.q)
                 self.step = max(2 * abs(step), self.options.first_step)
                 if last:
                     return LoadStepResult(iterations, steps, result)
@@ -140,60 +142,53 @@ class LoadSteps:
         ------
         SolveError
         """
-        result = self.solver.solve(self.q, self.pressure)
-        if not result.converged:
-            result = self.fallback.solve(self.q, self.pressure)
-        if not result.converged:
-            raise SolveError(f"The equilibrium at {self.pressure:.6g} Pa was lost: {result.reason}.")
-        self._take(result, self.pressure)
-        return result
+        for solver in (self.solver, self.fallback):
+            result = solver.solve(self.q, self.pressure)
+            if result.converged:
+                self._take(result, self.pressure, _slope(solver, result, self.pressure))
+                return result
+        raise SolveError(f"The equilibrium at {self.pressure:.6g} Pa was lost: {result.reason}.")
 
-    def _attempt(self, aim: float, straight: int | None) -> NewtonResult:
+    def _attempt(self, aim: float, straight: int | None) -> tuple[NewtonResult, np.ndarray | None]:
+        """What is found at a pressure, and dq/dP there if it is known."""
         start = self.q if self.slope is None else self.q + (aim - self.pressure) * self.slope
         wide = abs(aim - self.pressure) > WIDE * max(abs(aim - self.origin), abs(self.pressure - self.origin))
-        first = self._judged(self.solver.solve(start, aim, straight if wide else None), start, aim)
+        first, slope = self._judged(self.solver, self.solver.solve(start, aim, straight if wide else None), start, aim)
         if first.converged or (wide and straight is not None):
-            return first
-        result = self._judged(self.fallback.solve(self.q, aim), start, aim)
-        return replace(result, iterations=result.iterations + first.iterations)
+            return first, slope
+        result, slope = self._judged(self.fallback, self.fallback.solve(self.q, aim), start, aim)
+        return replace(result, iterations=result.iterations + first.iterations), slope
 
-    def _judged(self, result: NewtonResult, predicted: np.ndarray, pressure: float) -> NewtonResult:
-        """The result, refused if it lies far from the prediction or if the path to it is not resolved."""
-        limit = self.options.largest_jump
+    def _judged(
+        self, solver: EquilibriumSolver, result: NewtonResult, predicted: np.ndarray, pressure: float
+    ) -> tuple[NewtonResult, np.ndarray | None]:
+        """The result of a solver, refused if it lies far from the prediction or if the path to it is not resolved, and
+        dq/dP there.
+        """
+        slope, limit = _slope(solver, result, pressure), self.options.largest_jump
         if not result.converged or self.slope is None or not np.isfinite(limit):
-            return result
-        jump = self._size(result.q - predicted)
-        reason = f"the equilibrium found lies {jump:.2g} m from the predicted one" if jump > limit else ""
-        if not reason and self._is_unresolved(result, pressure):
-            reason = "the path to the equilibrium found is not resolved"
-        return replace(result, converged=False, reason=reason) if reason else result
-
-    def _is_unresolved(self, result: NewtonResult, pressure: float) -> bool:
-        """True where slopes at both ends of a step and its chord differ more than those of one path may."""
-        move, slope = result.q - self.q, self._slope_at(result, pressure)
-        if slope is None or self._size(move) <= SMALL * self.options.largest_jump:
-            return False
-        sizes = [self._size(along) for along in (self.slope, slope, move / (pressure - self.pressure))]
-        return max(sizes) > ALIKE * min(sizes)
+            return result, slope
+        jump, move, reason = self._size(result.q - predicted), result.q - self.q, ""
+        if jump > limit:
+            reason = f"the equilibrium found lies {jump:.2g} m from the predicted one"
+        elif slope is not None and self._size(move) > SMALL * limit:
+            sizes = [self._size(along) for along in (self.slope, slope, move / (pressure - self.pressure))]
+            if max(sizes) > ALIKE * min(sizes):
+                reason = "the path to the equilibrium found is not resolved"
+        return replace(result, converged=False, reason=reason) if reason else result, slope
 
     def _size(self, q: np.ndarray) -> float:
         """Largest displacement of a state, or of a motion."""
         return float(np.abs(self.model.nodal(q)[:, :3]).max())
 
-    def _slope_at(self, result: NewtonResult, pressure: float) -> np.ndarray | None:
-        """dq/dP at an equilibrium just found; None where it was one before the first iteration."""
-        used = self.solver if self.solver.last is result.q else self.fallback
-        return None if used.tangent is None else used.sensitivity(result.q, pressure)
-
-    def _accept(self, result: NewtonResult, pressure: float) -> None:
-        self._take(result, pressure)
-        if self.accepted is not None:
-            self.accepted(pressure, self.q)
-
-    def _take(self, result: NewtonResult, pressure: float) -> None:
+    def _take(self, result: NewtonResult, pressure: float, slope: np.ndarray | None) -> None:
         self.q, self.pressure = result.q, pressure
-        slope = self._slope_at(result, pressure)
         self.slope = self.slope if slope is None else slope
+
+
+def _slope(solver: EquilibriumSolver, result: NewtonResult, pressure: float) -> np.ndarray | None:
+    """dq/dP at what a solver has just found; None where it found nothing, or has no tangent yet."""
+    return solver.sensitivity(result.q, pressure) if result.converged and solver.tangent is not None else None
 
 
 class Loading:
