@@ -135,7 +135,7 @@ def _table(numbered: list[tuple[int, str]]) -> list[KeyProfile]:
             raise ValueError(f"whose column {name} has no unit of length; {_HEADER}") from None
     points, labels, joints = [], [], []
     for number, line in numbered[1:]:
-        words = cells_of(line)
+        words = cells_of(line, numbered[0][1])
         if len(words) != len(names):
             raise ValueError(f"whose line {number} has {len(words)} entries and not {len(names)}")
         row = dict(zip(names, words))

@@ -13,7 +13,7 @@ from pydantic import ValidationInfo
 
 from .quantity import Quantity
 from .section import Described
-from .tables import cells_of, numbered_lines
+from .tables import SEPARATORS, cells_of, numbered_lines
 
 _PRESSURE, _VOLUME, _MASS = Quantity("Pa", "kPa", head=True), Quantity("m^3/s", "L/s"), Quantity("kg/s", "kg/s")
 _LENGTH, _AREA = Quantity("m", "mm"), Quantity("m^2", "cm^2")
@@ -23,7 +23,6 @@ _BY_NAME = {"x": _LENGTH, "y": _LENGTH, "z": _LENGTH, "tap": _PRESSURE}
 _CALLED = {"pressure": "a pressure or head", "mass_flow": "a flow", "area": "an area", "face": "a face"} | {
     name: name for name in _BY_NAME
 }
-_SEPARATORS = ";\t,"
 #: May be negative: places, because the valve is symmetric, and pressures in the fluid.
 _SIGNED = ("x", "y", "tap")
 FACES = ("inner", "outer", "middle")
@@ -121,7 +120,7 @@ def _read_header(line: str, density: float) -> list[tuple[str, str, Quantity | N
     if len(set(names)) < len(names):
         twice = next(name for name in names if names.count(name) > 1)
         raise ValueError(f"whose columns are not told, because two are {_CALLED[twice]}; {_HEADER}")
-    divided = any(mark in line for mark in _SEPARATORS)
+    divided = any(mark in line for mark in SEPARATORS)
     if (divided and len(cells_of(line)) != len(columns)) or not any(_makes(kind, set(names)) for kind in _NEEDED):
         raise ValueError(f"whose columns are not told; {_HEADER}")
     return columns

@@ -38,8 +38,14 @@ def numbered_lines(path: Path) -> list[tuple[int, str]]:
     return [(i, line) for i, line in lines if line]
 
 
-def cells_of(line: str) -> list[str]:
-    """Cells of a line of a table: what stands between tabs, semicolons, commas or, without any of these, blanks.
+#: What divides the cells of a table, the first that a line has; without any of these blanks do.
+SEPARATORS = "\t;,"
+_ALIGNING_TAB = re.compile(r"(?<=[;,])\t+|\t+(?=[;,])")
+_DECIMAL_COMMA = re.compile(r"^([+-]?\d+),(\d+)")
+
+
+def cells_of(line: str, head: str = "") -> list[str]:
+    """Cells of a line of a table, divided as its head is, where one is given, or as the line itself.
 
     Between tabs or semicolons numbers may have decimal commas, as spreadsheets of half the world write them. A tab
     beside a comma or a semicolon is a blank.
@@ -49,8 +55,8 @@ def cells_of(line: str) -> list[str]:
     >>> cells_of("0,5; 10,25 kPa"), cells_of("0.5,\\t10"), cells_of("x [mm] y [mm]")
     (['0.5', '10.25 kPa'], ['0.5', '10'], ['x[mm]', 'y[mm]'])
     """
-    line = _ALIGNING_TAB.sub(" ", line)
-    mark = next((mark for mark in "\t;," if mark in line), None)
+    line, head = (_ALIGNING_TAB.sub(" ", text) for text in (line, head or line))
+    mark = next((mark for mark in SEPARATORS if mark in head), None)
     if mark is None:
         return re.sub(r"\s+([\[(])", r"\1", line).split()
     cells = (cell.strip() for cell in next(csv.reader([line], delimiter=mark)))
@@ -82,8 +88,6 @@ def existing_file(path: Path, info: ValidationInfo) -> Path:
 ExistingFile = Annotated[Path, AfterValidator(existing_file)]
 
 _TIME, _PRESSURE = Quantity("s", "s"), Quantity("Pa", "kPa", head=True)
-_ALIGNING_TAB = re.compile(r"(?<=[;,])\t+|\t+(?=[;,])")
-_DECIMAL_COMMA = re.compile(r"^([+-]?\d+),(\d+)")
 _UNIT = re.compile(r"[\[(]\s*([^\])]+?)\s*[\])]")
 
 

@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
+from ..texts import digits
 from .parameters import PARAMETERS, Parameter
 from .quantity import GRAVITY, Quantity
 
@@ -172,6 +173,5 @@ class Units:
 
 
 def _shorter(number: str, ratio: float) -> str:
-    digits = len(re.sub(r"e.*|\D", "", number).lstrip("0"))
-    text = f"{float(number) * ratio:.{min(max(3, digits - 1), 5)}g}"
-    return f"{float(text):.0f}" if 1e3 <= abs(float(text)) < 1e6 and "e" in text else text
+    given = len(re.sub(r"e.*|\D", "", number).lstrip("0"))
+    return digits(float(number) * ratio, min(max(3, given - 1), 5))

@@ -224,7 +224,7 @@ def _rows(path: Path) -> list[tuple[int, list[str]]]:
     lines = [(number, line) for number, line in numbered if line.strip() and not line.lstrip().startswith("#")]
     if not lines:
         raise MaterialError(f"Tension test {path} is empty.")
-    return [(number, cells_of(line)) for number, line in lines]
+    return [(number, cells_of(line, lines[0][1])) for number, line in lines]
 
 
 def _sheet(path: Path) -> str:

@@ -148,13 +148,20 @@ SPREADSHEETS = [
 @pytest.mark.parametrize(("read", "text"), SPREADSHEETS, ids=lambda x: getattr(x, "__name__", ""))
 @pytest.mark.parametrize("mark", [";", "\t"])
 def test_tables_may_have_decimal_commas(read, text, mark, tmp_path):
-    """What a spreadsheet writes in half the world: semicolons or tabs between, commas within numbers."""
+    """Semicolons or tabs between cells and commas within numbers, as spreadsheets of half the world write them."""
     file = tmp_path / "table.csv"
     file.write_text(text)
 
     expected = repr(read(file))
     file.write_text(text.replace(",", mark).replace(".", ","))
     assert repr(read(file)) == expected
+
+
+def test_a_semicolon_in_a_remark_divides_no_row_below_a_header_with_commas(tmp_path):
+    file = tmp_path / "table.csv"
+    file.write_text('engineering_strain [%], nominal_stress [MPa], remark\n0, 0, "clamped; new"\n10, 0.25,\n')
+    (test,) = read_curves(file)
+    assert test.strain.tolist() == [0.0, 0.1] and test.stress.tolist() == [0.0, 0.25e6]
 
 
 def test_key_points_are_found_beside_the_case_file(tmp_path):
