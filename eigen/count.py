@@ -265,7 +265,7 @@ class _Walk:
         length = np.concatenate([[1.0], length])  # the first interval begins at zero
         slope = np.abs(steps) / np.maximum(length, 1e-14)
         beside = np.maximum(np.concatenate([[0.0], slope[:-1]]), np.concatenate([slope[1:], [0.0]]))
-        power = 2.0 * (self.f.pencil.b - len(self.f.fluid) + 1)  # a growth like a power of omega hides nothing
+        power = self.f.power  # a growth like that hides nothing
         near = (slope > power) | (np.arange(slope.size) == 0)
         return np.flatnonzero(
             (np.abs(steps.imag) > OPTIONS.phase)

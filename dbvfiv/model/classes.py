@@ -45,6 +45,9 @@ class LinearisedClass(LinearisedState):
         values = self.shell.relaxing_tangents(np.zeros(self.shell.size))
         return tuple(self.shell.dofs.matrix(part) for part in values)
 
+    def resolved(self, mu) -> float:
+        return np.inf  # a plug has no waves
+
     def fluid_parts(self, density, storage=None, line=None) -> dict[str, np.ndarray]:
         """A0 to A2 of the plug; neither the continuity law nor a line matters, since no area changes."""
         flow = self.model.flow

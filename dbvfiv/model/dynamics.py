@@ -17,7 +17,7 @@ import scipy.sparse as sp
 
 from eigen.operator import FLUID_PARTS, CoupledPencil, Relaxation
 
-from ..case.parameters import PIPES
+from ..case.parameters import PIPES, Mu
 from ..errors import SolveError
 from ..flow.channel import Channel
 from ..flow.law import FlowLaw, FlowMotion
@@ -77,17 +77,34 @@ class LinearisedState:
         """
         return self.model.seal(self.area)
 
+    def resolved(self, mu: Mu) -> float:
+        """Frequency up to which waves of the fluid inside are resolved, Hz; infinite where these motions make none."""
+        law = self.model.flow if self.seal is None else self._still_law(mu.storage)
+        return law.resolved(mu.pipes)
+
+    def _still_law(self, storage: float | None) -> FlowLaw:
+        """Law of the still fluid in front of a seal: with the waves of a line where the wall displaces what makes them;
+        a gas has the inertia of a fluid that is not compressed.
+        """
+        flow = self.model.flow
+        rigid = still_channel(flow)
+        waves = not flow.compressed and (rigid.storage if storage is None else storage) > 0
+        return (flow if waves else rigid).shut(self.seal)
+
     def shut_parts(self, density: float, storage: float | None, line: Mapping[str, float]) -> dict[str, np.ndarray]:
-        """A0 to S1 of the still fluid in front of a seal, behind the rigid column of a line."""
+        """A0 to S1 of the still fluid in front of a seal."""
         given = {"inlet": self.inlet, "density": density, **line} | ({} if storage is None else {"storage": storage})
-        law = still_channel(self.model.flow).shut(self.seal)
-        found = law.linearise(FlowMotion.still(self.area, np.zeros(law.inner)), given)
-        own = found.parts() | {"R0": found.R1, "R1": found.R2, "S0": found.S1}  # nothing passes the seal at any time
+        law = self._still_law(storage)
+        rest = law.with_velocity(law.steady_inner(self.area, given), 0.0)
+        found = law.linearise(FlowMotion.still(self.area, rest), given).parts()
         parts = self.no_flow(self.model.flow.inner)
         parts["S0"] = np.eye(self.model.flow.inner)
-        for name in ("A0", "A1", "A2", "B0", "B1", "R0", "R1", "S0"):
-            rows, columns = own[name].shape
-            parts[name][:rows, :columns] = own[name]
+        for name, values in found.items():
+            rows, columns = values.shape
+            parts[name][:rows, :columns] = values
+        # the passage's own balance is the discharge past the seal, whose rate vanishes: so does it at all times
+        for name, rate in (("R0", "R1"), ("R1", "R2"), ("S0", "S1")):
+            parts[name][0], parts[rate][0] = parts[rate][0], 0.0
         return parts
 
     def fluid_parts(self, density: float, storage: float | None = None, line: Mapping[str, float] = {}):

@@ -142,10 +142,10 @@ def kicked(
         If there is no such mode, or it does not move the lip.
     """
     model = motion.model
-    pencil = linearise(model, q, inlet).pencil(motion.mu)
+    linear = linearise(model, q, inlet)
+    pencil = linear.pencil(motion.mu)
     try:
-        resolved = model.flow.resolved(motion.mu.pipes)
-        found, index = _find_mode(pencil, motion.mu, push, resolved)
+        found, index = _find_mode(pencil, motion.mu, push, linear.resolved(motion.mu))
     except (SingularShiftError, np.linalg.LinAlgError) as error:
         said = str(error).rstrip(".")
         raise SolveError(f"The mode to push along at {inlet:.6g} Pa was not found: {said}.") from error

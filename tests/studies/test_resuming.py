@@ -29,9 +29,11 @@ ONSET = {"onset.over": "pressure=4 kPa:12 kPa:5", "onset.normal_form": False, "f
 SCAN = {"onset.over": "density=1:1000:4:log", "onset.coarse_mesh": 0, "onset.normal_form": False}
 #: Its curves need three rounds of columns.
 CURVES = {"map.x": "pressure=500:30000:4", "map.y": "density=1:1000:10:log", "map.checks": 1, "damping.beta": 0.001}
+LONG = {"upstream.length": 100.0, "upstream.elements": 2, "drive.pressure": "6 kPa"}
 #: Runs by name, the study first.
 RUNS = {
     "modes": {"modes.symmetry": "all", "modes.count": 2},
+    "modes-undecided": {"modes.symmetry": "all", "modes.count": 2, "upstream.wave_speed": 300.0, **LONG},
     "sweep": {"sweep.over": "density=1:1000:5:log", "sweep.count": 3},
     "onset": ONSET,
     "onset-classes": SCAN | {"onset.symmetry": "all"},
@@ -93,6 +95,7 @@ def slow(*where):
     "name, share",
     [
         ("modes", 0.5),
+        ("modes-undecided", 0.5),
         ("sweep", 0.5),
         slow("onset", 0.1),
         slow("onset", 0.4),

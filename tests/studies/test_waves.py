@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import dbvfiv
-from dbvfiv.studies.case import thesis_case
+from dbvfiv.studies.case import load_case, thesis_case
 
 MESH = {"mesh.around": 8, "mesh.along": 12}
 LINE = {"upstream.length": 6.0, "upstream.wave_speed": 600.0, "upstream.loss": 1.5, "upstream.elements": 3}
@@ -44,6 +44,26 @@ def test_no_door_calls_a_valve_stable_whose_line_is_too_coarse_for_its_modes():
     told += [verdict["outcome"] for verdict in valve.sweep("pressure=1500,1600").summary()["verdict"]]
     told += [verdict["outcome"] for verdict in valve.onset("beta=4e-4:5e-4:3").summary()["scan"]["verdict"]]
     assert set(told) == {"undecided"}
+
+
+@pytest.mark.parametrize(
+    "case, keys",
+    [
+        (thesis_case(), {"modes.symmetry": "SA", "drive.pressure": "6 kPa"}),
+        (load_case("cases/dbv12-moulded.toml"), {"drive.pressure": "300 Pa"}),
+    ],
+)
+def test_motions_that_meet_no_waves_are_searched_beyond_those_that_are_resolved(case, keys):
+    """Lips that sway together, and a bill that is sealed under the quasi-steady flow model, where the wall displaces
+    nothing: the same modes behind a rigid line.
+    """
+    line = {"upstream.length": 40.0, "upstream.diameter": 0.3, "fluid.continuity": "quasi-steady"}
+    waves = {"upstream.wave_speed": 400.0, "upstream.elements": 2}
+    shared = MESH | line | keys | {"modes.count": 3, "damping.model": "rayleigh", "damping.alpha": 2.0}
+    elastic, rigid = (dbvfiv.load(case, shared | changes).modes() for changes in (waves, {}))
+    assert elastic.verdict.outcome == "stable" and elastic.modes[2].frequency > 20.0
+    rates = [[(mode.growth_rate, mode.angular_frequency) for mode in found.modes] for found in (elastic, rigid)]
+    assert rates[0] == [pytest.approx(pair, rel=1e-7) for pair in rates[1]]
 
 
 @pytest.mark.slow

@@ -46,11 +46,14 @@ def tables_of(mesh: MeshData) -> tuple[TableSpec, TableSpec, TableSpec]:
 def run(session: Session, record: GrowingRecord) -> None:
     """Leading modes of the steady state at drive.pressure, in every variant asked for."""
     case, model, options = session.case, session.model, ModesOptions.of(session.case)
-    asked = variants(case, "modes")
-    missing = [variant for variant in asked if variant not in _notes(record)]
-    if record.notes(_REFUSAL) or not missing:
-        return
     state, place = session.equilibrium(record), Mu.of(model.case)
+    if record.notes(_REFUSAL):
+        return
+    known = _notes(record)
+    for verdict in (Verdict.read(note["verdict"]) for note in known.values()):
+        if verdict.stable is None:
+            record.warn(verdict.reason)
+    missing = [variant for variant in variants(case, "modes") if variant not in known]
     if not record.rows(STATE):
         record.append(STATE, state_row(model, state))
     walk = StabilityWalk(model.case, model=model)

@@ -94,10 +94,10 @@ class ValveFamily(PencilFamily):
 
     def leading(self, mu: Mu, in_vacuo: bool = False) -> LeadingSearch:
         """Search for the leading modes, with the frequency up to which it is a verdict on the state."""
-        key = mu.beta, mu.loss_factor, in_vacuo, *mu.pipes.values()  # nothing else decides
+        key = mu.beta, mu.loss_factor, mu.storage, in_vacuo, *mu.pipes.values()  # nothing else decides
         if key not in self._searches:
             asked = SearchOptions(max_frequency=self.max_frequency)
-            resolved = np.inf if in_vacuo else self.linear.model.flow.resolved(mu.pipes)
+            resolved = np.inf if in_vacuo else self.linear.resolved(mu)
             self._searches[key] = select_search(asked, mu, self._lowest, self.modes, resolved)
         return self._searches[key]
 
