@@ -249,7 +249,7 @@ class _Load:
         if self.pressure is None and self.halved:
             raise self.missed  # there is no operating point to be halved
         whole = operating_pressure(model, self.observer) if self.pressure is None else self.pressure
-        return model.flow.back + (whole - model.flow.back) / 2**self.halved
+        return model.flow.back + (whole - model.flow.back) / 2**self.halved if self.halved else whole
 
     def told(self) -> str:
         """Its pressure in words."""

@@ -11,6 +11,8 @@ from dbvfiv.case.write import case_toml
 from dbvfiv.model.material_stability import tension_of
 from dbvfiv.model.strain_level import settle_levels
 from dbvfiv.studies.case import Case, load_case, thesis_case
+from dbvfiv.studies.session import Session
+from tests.observers import Stop
 
 COARSE = {"mesh.around": 8, "mesh.along": 14}
 AUTO = COARSE | {"materials.strain_level": "auto"}
@@ -39,6 +41,16 @@ def test_levels_agree_with_the_strains_they_give(found):
             assert rows[pressure, name]["level"] == 0.10 > rows[pressure, name]["peak"]
     given = dbvfiv.load(thesis_case(), COARSE).steady(pressure=36e3)
     assert rows[36e3, "CR"]["mass_flow"] > 1.03 * given.mass_flow
+
+
+def test_pressures_are_those_asked_for_also_in_a_run_that_goes_on(tmp_path):
+    """Behind a back pressure that rounds their differences."""
+    asked = {"levels.pressures": [13000.1, 13501.6], "downstream.pressure": 4200.3, "mesh.around": 6, "mesh.along": 8}
+    session = Session(thesis_case(asked))
+    whole = session.perform("levels")
+    part = session.perform("levels", tmp_path / "levels.h5", Stop(1))
+    assert [row["pressure"] for row in part.rows] == [13000.1] * 3 and not part.complete
+    assert dbvfiv.resume(tmp_path / "levels.h5").rows == whole.rows
 
 
 def levels_of(result):
