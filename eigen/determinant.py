@@ -217,7 +217,7 @@ class Determinant:
         0 or pi.
     power : float
         Exponent with which the ratio may grow over a wide interval: twice the unknowns of the fluid that it is not
-        divided for and the wall drives, and two.
+        divided for, but for those that stand apart, and two.
     fluid : (k,) array
         Zeros of what the ratio is divided by where the fluid has several unknowns, see `eigen.operator.FluidMotions`.
     evaluations : int
@@ -227,8 +227,8 @@ class Determinant:
         self.pencil, self.structure, self.line = pencil, structure, structure.line
         self.evaluations = 0
         self.fluid = pencil.fluid.stable(self.line)
-        driven = np.linalg.matrix_rank(np.hstack([pencil.R0, pencil.R1, pencil.R2])) if pencil.b and pencil.m else 0
-        self.power = 2.0 * (min(pencil.b - len(self.fluid), driven) + 1)
+        others = np.hstack([pencil.R0, pencil.R1, pencil.R2, pencil.S1, pencil.S0 - np.diag(np.diag(pencil.S0))])
+        self.power = 2.0 * (np.count_nonzero(others.any(axis=1)) - len(self.fluid) + 1)
         self.degree, self.leading_phase = self._at_infinity()
 
     def _at_infinity(self):

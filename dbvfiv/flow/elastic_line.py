@@ -352,10 +352,11 @@ class LineChannel(AroundChannel):
         return self.channel.speeds_of(area, area_rate, inner[: self.channel.inner], parameters)
 
     def with_velocity(self, inner, velocity):
-        if self.compressed:
+        if self.compressed and velocity:
             return inner
-        uniform = np.full(1 + self.line.size // 2, velocity)
-        return np.append(uniform, inner[len(uniform) :])
+        own, waves = np.split(np.array(inner, float), [self.channel.inner])
+        waves[: self.line.size // 2] = velocity
+        return np.append(self.channel.with_velocity(own, velocity), waves)
 
     def is_soft(self, density):
         return self.channel.is_soft(density)

@@ -165,8 +165,8 @@ def _mean(values):
 
 
 def _integral(law: GasChannel, values):
-    """Integral of values (m,) along the passage."""
-    return jnp.sum(law.step * _mean(values))
+    """Integral of values (m,) along the passage, up to a seal."""
+    return jnp.sum(law.cells * _mean(values))
 
 
 class LineInstant(NamedTuple):

@@ -75,9 +75,11 @@ class GasChannel(AroundChannel):
         Pressure at which the fluid boils, over that around the jet; negative.
     """
 
-    DATA = ("channel", "floor", "vapour")
-    STATIC = ("boils",)
+    DATA = ("channel", "floor", "vapour", "front")
+    STATIC = ("boils", "sealed")
     compressed = True
+    front = 1.0
+    sealed = False
     inner_names: ClassVar[tuple[str, ...]] = ("inlet velocity", "velocities", "logarithms of the density")
 
     def __init__(self, channel: Channel, sound_speed: float, ratio: float = 1.4, vapour: float | None = None):
@@ -149,8 +151,9 @@ class GasChannel(AroundChannel):
 
     def split(self, inner, parameters):
         """Velocities (m,), m/s, and sigma (m,), m/s, at the stations from the law's unknowns; traceable."""
-        speed = jnp.concatenate([inner[1 : self.count], inner[:1]])
-        return speed, jnp.concatenate([self.outlet(speed[0], parameters)[None], inner[self.count :]])
+        speed, sigma = jnp.concatenate([inner[1 : self.count], inner[:1]]), inner[self.count :]
+        outlet = sigma[:1] if self.sealed else self.outlet(speed[0], parameters)[None]
+        return speed, jnp.concatenate([outlet, sigma])
 
     # -- the definition
     # ----
@@ -168,8 +171,13 @@ class GasChannel(AroundChannel):
         added = jnp.zeros_like(area)
         if channel.terms:
             added = added + channel.term_momenta(channel.stream(area, area_rate, speed, inner), parameters)
-        psi = _cells(channel.step, speed) + added[:-1] - added[1:]
-        return jnp.concatenate([psi, added[-1:], _cells(channel.step, volume)])
+        psi, flange = _cells(channel.step, speed), added[-1:]
+        if self.sealed:  # the differences of what a fluid without compression has, which feeds no motion
+            before, spans = self._still._spans
+            psi = before[:-1] * speed[:-1] + (spans - before)[1:] * speed[1:]
+            flange = flange + before[-1:] * speed[-1:]
+        psi = psi + added[:-1] - added[1:]
+        return self._in_front(psi, flange, _cells(channel.step, volume), speed, sigma)
 
     @staticmethod
     def inside(sigma):
@@ -183,15 +191,17 @@ class GasChannel(AroundChannel):
         channel = self.channel
         speed, sigma = self.split(inner, parameters)
         open_ = above_floor(area, self.floor)
-        head = (reversible_head if channel.reversible else outward_head)(speed, inner[0])
+        head = (reversible_head if channel.reversible and not self.sealed else outward_head)(speed, inner[0])
         if channel.terms:
-            head = head + channel.term_heads(channel.stream(area, area_rate, speed, inner), parameters)
+            terms = [term for term in channel.terms if not (self.sealed and term.behind_throat)]
+            head = head + channel.term_heads(channel.stream(area, area_rate, speed, inner), parameters, terms)
         drive = self.supply(parameters)[0] if drive is None else drive
         total = head + self.enthalpy(sigma, parameters)
         thick = sigma + jnp.zeros_like(sigma).at[0].set(self.drawn(speed[0], parameters))
         flow = open_ * speed * jnp.exp(thick / parameters["sound_speed"])
         momentum = total[:-1] - total[1:] + self.shocks(speed, thick, parameters)
-        return jnp.concatenate([momentum, total[-1:] - drive, flow[:-1] - flow[1:]])
+        still = jnp.zeros_like(area)
+        return self._in_front(momentum, total[-1:] - drive, flow[:-1] - flow[1:], still, still)
 
     def drawn(self, speed, parameters):
         """sigma, m/s, of what is drawn in through the outlet with a speed, m/s; 0 where it flows out; traceable."""
@@ -222,6 +232,9 @@ class GasChannel(AroundChannel):
         """As `FlowLaw.sources` has them; `drive` is the enthalpy at the flange, m2/s2, where a line stands in front."""
         _, sigma = self.split(inner, parameters)
         pressure = self.pressure(sigma, parameters) + self.channel.static
+        if self.sealed:
+            rest = self.channel.static + parameters["inlet"] - self.channel.back
+            pressure = self.steady(area, parameters)[0] + self.front * (pressure - rest)
         return jnp.concatenate([pressure, self.balances(area, area_rate, inner, parameters, drive)])
 
     # -- the flange, where a line may stand in front
@@ -290,14 +303,14 @@ class GasChannel(AroundChannel):
             inner = jax.lax.stop_gradient(jax.lax.fori_loop(0, more, further, inner))
         for _ in range(2):
             inner = inner + _newton_step(own, area, driven, inner, drive)
-        _, sigma = self.split(inner, parameters)
+        _, sigma = own.split(inner, parameters)
         rest = jnp.zeros_like(area) + self.channel.static
         pressure = jnp.where(still, rest, self.pressure(sigma, parameters) + self.channel.static)
         return pressure, jnp.where(still, 0.0, inner)
 
     def without_drives(self) -> GasChannel:
-        """Copy of the law with only those terms that act on steady flow."""
-        return self.changed(channel=self.channel.without_drives())
+        """Copy of the law with only those terms that act on steady flow, which is that of an open passage."""
+        return self.changed(channel=self.channel.without_drives(), sealed=False, front=1.0)
 
     def reversed(self) -> GasChannel:
         return self.changed(channel=self.channel.reversed())
@@ -316,6 +329,49 @@ class GasChannel(AroundChannel):
 
     def inlet_ratio(self, inner):
         return float(np.exp(inner[2 * self.count - 2] / self.sound_speed))
+
+    # -- still gas in front of a seal
+    # ----
+
+    def shut(self, seal: int | None) -> GasChannel:
+        if seal is None:
+            return self
+        return self.changed(sealed=True, front=(np.arange(self.count) >= seal).astype(float))
+
+    @property
+    def _still(self) -> Channel:
+        """The sealed channel without compression."""
+        return self.channel.changed(sealed=True, front=self.front)
+
+    def _in_front(self, momentum, flange, mass, speed, sigma):
+        """Numbers (2 m - 1,) of the cells in front of a seal and of the flange; behind it speeds, that at the seal
+        included, and sigma, which stay as they are, take the places of momentum and mass; traceable.
+        """
+        if self.sealed:
+            front = jnp.asarray(self.front) > 0.0
+            # a seal at the outlet has no unknown pressure of its own: its cell has that of the next station
+            momentum = jnp.where(front[:-1].at[0].set(False), momentum, speed[:-1])
+            mass = jnp.where(front[:-1], mass, jnp.where(front[1:], speed[1:], sigma[1:]))
+        return jnp.concatenate([momentum, flange, mass])
+
+    @property
+    def cells(self):
+        """Lengths (m - 1,) of the cells, m, those behind a seal without length."""
+        return self.step * self.front[:-1] if self.sealed else self.step
+
+    def work_lengths(self, area):
+        return self._still.work_lengths(area)
+
+    def with_displaced(self, area, area_rate, inner):
+        if not self.sealed:
+            return inner
+        found = np.array(inner, float)
+        found[1 : self.count] *= np.append(0.0, np.asarray(self.front))[: self.count - 1]
+        return found
+
+    def with_velocity(self, inner, velocity):
+        """Unknowns of the gas at rest, with the pressure at the flange; no other velocity is free."""
+        return inner if velocity else np.append(np.zeros(self.count), np.full(self.count - 1, inner[-1]))
 
     # -- its energy, see `dbvfiv.flow.energy`
     # ----

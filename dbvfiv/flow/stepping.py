@@ -189,9 +189,10 @@ class MovingFluid:
 
     def facing(self, area: np.ndarray, speed: np.ndarray, inlet: float) -> MovingFluid:
         """The fluid of a step from areas and speeds (m,) under an inlet pressure, Pa: this one, or still in front of a
-        seal.
+        seal; of a liquid that is compressed a film passes, since stopping it would be a blow.
         """
-        seal, open_ = self._seal(area), self._behind[None]
+        open_ = self._behind[None]
+        seal = None if open_.compressed and not open_.quiet_inward else self._seal(area)
         if seal not in self._behind:
             law = open_.law.shut(seal)
             self._behind[seal] = open_ if law is open_.law else open_._with(law)
@@ -331,7 +332,11 @@ class FluidStep:
         if after is fluid:
             return FluidState(*new, carried, books)
         passage, acceleration = (flow.area, flow.area_rate), (flow.area_rate - old.area_rate) / self.h
-        return replace(after.moving(passage, acceleration, flow.inner, self.inlet), books=books)
+        moved = after.moving(passage, acceleration, flow.inner, self.inlet)
+        if books.size:  # what a seal stops, and the film in it, are a loss of the step
+            held = [sum(at.energies(flow.area, x).values()) for at, x in ((fluid, flow.inner), (after, moved.inner))]
+            books[fluid.law.book_names.index("gas_step_loss")] += held[0] - held[1]
+        return replace(moved, books=books)
 
 
 class FluidInstant:

@@ -83,28 +83,26 @@ class LinearisedState:
         return law.resolved(mu.pipes)
 
     def _still_law(self, storage: float | None) -> FlowLaw:
-        """Law of the still fluid in front of a seal: with the waves of a line where the wall displaces what makes them;
-        a gas has the inertia of a fluid that is not compressed.
-        """
+        """Law of which the still fluid in front of a seal is: with waves where the wall displaces what makes them."""
         flow = self.model.flow
         rigid = still_channel(flow)
-        waves = not flow.compressed and (rigid.storage if storage is None else storage) > 0
-        return (flow if waves else rigid).shut(self.seal)
+        return flow if (rigid.storage if storage is None else storage) > 0 else rigid
 
     def shut_parts(self, density: float, storage: float | None, line: Mapping[str, float]) -> dict[str, np.ndarray]:
         """A0 to S1 of the still fluid in front of a seal."""
         given = {"inlet": self.inlet, "density": density, **line} | ({} if storage is None else {"storage": storage})
         law = self._still_law(storage)
         rest = law.with_velocity(law.steady_inner(self.area, given), 0.0)
-        found = law.linearise(FlowMotion.still(self.area, rest), given).parts()
+        found = law.shut(self.seal).linearise(FlowMotion.still(self.area, rest), given).parts()
         parts = self.no_flow(self.model.flow.inner)
         parts["S0"] = np.eye(self.model.flow.inner)
         for name, values in found.items():
             rows, columns = values.shape
             parts[name][:rows, :columns] = values
-        # the passage's own balance is the discharge past the seal, whose rate vanishes: so does it at all times
+        # a balance of rates alone, as of the discharge past the seal, which stays zero, holds at all times
+        rates = ~np.hstack([parts["R0"], parts["S0"]]).any(axis=1)
         for name, rate in (("R0", "R1"), ("R1", "R2"), ("S0", "S1")):
-            parts[name][0], parts[rate][0] = parts[rate][0], 0.0
+            parts[name][rates], parts[rate][rates] = parts[rate][rates], 0.0
         return parts
 
     def fluid_parts(self, density: float, storage: float | None = None, line: Mapping[str, float] = {}):
@@ -248,7 +246,7 @@ def linearise(
     if seal is not None:
         stiffness = without_circulation(model, area, stiffness)
         if model.flow.unsteady:  # pressures do work on the areas
-            forces = model.forces_on_areas(nodal, still_channel(model.flow).shut(seal).work_lengths(area))
+            forces = model.forces_on_areas(nodal, model.flow.shut(seal).work_lengths(area))
     if added is None and model.outside is not None:
         added = model.outside.added_mass(q, structure)
     coupled = forces, slope, area, added, inner

@@ -20,6 +20,7 @@ from dbvfiv.flow import Channel, FlowMotion
 from dbvfiv.model import ValveModel
 from dbvfiv.model.build import moulded_share
 from dbvfiv.model.classes import linearise_class
+from dbvfiv.model.dynamics import linearise
 from dbvfiv.model.equilibria import LoadPath, SteadyOptions, first_opening, operating_pressure, sealing_for_cracking
 from dbvfiv.model.newton import EquilibriumSolver, NewtonOptions
 from dbvfiv.model.preset import stress_free_shape
@@ -236,6 +237,18 @@ def test_moving_fluid_in_front_of_a_seal_keeps_its_energy():
     gained = (kinetic(1e-5) - kinetic(-1e-5)) / 2e-5
     assert not speed[:4].any() and abs(gained) > 1e-9
     assert work == pytest.approx(entering - gained, rel=1e-6)
+
+
+def test_a_fluid_that_hardly_yields_is_one_that_does_not_in_front_of_a_seal():
+    """Waves of 100 km/s: eigenvalues to 1e-8."""
+    found = []
+    for keys in ({}, {"fluid.sound_speed": 1e5}):
+        model = ValveModel(thesis_case(COARSE | {"valve.sealing_pressure": PRESSURE, "drive.pressure": 480.0} | keys))
+        state = LoadPath(model).go_to(480.0)
+        linear = linearise(model, state.q, state.pressure)
+        assert linear.seal is not None
+        found.append(leading_modes(linear.pencil(Mu.of(model.case)), 4, SearchOptions(max_frequency=60.0)).eigenvalues)
+    assert found[1] == pytest.approx(found[0], rel=1e-8)
 
 
 def test_still_fluid_behind_a_seal_is_the_mass_of_what_the_wall_displaces():

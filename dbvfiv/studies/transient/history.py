@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from ...errors import CaseError
-from ...flow.stepping import FluidState, packed_size
+from ...flow.stepping import FluidState, MovingFluid, packed_size
 from ...model.state import LipCentre
 from ...model.valve import ValveModel
 from ...motion.control import RunOptions
@@ -61,18 +61,23 @@ class Instant:
         return balance if memory is None else balance + memory.work.sum()
 
     @cached_property
+    def _facing(self) -> MovingFluid:
+        """The fluid that the passage has, still where faces shut it."""
+        return self.motion.fluid.facing(self.load.area, self.load.speed, self.load.inlet)
+
+    @cached_property
     def flows(self) -> tuple[float, float, float]:
         """Mass flow out at the lip and in at the flange, kg/s of the part, and the largest Mach number."""
         speed, density = self.load.speed, self.motion.mu.density
         if self.motion.fluid.compressed:
-            return self.motion.fluid.readings(self.load.area, self.state.fluid.inner)
+            return self._facing.readings(self.load.area, self.state.fluid.inner)
         out = density * speed[0] * float(self.model.flow.open_area(self.load.area[0]))
         return out, density * speed[-1] * self.reader.inlet_area, 0.0
 
     @cached_property
     def fluid(self) -> dict[str, float]:
         """Energies that the fluid holds, and what became of it since the start, by the names of the law."""
-        held = self.motion.fluid.energies(self.load.area, self.state.fluid.inner)
+        held = self._facing.energies(self.load.area, self.state.fluid.inner)
         return held | dict(zip(self.model.flow.book_names, self.state.fluid.books))
 
     @cached_property

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from dbvfiv.flow.energy import GAS_BOOKS
 from dbvfiv.studies.transient.run import beyond_model
 
 from .runs import SHORT, transient
@@ -18,6 +19,20 @@ def test_a_steady_start_stays(valve):
     for name in ("mass_flow", "inlet_mass_flow", "gas_energy"):
         assert np.ptp(run.history[name]) < 1e-7 * np.abs(run.history[name]).max(), name
     assert run.history["mass_flow"][0] == pytest.approx(run.history["inlet_mass_flow"][0], rel=1e-9)
+
+
+def test_energies_close_where_faces_shut_and_part(valve, tmp_path):
+    """A blow of air parts the faces of a bill that is moulded shut; before and after it they let nothing pass."""
+    table = tmp_path / "blow.csv"
+    table.write_text("time [ms], pressure [Pa]\n0, 300\n5, 300\n15, 3000\n35, 3000\n40, 300\n")
+    keys = {"valve.sealing_pressure": 800.0, "damping.alpha": 5.0, "drive.pressure": 300.0}
+    times = {"transient.duration": 0.08, "transient.step": 1e-3, "transient.start": "steady"}
+    history = transient(valve(AIR | keys | times | {"transient.drive_table": str(table)})).history
+    flow = history["mass_flow"]
+    assert flow[0] == flow[5] == flow[-1] == 0.0 and flow.max() > 0.02
+    supply, *gone = (history[name] for name in GAS_BOOKS)
+    left = history["gas_energy"] - history["gas_energy"][0] - supply + sum(gone)
+    assert np.abs(left).max() < 1e-12 * np.abs(supply).max()
 
 
 def test_a_run_faster_than_sound_is_told():
