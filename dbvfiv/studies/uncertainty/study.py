@@ -71,8 +71,10 @@ def tables_of(_mesh: MeshData) -> tuple[TableSpec, ...]:
 
 
 def rows_to_keep(known: Record, _case: Case) -> dict[str, int]:
-    """Rows that a run goes on from: those of whole samples."""
-    return {name: known.rows(name) for name in (SAMPLES, NUMBERS)}
+    """Rows that a run goes on from: verdicts, and the inputs of the samples that have them."""
+    vouched, inputs = (set(zip(*(known.column(name, c) for c in (_LAW.name, "sample")))) for name in (SAMPLES, NUMBERS))
+    each = known.rows(NUMBERS) // max(len(inputs), 1)
+    return {SAMPLES: known.rows(SAMPLES), NUMBERS: each * len(vouched)}
 
 
 def run(session: Session, record: GrowingRecord, workers: int | str | None = None) -> None:

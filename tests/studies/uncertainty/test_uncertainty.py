@@ -11,6 +11,7 @@ import pytest
 import dbvfiv
 from dbvfiv.errors import CaseError
 from dbvfiv.observer import Observer
+from dbvfiv.record.record import GrowingRecord
 from dbvfiv.report.gather import Gathered
 from dbvfiv.report.parts import chance_part
 from dbvfiv.studies import workers
@@ -79,6 +80,25 @@ def test_workers_and_interruptions_change_no_digit(valve, found, tmp_path):
     assert partly.interrupted and 0 < len(partly.at(partly.plan.values[0])["outcome"]) < 16
     whole = dbvfiv.resume(path, workers=2)
     assert whole.complete and whole.summary() == found.summary() == load_result(path).summary()
+
+
+def test_inputs_without_a_verdict_are_not_kept_twice(valve, found, tmp_path, monkeypatch):
+    """A run that is killed after the inputs of some samples, before their verdicts."""
+    path, extend, inner = tmp_path / "samples.h5", [], GrowingRecord.extend
+
+    def killed(self, table, columns):
+        extend.append(table)
+        if extend.count("numbers") == 2 and table == "samples":
+            raise KeyboardInterrupt
+        inner(self, table, columns)
+
+    monkeypatch.setattr(GrowingRecord, "extend", killed)
+    partly = valve.uncertainty(inputs=OWN, output=path)
+    monkeypatch.undo()
+    assert len(partly.record.column("numbers", "sample")) > len(partly.record.column("samples", "sample")) * len(OWN)
+    record = dbvfiv.resume(path).record
+    for name in ("sample", "input", "value"):
+        assert np.array_equal(record.column("numbers", name), found.record.column("numbers", name))
 
 
 def test_surroundings_are_asked_side_by_side(valve):
