@@ -335,7 +335,7 @@ class FluidStep:
         moved = after.moving(passage, acceleration, flow.inner, self.inlet)
         if books.size:  # what a seal stops, and the film in it, are a loss of the step
             held = [sum(at.energies(flow.area, x).values()) for at, x in ((fluid, flow.inner), (after, moved.inner))]
-            books[fluid.law.book_names.index("gas_step_loss")] += held[0] - held[1]
+            books[next(i for i, name in enumerate(fluid.law.book_names) if "step_loss" in name)] += held[0] - held[1]
         return replace(moved, books=books)
 
 
