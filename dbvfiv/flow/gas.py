@@ -79,7 +79,6 @@ class GasChannel(AroundChannel):
     STATIC = ("boils", "sealed")
     compressed = True
     front = 1.0
-    sealed = False
     inner_names: ClassVar[tuple[str, ...]] = ("inlet velocity", "velocities", "logarithms of the density")
 
     def __init__(self, channel: Channel, sound_speed: float, ratio: float = 1.4, vapour: float | None = None):

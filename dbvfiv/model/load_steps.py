@@ -150,7 +150,7 @@ class LoadSteps:
         raise SolveError(f"The equilibrium at {self.pressure:.6g} Pa was lost: {result.reason}.")
 
     def _attempt(self, aim: float, straight: int | None) -> tuple[NewtonResult, np.ndarray | None]:
-        """What is found at a pressure, and dq/dP there if it is known."""
+        """Result at a pressure, and dq/dP there if it is known."""
         start = self.q if self.slope is None else self.q + (aim - self.pressure) * self.slope
         wide = abs(aim - self.pressure) > WIDE * max(abs(aim - self.origin), abs(self.pressure - self.origin))
         first, slope = self._judged(self.solver, self.solver.solve(start, aim, straight if wide else None), start, aim)
