@@ -9,7 +9,7 @@ from .cli import run
 
 def main() -> None:
     """Run the command line and leave with its exit status."""
-    sys.exit(run(sys.argv[1:]))
+    sys.exit(run(sys.argv[1:], leaving=True))
 
 
 if __name__ == "__main__":

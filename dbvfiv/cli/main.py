@@ -71,13 +71,15 @@ def build() -> typer.Typer:
     return commands_of
 
 
-def run(arguments: Sequence[str]) -> int:
+def run(arguments: Sequence[str], leaving: bool = False) -> int:
     """Run one command line.
 
     Parameters
     ----------
     arguments : sequence of str
         Without the program's name.
+    leaving : bool
+        True where the process ends with it: SIGTERM that comes again meanwhile does not change its status.
 
     Returns
     -------
@@ -85,7 +87,7 @@ def run(arguments: Sequence[str]) -> int:
         Exit status: 0 done, 1 no solution or a failing machine, 2 a case or
         an argument that cannot be used, 3 an error of the program, 130 interrupted, 143 terminated.
     """
-    with Ending() as ending:
+    with Ending(leaving) as ending:
         return _outcome(arguments, ending)
 
 
@@ -101,8 +103,8 @@ class Ending:
     #: A signal that comes again within this time is the same one sent twice, as `timeout` and many job systems do, s.
     SAME = 2.0
 
-    def __init__(self):
-        self.terminated = False
+    def __init__(self, leaving: bool = False):
+        self.terminated, self._leaving = False, leaving
         self._since = -math.inf
         self._before: Any = None
 
@@ -115,7 +117,7 @@ class Ending:
 
     def __exit__(self, *error: object) -> None:
         if self._before is not None:
-            signal.signal(signal.SIGTERM, self._before)
+            signal.signal(signal.SIGTERM, signal.SIG_IGN if self.terminated and self._leaving else self._before)
 
     def _interrupt(self, _number: int, _frame: FrameType | None) -> None:
         self.terminated = True

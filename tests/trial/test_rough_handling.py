@@ -71,18 +71,22 @@ def test_a_file_that_only_holds_the_name_of_a_run(tmp_path, command_line):
 
 
 @pytest.mark.slow
-def test_sigterm_twice_and_in_time(tmp_path):
-    """As `timeout` and job systems send it; the file says that it is not complete and what there is."""
+@pytest.mark.parametrize("pause", [0.01, None])
+def test_sigterm_twice_and_in_time(tmp_path, pause):
+    """As `timeout` and job systems send it, the second one as late as when the sentence is out; the file says that it
+    is not complete and what there is.
+    """
     path = tmp_path / "t.h5"
     run = start("transient", *COARSE, "--set", "drive.pressure=2 kPa", "--set", "transient.duration=50", "-o", path)
     while not path.exists() or not path.stat().st_size:
         assert run.poll() is None, run.communicate()
         time.sleep(0.05)
     time.sleep(0.5)
-    for _ in range(2):
-        run.send_signal(signal.SIGTERM)
-        time.sleep(0.01)
-    _, err = run.communicate(timeout=60)
+    run.send_signal(signal.SIGTERM)
+    said = "" if pause else run.stderr.readline()
+    time.sleep(pause or 0.05)
+    run.send_signal(signal.SIGTERM)
+    err = said + run.communicate(timeout=60)[1]
     assert run.returncode == 143 and err.strip().splitlines()[-1].startswith("Terminated; "), err
     assert not dbvfiv.load_result(path).complete
 
