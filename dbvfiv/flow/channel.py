@@ -156,15 +156,19 @@ class Channel(FlowLaw):
         if self.sealed:
             velocity = self.displaced(area, area_rate, storage)
         speeds = (open_[-1] * velocity - storage * upstream_integral(self.step, opening)) / open_
-        return jnp.where(self._spans[0] > 0, speeds, 0.0) if self.sealed else speeds
+        return jnp.where(self.spans[0] > 0, speeds, 0.0) if self.sealed else speeds
 
     def heads(self, area, area_rate, inner, parameters):
         """Heads (m,) from the inlet to each station, m2/s2: Bernoulli's and those of the terms; traceable."""
         speed = self.speeds(area, area_rate, inner[0], self._blend(parameters))
-        head = (reversible_head if self.reversible and not self.sealed else outward_head)(speed, inner[0])
+        return self.heads_of(self.stream(area, area_rate, speed, inner), parameters)
+
+    def heads_of(self, stream: Stream, parameters):
+        """Heads (m,) from the inlet to each station, m2/s2, of given speeds; traceable."""
+        head = (reversible_head if self.reversible and not self.sealed else outward_head)(stream.speed, stream.inner[0])
         if self.terms:
             terms = [term for term in self.terms if not (self.sealed and term.behind_throat)]
-            head = head + self.term_heads(self.stream(area, area_rate, speed, inner), parameters, terms)
+            head = head + self.term_heads(stream, parameters, terms)
         return head
 
     def psi(self, area, area_rate, inner, parameters):
@@ -173,7 +177,7 @@ class Channel(FlowLaw):
         """
         speed = self.speeds(area, area_rate, inner[0], self._blend(parameters))
         if self.sealed:
-            before, spans = self._spans
+            before, spans = self.spans
             psi = jnp.cumsum((spans * speed)[::-1])[::-1] - (spans - before) * speed
         else:
             psi = upstream_integral(self.step, speed)
@@ -282,7 +286,7 @@ class Channel(FlowLaw):
         return self.changed(sealed=True, front=(np.arange(self.count) >= seal).astype(float))
 
     @property
-    def _spans(self):
+    def spans(self):
         """Halves (m,) of the lengths before the stations, from the seal on, and what stands at each, m."""
         half = 0.5 * self.step * self.front[:-1]
         before = jnp.append(0.0, half)
@@ -291,7 +295,7 @@ class Channel(FlowLaw):
     def displaced(self, area, area_rate, storage):
         """Inlet velocity, m/s, of what the wall displaces in front of the seal; traceable."""
         open_, opening = jax.jvp(lambda a: above_floor(a, self.floor), (area,), (area_rate,))
-        return storage * jnp.sum(self._spans[1] * opening) / open_[-1]
+        return storage * jnp.sum(self.spans[1] * opening) / open_[-1]
 
     def work_lengths(self, area: np.ndarray) -> np.ndarray:
         """Lengths (m,), m, over which pressures of moving fluid in front of the seal do work on areas (m,).
@@ -299,7 +303,7 @@ class Channel(FlowLaw):
         With the discharges Q_k that the wall displaces, by trapezoids, the kinetic energy is rho/2 sum_k l_k Q_k^2/A_k,
         and pressures follow from it, so that they feed no motion.
         """
-        return np.asarray(self._spans[1]) * np.asarray(jax.grad(lambda a: above_floor(a, self.floor).sum())(area))
+        return np.asarray(self.spans[1]) * np.asarray(jax.grad(lambda a: above_floor(a, self.floor).sum())(area))
 
     def with_displaced(self, area, area_rate, inner):
         if not self.sealed:
@@ -310,7 +314,7 @@ class Channel(FlowLaw):
 
     def without_drives(self) -> Channel:
         """Copy of the channel with only those terms that act on steady flow."""
-        return self.changed(terms=self.losses, sealed=False)
+        return self.changed(terms=self.losses, sealed=False, front=1.0)
 
     def with_velocity(self, inner, velocity):
         return np.array([velocity])
@@ -390,3 +394,14 @@ class AroundChannel(FlowLaw):
     def storage(self) -> float:
         """Blend of the continuity laws."""
         return self.channel.storage
+
+    @property
+    def sealed(self) -> bool:
+        """State of the channel: True where it is shut."""
+        return self.channel.sealed
+
+    def shut(self, seal: int | None):
+        return self.changed(channel=self.channel.shut(seal))
+
+    def work_lengths(self, area):
+        return self.channel.work_lengths(area)

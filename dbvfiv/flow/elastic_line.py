@@ -361,17 +361,6 @@ class LineChannel(AroundChannel):
     def is_soft(self, density):
         return self.channel.is_soft(density)
 
-    @property
-    def sealed(self) -> bool:
-        """State of the passage: True where it is shut."""
-        return self.channel.sealed
-
-    def shut(self, seal: int | None) -> LineChannel:
-        return self.changed(channel=self.channel.shut(seal))
-
-    def work_lengths(self, area):
-        return self.channel.work_lengths(area)
-
     def with_displaced(self, area, area_rate, inner):
         return self.channel.with_displaced(area, area_rate, inner)
 

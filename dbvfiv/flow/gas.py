@@ -33,7 +33,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from .channel import AroundChannel, Channel, outward_head, reversible_head
+from .channel import AroundChannel, Channel
 from .energy import GAS_BOOKS, gas_books, gas_energy, gas_powers
 from .law import FlowParameter, above_floor
 
@@ -75,10 +75,9 @@ class GasChannel(AroundChannel):
         Pressure at which the fluid boils, over that around the jet; negative.
     """
 
-    DATA = ("channel", "floor", "vapour", "front")
-    STATIC = ("boils", "sealed")
+    DATA = ("channel", "floor", "vapour")
+    STATIC = ("boils",)
     compressed = True
-    front = 1.0
     inner_names: ClassVar[tuple[str, ...]] = ("inlet velocity", "velocities", "logarithms of the density")
 
     def __init__(self, channel: Channel, sound_speed: float, ratio: float = 1.4, vapour: float | None = None):
@@ -172,7 +171,7 @@ class GasChannel(AroundChannel):
             added = added + channel.term_momenta(channel.stream(area, area_rate, speed, inner), parameters)
         psi, flange = _cells(channel.step, speed), added[-1:]
         if self.sealed:  # the differences of what a fluid without compression has, which feeds no motion
-            before, spans = self._still._spans
+            before, spans = channel.spans
             psi = before[:-1] * speed[:-1] + (spans - before)[1:] * speed[1:]
             flange = flange + before[-1:] * speed[-1:]
         psi = psi + added[:-1] - added[1:]
@@ -190,10 +189,7 @@ class GasChannel(AroundChannel):
         channel = self.channel
         speed, sigma = self.split(inner, parameters)
         open_ = above_floor(area, self.floor)
-        head = (reversible_head if channel.reversible and not self.sealed else outward_head)(speed, inner[0])
-        if channel.terms:
-            terms = [term for term in channel.terms if not (self.sealed and term.behind_throat)]
-            head = head + channel.term_heads(channel.stream(area, area_rate, speed, inner), parameters, terms)
+        head = channel.heads_of(channel.stream(area, area_rate, speed, inner), parameters)
         drive = self.supply(parameters)[0] if drive is None else drive
         total = head + self.enthalpy(sigma, parameters)
         thick = sigma + jnp.zeros_like(sigma).at[0].set(self.drawn(speed[0], parameters))
@@ -233,7 +229,7 @@ class GasChannel(AroundChannel):
         pressure = self.pressure(sigma, parameters) + self.channel.static
         if self.sealed:
             rest = self.channel.static + parameters["inlet"] - self.channel.back
-            pressure = self.steady(area, parameters)[0] + self.front * (pressure - rest)
+            pressure = self.steady(area, parameters)[0] + self.channel.front * (pressure - rest)
         return jnp.concatenate([pressure, self.balances(area, area_rate, inner, parameters, drive)])
 
     # -- the flange, where a line may stand in front
@@ -309,7 +305,7 @@ class GasChannel(AroundChannel):
 
     def without_drives(self) -> GasChannel:
         """Copy of the law with only those terms that act on steady flow, which is that of an open passage."""
-        return self.changed(channel=self.channel.without_drives(), sealed=False, front=1.0)
+        return self.changed(channel=self.channel.without_drives())
 
     def reversed(self) -> GasChannel:
         return self.changed(channel=self.channel.reversed())
@@ -332,22 +328,12 @@ class GasChannel(AroundChannel):
     # -- still gas in front of a seal
     # ----
 
-    def shut(self, seal: int | None) -> GasChannel:
-        if seal is None:
-            return self
-        return self.changed(sealed=True, front=(np.arange(self.count) >= seal).astype(float))
-
-    @property
-    def _still(self) -> Channel:
-        """The sealed channel without compression."""
-        return self.channel.changed(sealed=True, front=self.front)
-
     def _in_front(self, momentum, flange, mass, speed, sigma):
         """Numbers (2 m - 1,) of the cells in front of a seal and of the flange; behind it speeds, that at the seal
         included, and sigma, which stay as they are, take the places of momentum and mass; traceable.
         """
         if self.sealed:
-            front = jnp.asarray(self.front) > 0.0
+            front = jnp.asarray(self.channel.front) > 0.0
             # a seal at the outlet has no unknown pressure of its own: its cell has that of the next station
             momentum = jnp.where(front[:-1].at[0].set(False), momentum, speed[:-1])
             mass = jnp.where(front[:-1], mass, jnp.where(front[1:], speed[1:], sigma[1:]))
@@ -356,16 +342,13 @@ class GasChannel(AroundChannel):
     @property
     def cells(self):
         """Lengths (m - 1,) of the cells, m, those behind a seal without length."""
-        return self.step * self.front[:-1] if self.sealed else self.step
-
-    def work_lengths(self, area):
-        return self._still.work_lengths(area)
+        return self.step * self.channel.front[:-1] if self.sealed else self.step
 
     def with_displaced(self, area, area_rate, inner):
         if not self.sealed:
             return inner
         found = np.array(inner, float)
-        found[1 : self.count] *= np.append(0.0, np.asarray(self.front))[: self.count - 1]
+        found[1 : self.count] *= np.append(0.0, np.asarray(self.channel.front))[: self.count - 1]
         return found
 
     def with_velocity(self, inner, velocity):
