@@ -10,6 +10,7 @@ import threading
 import time
 import traceback
 from collections.abc import Sequence
+from functools import cache
 from types import FrameType
 from typing import Annotated, Any
 
@@ -71,6 +72,12 @@ def build() -> typer.Typer:
     return commands_of
 
 
+@cache
+def _command() -> Any:
+    """Parser of all commands, the same for every command line of a process."""
+    return typer.main.get_command(build())
+
+
 def run(arguments: Sequence[str], leaving: bool = False) -> int:
     """Run one command line.
 
@@ -129,8 +136,7 @@ class Ending:
 def _outcome(arguments: Sequence[str], ending: Ending) -> int:
     """Exit status of a command line; failures become sentences."""
     try:
-        command = typer.main.get_command(build())
-        status = command.main(list(arguments), prog_name="dbvfiv", standalone_mode=False)
+        status = _command().main(list(arguments), prog_name="dbvfiv", standalone_mode=False)
         sys.stdout.flush()
         if status == 130:  # newer Typer swallows Ctrl-C
             raise KeyboardInterrupt
