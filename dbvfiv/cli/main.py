@@ -58,8 +58,9 @@ def _root(
     """
 
 
-def build() -> typer.Typer:
-    """All commands, in the order of their help."""
+@cache
+def build() -> Any:
+    """Parser of all commands, in the order of their help; one for every command line of a process."""
     commands_of = typer.Typer(
         add_completion=True, no_args_is_help=True, rich_markup_mode=None, pretty_exceptions_enable=False
     )
@@ -69,13 +70,7 @@ def build() -> typer.Typer:
     commands += [(command.__name__, command) for command in _AFTER]
     for name, command in commands:
         commands_of.command(name, no_args_is_help=False)(command)
-    return commands_of
-
-
-@cache
-def _command() -> Any:
-    """Parser of all commands, the same for every command line of a process."""
-    return typer.main.get_command(build())
+    return typer.main.get_command(commands_of)
 
 
 def run(arguments: Sequence[str], leaving: bool = False) -> int:
@@ -136,7 +131,7 @@ class Ending:
 def _outcome(arguments: Sequence[str], ending: Ending) -> int:
     """Exit status of a command line; failures become sentences."""
     try:
-        status = _command().main(list(arguments), prog_name="dbvfiv", standalone_mode=False)
+        status = build().main(list(arguments), prog_name="dbvfiv", standalone_mode=False)
         sys.stdout.flush()
         if status == 130:  # newer Typer swallows Ctrl-C
             raise KeyboardInterrupt

@@ -10,7 +10,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-import typer
 
 import dbvfiv
 from dbvfiv import cli
@@ -27,7 +26,7 @@ def follow(name: str, mesh: tuple[int, int] = COARSE, folder: str = "recipes") -
 
     A block of TOML or CSV that begins with `# NAME` is that file; every line of a block of the shell is a command.
     """
-    commands = typer.main.get_command(build()).commands
+    commands = build().commands
     keys = ("--set", f"mesh.around={mesh[0]}", "--set", f"mesh.along={mesh[1]}")
     text = (ROOT / f"docs/{folder}/{name}.md").read_text()
     for language, body in re.findall(r"^```(\w+)\n(.*?)^```$", text, re.M | re.S):
