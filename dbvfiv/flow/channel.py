@@ -400,7 +400,7 @@ class AroundChannel(FlowLaw):
         """State of the channel: True where it is shut."""
         return self.channel.sealed
 
-    def shut(self, seal: int | None):
+    def shut(self, seal: int | None) -> AroundChannel:
         return self.changed(channel=self.channel.shut(seal))
 
     def work_lengths(self, area):
