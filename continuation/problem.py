@@ -125,7 +125,7 @@ class Local:
         self.columns = [system.d_parameter(u, mu, name) for name in problem.names]
         self.solver = bordered(self.linear, self.columns, frame)
         #: Directions along which F stays zero, shape (n + k, k).
-        self.basis = np.array([self.solver.solve(row) for row in np.eye(n + k)[n:]]).reshape(k, n + k).T
+        self.basis = np.array([self.solver.solve(row) for row in np.eye(k, n + k, n)]).reshape(k, n + k).T
         self.condition = None
         if problem.condition is not None:
             self.condition = problem.condition.evaluate(system, u, mu, problem.names, self.linear, problem.extra(z))

@@ -362,6 +362,6 @@ def _basis(system: PeriodicValve, spectrum) -> np.ndarray:
         mode = spectrum.mode(i)
         vector = np.concatenate([mode.q, mode.u])
         columns += [vector.real, vector.imag]
-    columns += list(np.eye(system.size)[system.size - system.inner :])
+    columns += list(np.eye(system.inner, system.size, system.size - system.inner))
     sizes = [np.linalg.norm(x / system.scales) for x in columns]
     return np.array([x / s for x, s in zip(columns, sizes) if s > 0]).T
