@@ -301,11 +301,14 @@ class Runs:
         self._tasks: set[asyncio.Task] = set()
 
     def of(self, folder: Path) -> list[Run]:
-        """Runs of the folder of a user, the newest first."""
+        """Runs of the folder of a user, the newest first, without results of which the kind is still to be told."""
+        return sorted((run for run in self._all(folder).values() if run.kind), key=lambda run: -run.made)
+
+    def _all(self, folder: Path) -> dict[str, Run]:
         if folder not in self._known:
             found = [Run.read(path) for path in sorted((folder / "runs").glob("*")) if path.is_dir()]
             self._known[folder] = {run.name: run for run in found if run is not None}
-        return sorted(self._known[folder].values(), key=lambda run: -run.made)
+        return self._known[folder]
 
     def add(self, folder: Path, kind: str, title: str, files: dict[str, bytes], arguments: list[str]) -> Run:
         """Put a run with its files into the queue.
@@ -334,7 +337,8 @@ class Runs:
         return run
 
     def _make(self, folder: Path, kind: str, title: str, files: dict[str, Path | bytes], arguments: list[str]) -> Run:
-        if len(self.of(folder)) >= KEPT:
+        known = self._all(folder)
+        if len(known) >= KEPT:
             raise CaseError(f"{KEPT} results are kept already; delete some.")
         own = folder / "runs" / f"{time.time_ns():x}-{secrets.token_hex(3)}"
         own.mkdir(parents=True)
@@ -344,7 +348,7 @@ class Runs:
             else:
                 (own / name).write_bytes(content)
         run = Run(own, kind, title, arguments, made=time.time())
-        self._known[folder][run.name] = run
+        known[run.name] = run
         return run
 
     def resume(self, run: Run) -> None:
@@ -371,7 +375,7 @@ class Runs:
     def delete(self, folder: Path, run: Run) -> None:
         """End a run and delete its folder."""
         self.cancel(run)
-        self._known[folder].pop(run.name, None)
+        self._all(folder).pop(run.name, None)
         shutil.rmtree(run.folder, ignore_errors=True)
 
     def _next(self) -> None:

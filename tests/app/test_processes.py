@@ -80,6 +80,14 @@ def test_users_keep_so_many(stubborn, monkeypatch):
         runs.keep(home, "3.h5", b"")
 
 
+def test_a_result_is_listed_as_soon_as_its_kind_is_known(tmp_path):
+    runs = Runs()
+    run = runs.keep(tmp_path, "six.h5", b"")
+    assert not runs.of(tmp_path)
+    run.kind = "steady"
+    assert runs.of(tmp_path) == [run]
+
+
 def test_a_spoiled_journal_is_passed_over(tmp_path):
     for number, text in enumerate(("", "{", '{"kind": 1}', '{"kind": "map", "title": "t", "process": 3, "x": 1}')):
         folder = tmp_path / "runs" / str(number)
