@@ -1,7 +1,7 @@
 """A process that starts studies in children, kills them at random moments, and says what their files hold.
 
-It imports everything once and starts nothing itself, so that a child can be forked from it. It reads requests from
-standard input, one JSON document a line, and answers likewise.
+It imports everything and loads the compiled element loops once, and starts nothing of JAX itself, so that a child can
+be forked from it. It reads requests from standard input, one JSON document a line, and answers likewise.
 """
 
 from __future__ import annotations
@@ -268,5 +268,9 @@ def answer(request: dict) -> dict:
 if __name__ == "__main__":
     warnings.simplefilter("ignore")  # JAX warns of forks; it has not begun to work here
     assert Valve and all(find_study(kind) for kind in KINDS)
+    model = dbvfiv.load(thesis_case(), CASE).session.described
+    rest = np.zeros(model.shell.size)
+    model.shell.force_and_tangent(rest), model.shell.mass(rest), model.shell.inertia(rest, rest, rest)
+    model.station_forces(model.shell.dofs.expand(rest))
     for line in sys.stdin:
         print(json.dumps(answer(json.loads(line))), flush=True)
