@@ -176,10 +176,10 @@ class BranchPointCondition:
         # The first border must not be singular with its row alone, so the rows are ordered
         # by the caller: the tangent of the branch first.
         solver = bordered(linear, columns, rows)
-        unit = np.eye(n + 2)
-        right = [solver.solve(unit[n + i]) for i in range(2)]
+        units = np.eye(2, n + 2, n)
+        right = [solver.solve(unit) for unit in units]
         self.null = [x[: n + 1] for x in right]
-        self.w = solver.solve_transpose(unit[-1])[:n]
+        self.w = solver.solve_transpose(units[-1])[:n]
         self.values = np.array([x[-1] for x in right])
 
     def extended_along(self, x, du, dmu):

@@ -270,7 +270,9 @@ if __name__ == "__main__":
     assert Valve and all(find_study(kind) for kind in KINDS)
     model = dbvfiv.load(thesis_case(), CASE).session.described
     rest = np.zeros(model.shell.size)
-    model.shell.force_and_tangent(rest), model.shell.mass(rest), model.shell.inertia(rest, rest, rest)
+    model.shell.force_and_tangent(rest)
+    model.shell.mass(rest)
+    model.shell.inertia(rest, rest, rest)
     model.station_forces(model.shell.dofs.expand(rest))
     for line in sys.stdin:
         print(json.dumps(answer(json.loads(line))), flush=True)
