@@ -186,6 +186,8 @@ class TransferBasis:
         Number of structural modes.
     compression : float
         Static corrections smaller than this, relative to the largest, are left out.
+    workspace : Workspace, optional
+        Keeps the symbolic factorisation between pencils of one pattern.
 
     Attributes
     ----------
@@ -205,14 +207,22 @@ class TransferBasis:
     1
     """
 
-    def __init__(self, pencil: CoupledPencil, *, modes: int = 24, compression: float = 1e-7):
-        typical = _at_typical_frequency(pencil)
-        values, vectors = lowest_modes(typical, modes)
+    def __init__(
+        self,
+        pencil: CoupledPencil,
+        *,
+        modes: int = 24,
+        compression: float = 1e-7,
+        workspace: Workspace | None = None,
+    ):
+        workspace = workspace or Workspace()
+        typical = _at_typical_frequency(pencil, workspace)
+        values, vectors = lowest_modes(typical, modes, workspace)
         self.structural_frequencies = _frequencies(pencil, values, vectors)
         self.V = np.zeros((pencil.n, 0))
         self._extend(pencil.M, vectors, ROUNDING**0.5)
         if pencil.m and self.V.shape[1] < pencil.n:
-            factor = Workspace().factor_stiffness(typical.replace(C=0.0 * pencil.M))
+            factor = workspace.factor_stiffness(typical.replace(C=0.0 * pencil.M))
             parts = [factor.solve(pencil.G.toarray()).real, factor.solve_transposed(pencil.J.toarray().T).real]
             self._extend(pencil.M, np.hstack([p / (np.linalg.norm(p) or 1.0) for p in parts]), compression)
 

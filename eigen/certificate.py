@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -127,6 +127,7 @@ def missing_pairs(
     basis: TransferBasis | None,
     line: float,
     options: SearchOptions,
+    workspace: Workspace,
 ) -> Found | None:
     """Unstable pairs of the full pencil near those that the pencil on a basis has and a spectrum lacks: beyond its band
     too, if that was not asked for, as far as they are resolved; without a basis those of a small pencil.
@@ -154,7 +155,6 @@ def missing_pairs(
     still = values.imag[unstable] == 0
     chosen = [*unstable[still][: OPTIONS.distant], *unstable[~still][: OPTIONS.distant]]
     starts = [(values[i], q[:, i] if basis is None else basis.V @ q[:, i], u[:, i]) for i in chosen]
-    workspace = Workspace()
     pairs = []
     for start in starts:
         pair = newton(pencil, *start, workspace=workspace, tolerance=options.tolerance, steps=OPTIONS.steps)
@@ -304,10 +304,11 @@ def certified_spectrum(
     CertifiedSpectrum
     """
     options = options or SearchOptions()
-    search = partial(leading_modes, pencil, workspace=workspace or Workspace(), solver=solver)
+    workspace = workspace or Workspace()
+    search = partial(leading_modes, pencil, workspace=workspace, solver=solver)
     spectrum = search(count, options)
-    basis = (basis or TransferBasis(pencil)) if pencil.n > dense else None
-    asked = pencil, options, search
+    basis = (basis or TransferBasis(pencil, workspace=workspace)) if pencil.n > dense else None
+    asked = pencil, options, search, workspace
     if not whole and options.max_frequency is not None and np.isfinite(spectrum.band):
         found, _ = _judged(*asked, spectrum, basis, within=options.inside * spectrum.band)
         if found.agrees:
@@ -316,14 +317,14 @@ def certified_spectrum(
     for finer in range(1, OPTIONS.finer + 1):
         if found.agrees or basis is None:
             break
-        basis = _finer(pencil, basis, found, finer)
+        basis = _finer(pencil, basis, found, finer, workspace)
         if basis.size > dense:
             break
         found, basis = _judged(*asked, found.spectrum, basis, finer)
     return found
 
 
-def _finer(pencil, basis, found, finer) -> TransferBasis:
+def _finer(pencil, basis, found, finer, workspace) -> TransferBasis:
     """A basis that answers better than the one that left a count open."""
     spectrum = found.spectrum
     if finer == 1 and len(spectrum):  # a mode that is all but neutral has to be met to a fraction of its growth rate
@@ -331,13 +332,13 @@ def _finer(pencil, basis, found, finer) -> TransferBasis:
     checked = _checks(spectrum, found.count, finer - 1, basis)
     exact = []
     for f in checked:
-        factor = Workspace().factored(pencil, 2j * np.pi * f)
+        factor = workspace.factored(pencil, 2j * np.pi * f)
         exact += [factor.solve(pencil.G.toarray().astype(complex))]
         exact += [factor.solve_transposed(pencil.J.toarray().T.astype(complex))]
     return basis.enlarged(pencil, *exact, compression=OPTIONS.distinct)
 
 
-def _judged(pencil, options, search, spectrum, basis, finer=0, within=None):
+def _judged(pencil, options, search, workspace, spectrum, basis, finer=0, within=None):
     """A spectrum beside a count, and the basis of the count; both may grow by what the count points to. The count is
     that of all that is resolved, or `within` a band, Hz.
     """
@@ -362,7 +363,7 @@ def _judged(pencil, options, search, spectrum, basis, finer=0, within=None):
         # all that were asked for are unstable: look at the rest of the unstable ones too
         spectrum = search(winding.number + 2, options)
     if winding.number > listed_unstable(spectrum, winding):
-        distant = missing_pairs(pencil, spectrum, basis, winding.line, options)
+        distant = missing_pairs(pencil, spectrum, basis, winding.line, options, workspace)
         if distant is not None:
             spectrum = joined(spectrum, distant, winding.line)
             if basis is not None:
@@ -379,7 +380,7 @@ def _judged(pencil, options, search, spectrum, basis, finer=0, within=None):
     listed = listed_unstable(spectrum, winding)
     error = None
     if model is not pencil:
-        error = response_error(pencil, model, _checks(spectrum, winding, finer, basis))
+        error = response_error(pencil, model, _checks(spectrum, winding, finer, basis), workspace)
     trusted = winding.certain and (error is None or error < OPTIONS.trusted)
     certificate = Certificate(listed, winding.number, trusted, winding.line, winding.band)
     return CertifiedSpectrum(spectrum, winding, certificate, error), basis
@@ -391,12 +392,15 @@ def listed_unstable(spectrum: Spectrum, count: Count) -> int:
     return spectrum.select(inside).count_right_of(count.line)
 
 
-def response_error(pencil: CoupledPencil, reduced: CoupledPencil, frequencies) -> float:
+def response_error(
+    pencil: CoupledPencil, reduced: CoupledPencil, frequencies: Sequence[float], workspace: Workspace | None = None
+) -> float:
     """Largest error of log det of the condensed pencil made by a reduced one, at i 2 pi f."""
+    workspace = workspace or Workspace()
     worst, small, forces = 0.0, StructureMatrices(reduced), reduced.G.toarray()
     for f in frequencies if pencil.m else ():
         s = 2j * np.pi * f
-        exact = Workspace().factored(pencil, s).solve(pencil.G.toarray().astype(complex))
+        exact = workspace.factored(pencil, s).solve(pencil.G.toarray().astype(complex))
         coupling, _ = pencil.fluid.condensed([s])
         other = np.linalg.solve(small.matrix(s).toarray(), forces)
         both = [np.eye(pencil.m) - coupling[0] @ H for H in (real_apply(pencil.J, exact), reduced.J @ other)]

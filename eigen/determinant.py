@@ -154,7 +154,10 @@ class Structure:
         if np.abs(M - M.T).max() > 1e-10 * np.abs(M).max():
             raise ValueError("The count needs a symmetric mass matrix.")
         self._G, self._J = pencil.G.toarray(), pencil.J.toarray()
-        self._flat = np.stack([K, C, M, *relaxing]).reshape(3 + len(relaxing), -1)
+        flat = np.stack([K, C, M, *relaxing]).reshape(3 + len(relaxing), -1)
+        filled = np.flatnonzero(flat.any(axis=0))
+        self._filled = filled if 2 * filled.size < flat.shape[1] else slice(None)
+        self._flat = np.ascontiguousarray(flat[:, self._filled])
         # (g + z)^2 M + (g + z) C + K = z^2 M + z (C + 2 g M) + (K + g C + g^2 M)
         relaxing, self._relaxation = np.array(relaxing).reshape(-1, *M.shape), None
         stiffness = K + line * C + line**2 * M
@@ -195,8 +198,8 @@ class Structure:
         # one product of real matrices, whose rows are real and imaginary parts in turn
         both = np.ascontiguousarray(np.stack(weights, axis=1)).view(float).reshape(s.size, -1, 2)
         flat = np.moveaxis(both, 2, 1).reshape(2 * s.size, -1) @ self._flat
-        out = np.empty((s.size, self._flat.shape[1]), complex)
-        out.real, out.imag = flat[0::2], flat[1::2]
+        out = np.zeros((s.size, self.pencil.n**2), complex)
+        out.real[:, self._filled], out.imag[:, self._filled] = flat[0::2], flat[1::2]
         return out.reshape(s.size, self.pencil.n, -1)
 
 

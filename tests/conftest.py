@@ -16,6 +16,11 @@ settings.register_profile(
 settings.load_profile("dbvfiv")
 
 
+def pytest_collection_modifyitems(items):
+    """Put long tests first, so that no worker waits for one in the end."""
+    items.sort(key=lambda item: not (item.get_closest_marker("long") or item.get_closest_marker("random")))
+
+
 @dataclass(frozen=True)
 class Outcome:
     """What one command line did."""

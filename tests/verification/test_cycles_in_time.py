@@ -1,11 +1,9 @@
 """Cycles of the valve and their Floquet exponents against runs in time, extrapolated to steps of no length.
 
-On a coarse mesh; with `DBVFIV_FINE=1` amplitudes and periods on the mesh of the cases too.
+On a coarse mesh; amplitudes and periods on the mesh of the cases too.
 """
 
 from __future__ import annotations
-
-import os
 
 import numpy as np
 import pytest
@@ -83,7 +81,7 @@ def _swing(lip: np.ndarray, first: int, last: int) -> float:
     return 0.5 * (peak(1.0) + peak(-1.0))
 
 
-@pytest.mark.skipif(not os.environ.get("DBVFIV_FINE"), reason="minutes on the mesh of the cases")
+@pytest.mark.long
 def test_the_branch_on_the_mesh_of_the_cases():
     """28 x 48 elements, six densities: amplitude within 0.5 %, period within 0.1 %."""
     mesh = {"mesh.around": 28, "mesh.along": 48, "cycle.over": "density=25:60:8"}

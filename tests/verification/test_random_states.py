@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from dbvfiv.model import select_search
-from eigen import CertifiedSpectrum, SearchOptions, TransferBasis, certified_spectrum, unstable_count
+from eigen import CertifiedSpectrum, SearchOptions, TransferBasis, Workspace, certified_spectrum, unstable_count
 from eigen.operator import apart_from_creep
 from eigen.pairs import acceptable, all_eigenvalues
 from tests.small_valves import FORMER
@@ -35,15 +35,16 @@ class Examined:
 
 def examined(around: int, along: int, number: int, seed: int, pressures: int) -> list[Examined]:
     states = linearised_states(around, along, random_pressures(pressures, seed))
-    bases, out = {}, []
+    workspace, bases, out = Workspace(), {}, []
     for state in random_states(states, number, seed):
         pencil = state.pencil
         if state.linear.inlet not in bases:  # it depends on the state of the structure alone
-            bases[state.linear.inlet] = TransferBasis(pencil)
+            bases[state.linear.inlet] = TransferBasis(pencil, workspace=workspace)
         basis = bases[state.linear.inlet]
         lowest = basis.structural_frequencies
         search = select_search(SearchOptions(), state.mu, lambda n, known=lowest: known[:n], COUNT)
-        out.append(Examined(state, certified_spectrum(pencil, COUNT, search.options, basis=basis)))
+        found = certified_spectrum(pencil, COUNT, search.options, basis=basis, workspace=workspace)
+        out.append(Examined(state, found))
     return out
 
 
@@ -51,13 +52,14 @@ def examined_relaxing(around: int, along: int, number: int, seed: int, pressures
     """Random states of viscoelastic walls of stable rubbers, each with a basis of its own."""
     changes = {"damping.model": "loss factor", "materials.constants": "stable", **mesh}
     states = linearised_states(around, along, random_pressures(pressures, seed), **changes)
-    out = []
+    workspace, out = Workspace(), []
     for state in relaxing_states(states, number, seed):
         pencil = state.pencil
-        basis = TransferBasis(pencil)
+        basis = TransferBasis(pencil, workspace=workspace)
         lowest = basis.structural_frequencies
         search = select_search(SearchOptions(), state.mu, lambda n, known=lowest: known[:n], COUNT)
-        out.append(Examined(state, certified_spectrum(pencil, COUNT, search.options, basis=basis)))
+        found = certified_spectrum(pencil, COUNT, search.options, basis=basis, workspace=workspace)
+        out.append(Examined(state, found))
     return out
 
 

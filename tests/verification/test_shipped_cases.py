@@ -1,10 +1,9 @@
 """Every case that ships as a valve of its own: steady from 0.1 to 10 m of head, modes, onset over density, closure to
-its rated back pressure. On coarse meshes; `DBVFIV_FINE=1` takes those of the cases.
+its rated back pressure. On coarse meshes, and on those of the cases.
 """
 
 from __future__ import annotations
 
-import os
 from pathlib import Path
 
 import numpy as np
@@ -16,15 +15,16 @@ from dbvfiv.case.quantity import GRAVITY
 CASES = Path(__file__).parents[2] / "cases"
 VALVES = ("dbv12", "dbv12-table-layers", "dbv12-40-percent", "dbv6", "dbv36", "dbv4-wide", "dbv4-flat")
 HEADS = (0.1, 0.5, 2.0, 5.0, 10.0)
-MESH = {} if os.environ.get("DBVFIV_FINE") else {"mesh.around": 8, "mesh.along": 14}
+MESHES = {"coarse": {"mesh.around": 8, "mesh.along": 14}, "own": {}}
 
 
-def valve_of(name: str, **more):
-    return dbvfiv.load(CASES / f"{name}.toml", MESH | {key.replace("__", "."): value for key, value in more.items()})
+def valve_of(name: str, mesh: str, **more):
+    changes = {key.replace("__", "."): value for key, value in more.items()}
+    return dbvfiv.load(CASES / f"{name}.toml", MESHES[mesh] | changes)
 
 
-def examine_steady(name: str, heads) -> None:
-    valve = valve_of(name)
+def examine_steady(name: str, mesh: str, heads) -> None:
+    valve = valve_of(name, mesh)
     weight = valve.case.fluid.density * GRAVITY
     found = valve.steady(pressure=[weight * head for head in heads])
     assert len(found.states) == len(heads) and not found.failures
@@ -39,8 +39,8 @@ def examine_steady(name: str, heads) -> None:
     print(f"\n{name}: {heads}")
 
 
-def examine_modes(name: str) -> None:
-    valve = valve_of(name)
+def examine_modes(name: str, mesh: str) -> None:
+    valve = valve_of(name, mesh)
     modes = valve.modes(pressure=2.0 * GRAVITY * valve.case.fluid.density)
     certificate = modes.certificate
     assert modes.stable and certificate.unstable_count == certificate.unstable_count_independent == 0
@@ -50,27 +50,29 @@ def examine_modes(name: str) -> None:
 
 
 def test_the_wide_bill_from_rest_to_two_metres():
-    examine_steady("dbv4-wide", (0.1, 2.0))
-    examine_modes("dbv4-wide")
+    examine_steady("dbv4-wide", "coarse", (0.1, 2.0))
+    examine_modes("dbv4-wide", "coarse")
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", VALVES)
-def test_steady_and_modes(name):
-    examine_steady(name, HEADS)
-    examine_modes(name)
+@pytest.mark.parametrize("mesh", MESHES)
+def test_steady_and_modes(name, mesh):
+    examine_steady(name, mesh, HEADS)
+    examine_modes(name, mesh)
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", VALVES)
-def test_onset_over_density(name):
+@pytest.mark.parametrize("mesh", MESHES)
+def test_onset_over_density(name, mesh):
     """Each flutters in a light enough fluid at half a metre of head, under both laws, softly or hard, and says where;
     the quasi-steady law takes it for unstable in denser fluids.
     """
     found = {}
     for law in ("quasi-steady", "storage"):
         changes = {"fluid__continuity": law, "onset__coarse_mesh": 0, "onset__normal_form": False}
-        valve = valve_of(name, **changes)
+        valve = valve_of(name, mesh, **changes)
         points = valve.onset(over="density=0.5:5000:25:log", pressure=0.5 * GRAVITY * 1000.0).points
         found[law] = max(point["value"] for point in points)
         assert all(point["frequency"] > 1.0 for point in points)
@@ -81,8 +83,9 @@ def test_onset_over_density(name):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", VALVES)
-def test_closure_to_the_rated_back_pressure(name):
-    valve = valve_of(name)
+@pytest.mark.parametrize("mesh", MESHES)
+def test_closure_to_the_rated_back_pressure(name, mesh):
+    valve = valve_of(name, mesh)
     found = valve.closure()
     rated = valve.case.closure.rated_pressure or max(valve.case.closure.pressures)
     assert max(state.pressure for state in found.states) >= rated

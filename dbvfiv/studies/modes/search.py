@@ -11,6 +11,7 @@ import numpy as np
 
 from eigen.basis import TransferBasis
 from eigen.certificate import CertifiedSpectrum, certified_spectrum
+from eigen.factor import Workspace
 from eigen.operator import CoupledPencil
 from eigen.search import leading_modes
 from eigen.spectrum import SearchOptions, Spectrum
@@ -392,8 +393,9 @@ def run_modes(
         family = ValveFamily(linear, options.search.max_frequency, options.count)
         search = family.leading(place, in_vacuo)
         asked = replace(search.options, shifts=options.search.shifts, tolerance=options.search.tolerance)
-        basis = TransferBasis(pencil, modes=max(_BASIS, options.count))
-        certified = certified_spectrum(pencil, options.count, asked, basis=basis)
+        workspace = Workspace()
+        basis = TransferBasis(pencil, modes=max(_BASIS, options.count), workspace=workspace)
+        certified = certified_spectrum(pencil, options.count, asked, workspace=workspace, basis=basis)
     certified = replace(certified, spectrum=_ties_by_frequency(certified.spectrum))
     notes = (*search.notes, *certified.spectrum.notes)
     if symmetry.of_equilibria and not (model.mesh.part.is_quarter or in_vacuo):

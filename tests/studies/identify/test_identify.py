@@ -235,6 +235,7 @@ def found_of(valve, seed, folder):
 
 
 @pytest.mark.slow
+@pytest.mark.long
 def test_intervals_hold_hidden_inputs_and_onsets_of_fifty_valves(tmp_path):
     more = {"identify.samples": 24, "identify.round": 8, "identify.over": "pressure=2000,3000,4000,6000,9000"}
     inputs, begins = [], []
