@@ -176,10 +176,11 @@ class Page:
         return run
 
     async def _result_of_start(self, path: Path) -> Run:
-        """Run of the result file that the server was started with, which is kept once."""
-        kept = (run for run in self.site.runs.of(self.home) if run.title == path.name and run.page.exists())
-        found = next((run for run in kept if filecmp.cmp(run.page, path, shallow=False)), None)
-        return found or await self.keep_result(path.name, path)
+        """Run of the result file that the server was started with, which is kept once, however many pages open."""
+        async with self.site.keeping:
+            kept = (run for run in self.site.runs.of(self.home) if run.title == path.name and run.page.exists())
+            found = next((run for run in kept if filecmp.cmp(run.page, path, shallow=False)), None)
+            return found or await self.keep_result(path.name, path)
 
     def take_case_of(self, run: Run) -> None:
         """Take the valve of a run, unless it is that on the page.

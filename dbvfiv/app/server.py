@@ -183,6 +183,7 @@ class Site:
 
     def __post_init__(self) -> None:
         self.runs = Runs(self.at_once)
+        self.keeping = asyncio.Lock()  # one page at a time looks for a result, and keeps it where it is new
 
     def home(self, user: str) -> Path:
         """Folder of a user."""

@@ -6,13 +6,16 @@ import asyncio
 import json
 import sys
 from pathlib import Path
+from types import SimpleNamespace
 
 import h5py
 import pytest
 
 import dbvfiv
 from dbvfiv.app import processes
+from dbvfiv.app.page import Page
 from dbvfiv.app.processes import Run, Runs, Worker, Workers
+from dbvfiv.app.server import Site
 from dbvfiv.app.worker import Desk
 from dbvfiv.errors import CaseError
 
@@ -86,6 +89,23 @@ def test_a_result_is_listed_as_soon_as_its_kind_is_known(tmp_path):
     assert not runs.of(tmp_path)
     run.kind = "steady"
     assert runs.of(tmp_path) == [run]
+
+
+def test_pages_that_open_together_keep_the_result_of_the_start_once(tmp_path):
+    class Drawing:
+        async def ask(self, question, **about):
+            await asyncio.sleep(0.01)
+            return {"kind": "steady", "case": ""}
+
+    start = tmp_path / "result.h5"
+    start.write_bytes(b"result")
+    site = Site(tmp_path / "site", start, workers=SimpleNamespace(drawing=Drawing()))
+    pages = [Page(site, site.home("a")) for _ in range(3)]
+
+    async def opened():
+        return await asyncio.gather(*(page._result_of_start(start) for page in pages))
+
+    assert len({run.name for run in asyncio.run(opened())}) == len(site.runs.of(site.home("a"))) == 1
 
 
 def test_a_spoiled_journal_is_passed_over(tmp_path):
