@@ -45,8 +45,6 @@ from continuation.options import (
 )
 from continuation.periodic import PeriodicMotion
 
-#: Share of the most harmonics allowed from which on a branch that needs more ends.
-NEARLY = 0.9
 #: Change of the parameter over its unit that is rounding.
 STILL = 1e-9
 
@@ -191,7 +189,7 @@ class CycleTracer:
                 reason = str(error)
                 if (
                     getattr(error, "reason", None) is Reason.HARMONICS
-                    and self._series().count > NEARLY * self.shape.max_harmonics
+                    and self.points[-1].motion.harmonics.count >= self.shape.max_harmonics
                 ):
                     break
                 step *= 0.4
@@ -313,9 +311,8 @@ class CycleTracer:
     def _series(self) -> Harmonics:
         """Series of the next motion: longer where the last one nearly needed it."""
         last, options = self.points[-1].motion, self.shape
-        if last.tail > 0.4 * options.tail and last.harmonics.count + 2 <= options.max_harmonics:
-            return Harmonics(last.harmonics.count + 2)
-        return last.harmonics
+        longer = min(last.harmonics.count + 2, options.max_harmonics)
+        return Harmonics(longer) if last.tail > 0.4 * options.tail else last.harmonics
 
     def _plane(self, motion, value: float) -> Condition:
         """Normal to the way from the last point, through the prediction."""
