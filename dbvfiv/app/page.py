@@ -18,7 +18,7 @@ from ..errors import CaseError
 from ..studies.case import Case
 from .ask import AskPanel
 from .processes import Run
-from .see import RunsPanel, SeePanel
+from .see import RunsPanel, SeePanel, drop_box
 from .sheet import FORM, Checked, change, check, given, read_sheet, usual_value, write_sheet
 
 #: Valves to start from: those of the source tree, and of the folder that the server was started in.
@@ -267,10 +267,7 @@ class Page:
             ui.select(
                 [*names], label="Start from", on_change=lambda e: self._attempt(self.start_from, names[e.value])
             ).style("min-width: 170px").props('data-at="start"')
-            drop = ui.upload(
-                label="Drop a case, or data", auto_upload=True, max_file_size=DATA, on_upload=self._uploaded
-            )
-            drop.props("flat bordered").style("width: 230px; max-height: 56px")
+            drop_box("Drop a case, or data", DATA, self._uploaded)
             ui.button("Save", on_click=self._save).props('data-at="save"')
         with ui.element("div").classes("columns"):
             with ui.column():
@@ -384,7 +381,6 @@ class Page:
     async def _uploaded(self, event: events.UploadEventArguments) -> None:
         """Take a case file, or keep a data file; a record becomes a run that judges it."""
         content, name = await event.file.read(), Path(event.file.name.replace("\\", "/")).name
-        event.sender.reset()
         if not re.fullmatch(r"[\w][\w. -]{0,60}\.(toml|csv)", name, re.IGNORECASE) or len(content) > DATA:
             self.tell(f"{name[:60]!r} is not taken: a case ends in .toml, data in .csv, up to {DATA >> 20} MB.")
             return

@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import re
 import time
+from collections.abc import Callable
 from itertools import groupby
 from typing import Any
 
@@ -44,6 +45,16 @@ def arguments_of(case: Any, title: str) -> list[str]:
     heads = {"low": 0.1 * high, "high": high, "kpa_low": 1e-4 * high, "kpa_high": 1e-3 * high}
     values = heads | {"damping": f"{name}={0.25 * own:.6g}:{3 * own:.6g}"}
     return [argument.format(**values) for argument in PICTURES[title][1]]
+
+
+def drop_box(label: str, largest: int, take: Callable[[events.UploadEventArguments], Any]) -> None:
+    """Box that a file up to a size in bytes is dropped on.
+
+    The browser empties it when a file has arrived: told to from here, a little later, it would lose the next file.
+    """
+    box = ui.upload(label=label, auto_upload=True, max_file_size=largest, on_upload=take)
+    box.props("flat bordered").style("width: 250px; max-height: 56px")
+    box.on("finish", js_handler=f"() => runMethod({box.id}, 'removeUploadedFiles', [])")
 
 
 class RunView:
@@ -255,10 +266,7 @@ class RunsPanel:
             kinds = ["report", *KINDS]
             self._kind = ui.select(kinds, value="report", label="Run").style("min-width: 140px").props('data-at="kind"')
             ui.button("Add to the queue", on_click=self._add).props('data-at="add"')
-            drop = ui.upload(
-                label="Drop a record or result", auto_upload=True, max_file_size=LARGEST, on_upload=self._take
-            )
-            drop.props("flat bordered").style("width: 270px; max-height: 56px")
+            drop_box("Drop a record or result", LARGEST, self._take)
         ui.label("What a study takes stands in its section of the case: Describe, all keys as text.").classes("note")
         self._list = RunList(self.page, opens=False)
         ui.timer(LOOK, self.refresh)
@@ -270,7 +278,6 @@ class RunsPanel:
     async def _take(self, event: events.UploadEventArguments) -> None:
         """Keep a result; judge a record, beside the modes of the valve at the values of the sliders."""
         content, name, page = await event.file.read(), re.sub(r"[^\w. -]", "_", event.file.name[-40:]), self.page
-        event.sender.reset()
         try:
             if name.lower().endswith(".h5"):
                 await page.keep_result(name, content)

@@ -147,15 +147,27 @@ class Tab:
         ActionChains(self.driver, duration=0).move_to_element_with_offset(track, offset, 0).click().perform()
 
     def drop(self, name: str, content: bytes) -> None:
-        """Drop a file on the box of the panel that is shown."""
-        boxes = lambda: self.driver.find_elements("css selector", ".q-uploader")  # noqa: E731
-        box = self.wait(lambda: next((box for box in boxes() if box.is_displayed()), None))
-        script = """const [box, name, data] = arguments, moved = new DataTransfer();
-            moved.items.add(new File([Uint8Array.from(atob(data), c => c.charCodeAt(0))], name));
-            const told = kind => new DragEvent(kind, {bubbles: true, cancelable: true, dataTransfer: moved});
-            box.dispatchEvent(told("dragover"));
-            setTimeout(() => box.querySelector(".q-uploader__dnd").dispatchEvent(told("drop")), 200);"""
-        self.driver.execute_script(script, box, name, base64.b64encode(content).decode())
+        """Drop a file on the box of the panel that is shown, as soon as it takes one."""
+        data = base64.b64encode(content).decode()
+        show = """const [box, name, data] = arguments;
+            window.moved = new DataTransfer();
+            window.moved.items.add(new File([Uint8Array.from(atob(data), c => c.charCodeAt(0))], name));
+            window.told = kind => new DragEvent(kind, {bubbles: true, cancelable: true, dataTransfer: window.moved});
+            box.dispatchEvent(window.told("dragover"));"""
+        let_go = """const place = arguments[0].querySelector(".q-uploader__dnd");
+            place?.dispatchEvent(window.told("drop"));
+            return place !== null;"""
+
+        def dropped() -> bool:
+            boxes = self.driver.find_elements("css selector", ".q-uploader")
+            box = next((box for box in boxes if box.is_displayed()), None)
+            if box is None:
+                return False
+            self.driver.execute_script(show, box, name, data)
+            time.sleep(0.2)
+            return self.driver.execute_script(let_go, box)
+
+        self.wait(dropped)
 
     def number(self, name: str) -> float:
         """Number of the answer, SI."""

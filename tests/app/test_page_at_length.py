@@ -242,24 +242,28 @@ def test_malformed_cases_are_told(tmp_path):
         with served(tmp_path) as server:
             tab = Tab(driver, server.address)
             tab.unfold("Layers, inside to outside")
-            for text, said in (
-                ("valve = [", "TOML"),
-                ("x = " + "[" * 5000, "recursion"),
-                ("layers = [1, 2]", "layers"),
-                ('layers = [{ material = "CR" }, 7]', "layers"),
-                ('layers = "many"', "layers"),
-                ('valve = "round"', "valve"),
-                ('[valve]\nkey_points = "../../../etc/passwd"', "without their folder"),
+            for text, said, third_row in (
+                ("valve = [", "TOML", False),
+                ("x = " + "[" * 5000, "recursion", False),
+                ("layers = [1, 2]", "layers.0 is given as 1", True),
+                ('layers = [{ material = "CR" }, 7]', "layers.0.thickness is missing", True),
+                ('layers = "many"', "layers is given as", False),
+                ('valve = "round"', "valve is given as", False),
+                ('[valve]\nkey_points = "../../../etc/passwd"', "without their folder", False),
             ):
                 tab.drop("bad.toml", text.encode())
                 tab.wait(lambda said=said: said in tab.at("wrong").text, 20)
                 tab.click("Add a row")
-                if "layers" in text:
-                    tab.wait(lambda: tab.at("wrong").text, 20)
+                if third_row:
+                    tab.wait(lambda: tab.at("layers.2.material").is_displayed(), 20)
+                    assert said in tab.at("wrong").text
+                elif "many" in text:  # the usual rows stand there, and one more
+                    tab.wait(lambda: tab.at("fits").text == "It fits.", 20)
             tab.drop("dbv6.toml", COARSE.encode())
             tab.wait(lambda: tab.at("fits").text == "It fits.", 20)
             tab.drop("picture.exe", b"MZ")
             tab.wait(lambda: "is not taken" in tab.text, 20)
+            tab.wait(lambda: not driver.find_elements("css selector", ".q-uploader__file"), 20)
             tab.drop("huge.toml", b"#" * (6 << 20))
             time.sleep(1.0)
             assert tab.at("fits").text == "It fits." and server.process.poll() is None
@@ -364,6 +368,7 @@ def test_two_tabs_and_a_killed_worker(tmp_path):
             driver.switch_to.window(driver.window_handles[0])
             assert one.number("volume_flow") < two_third(flow)  # the first tab stands where it stood
             one.go("Describe")
+            one.wait(lambda: one.at("valve.scale").is_displayed())
             one.at("valve.scale").send_keys("nonsense")
             one.wait(lambda: "valve.scale" in one.at("wrong").text)
             assert server.process.poll() is None
