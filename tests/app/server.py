@@ -148,24 +148,21 @@ class Tab:
 
     def drop(self, name: str, content: bytes) -> None:
         """Drop a file on the box of the panel that is shown, as soon as it takes one."""
-        data = base64.b64encode(content).decode()
-        show = """const [box, name, data] = arguments;
-            window.moved = new DataTransfer();
-            window.moved.items.add(new File([Uint8Array.from(atob(data), c => c.charCodeAt(0))], name));
-            window.told = kind => new DragEvent(kind, {bubbles: true, cancelable: true, dataTransfer: window.moved});
-            box.dispatchEvent(window.told("dragover"));"""
-        let_go = """const place = arguments[0].querySelector(".q-uploader__dnd");
-            place?.dispatchEvent(window.told("drop"));
-            return place !== null;"""
+        script = """const [box, name, data, done] = arguments, moved = new DataTransfer();
+            moved.items.add(new File([Uint8Array.from(atob(data), c => c.charCodeAt(0))], name));
+            const told = kind => new DragEvent(kind, {bubbles: true, cancelable: true, dataTransfer: moved});
+            box.dispatchEvent(told("dragover"));
+            setTimeout(() => {
+                const place = box.querySelector(".q-uploader__dnd");
+                place?.dispatchEvent(told("drop"));
+                done(place !== null);
+            }, 200);"""
 
         def dropped() -> bool:
             boxes = self.driver.find_elements("css selector", ".q-uploader")
             box = next((box for box in boxes if box.is_displayed()), None)
-            if box is None:
-                return False
-            self.driver.execute_script(show, box, name, data)
-            time.sleep(0.2)
-            return self.driver.execute_script(let_go, box)
+            data = base64.b64encode(content).decode()
+            return box is not None and self.driver.execute_async_script(script, box, name, data)
 
         self.wait(dropped)
 
