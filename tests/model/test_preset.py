@@ -325,16 +325,17 @@ def test_faces_that_graze_have_a_spectrum_on_either_side(model, path):
     face = int(np.flatnonzero(~at_ends[0] & at_ends[1])[0])
     pressure = float(brentq(room, *pressures, args=(face,), xtol=1e-3))
     told = [
-        load(model.case.replace({"modes.in_vacuo": True, "modes.count": 4, "drive.pressure": p}))
-        for p in (pressure, 4e3)
+        load(model.case.replace({"modes.in_vacuo": True, "modes.count": 4, "drive.pressure": p, "damping.beta": beta}))
+        for p, beta in ((pressure, 0.0), (4e3, 0.0), (pressure, 0.05))
     ]
-    graze, away = (valve.modes().summary() for valve in told)
+    graze, away, damped = (valve.modes().summary() for valve in told)
     sides, own = graze["classes"][0]["grazing"], np.array([mode["frequency"] for mode in graze["modes"]])
     assert sides["faces"] >= 1 and any(note.startswith("Grazing: ") for note in graze["notes"])
     parted, held = (np.array([mode["frequency"] for mode in sides[name]]) for name in ("parted", "held"))
     assert parted == pytest.approx(own, rel=1e-3) and np.all(parted <= own * (1 + 1e-9))
     assert np.all(held >= own * (1 - 1e-9)) and np.max(held / own) > 1.001
     assert "grazing" not in away["classes"][0]
+    assert damped["modes"] == [] and any("no mode is listed with them parted" in note for note in damped["notes"])
 
 
 CASES = Path(__file__).parents[2] / "cases"

@@ -443,11 +443,15 @@ def _one_sided(model, state: SteadyState, pencil: CoupledPencil, search: SearchO
 def _grazing_notes(model, grazing: dict[str, Any]) -> list[str]:
     if not grazing:
         return []
-    sides = ((name, grazing[name][0]) for name in ("parted", "held"))
-    said = [f"{v['growth_rate']:+.4g} 1/s at {v['frequency']:.4g} Hz with them {name}" for name, v in sides]
+    said = []
+    for name in ("parted", "held"):  # highly damped walls may have no mode within reach of the search
+        first = "no mode is listed"
+        for mode in grazing[name][:1]:
+            first = f"the first mode has {mode['growth_rate']:+.4g} 1/s at {mode['frequency']:.4g} Hz"
+        said.append(f"{first} with them {name}")
     within = 1e6 * GRAZING * model.contact.law.rounding
     faces = "1 node whose face is" if grazing["faces"] == 1 else f"{grazing['faces']} nodes whose faces are"
-    return [f"Grazing: {faces} within {within:.2g} um of parting or meeting; the first mode has {', '.join(said)}."]
+    return [f"Grazing: {faces} within {within:.2g} um of parting or meeting; {', '.join(said)}."]
 
 
 def _verdict(found: CertifiedSpectrum, searched: np.ndarray, search: LeadingSearch, sealed: bool) -> Verdict:
