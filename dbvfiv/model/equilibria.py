@@ -320,11 +320,16 @@ def sealing_for_cracking(case: Case, area_ratio: float, observer: Observer | Non
         if abs(off) <= _HEAD_ACCURACY:
             return sealing
         known.append((np.log(sealing), off))
+        if off > 0.0 and sealing < _HEAD_ACCURACY * drive:
+            break  # a lower one changes nothing
         slope = 1.0
         if len(known) > 1 and known[-1][0] != known[-2][0]:
             (a, at_a), (b, at_b) = known[-2:]
             slope = np.clip((at_b - at_a) / (b - a), 0.3, 3.0)
         sealing = float(np.exp(known[-1][0] - off / slope))
+    if known and (least := min(known))[1] > 0.0:
+        above = f"{'' if least[1] < np.log(_BEYOND[-1]) else 'more than '}{np.exp(least[1]) * head:.4g} m"
+        why = f" Pressed by no more than {np.exp(least[0]):.3g} Pa it takes {above}, which a thinner wall lowers."
     raise SolveError(f"No sealing pressure was found with which the bill cracks at a head of {head:.4g} m.{why}")
 
 

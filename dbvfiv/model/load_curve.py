@@ -54,12 +54,15 @@ class LoadSystem(System):
     model : ValveModel or alike
         With `apply_transposed` besides what `EquilibriumSolver` asks.
     scale : float, Pa
-        Residuals are measured against the force of this load.
+        Residuals are measured against the force of this load over the pressure downstream.
     """
 
     def __init__(self, model: Any, scale: float):
         self.model, self.size = model, model.size
-        self._scale = model.force_scale(model.rest(), scale)
+        rest, load = model.rest(), model.flow.back + scale
+        self._scale = model.force_scale(rest, load)
+        #: Residual norm that rounding alone leaves.
+        self.rounding = model.rounding(rest, model.tangent(rest, load)) / self._scale
         self.factor, self.factored = model.factor(), None
         # One unit of the state is a mean displacement of the gap that faces in contact leave, or a mean rotation by it
         # over the wall: in larger units the curve would turn right back where faces part.
@@ -300,7 +303,9 @@ class LoadCurve:
             parameter_scales={LOAD: self._unit},
             locate=False,
             stop_at=frozenset({"fold"}),
-            newton=ContinuationNewton(max(self.newton.tolerance, _POINTS), _AHEAD if ahead else _BETWEEN),
+            newton=ContinuationNewton(
+                max(self.newton.tolerance, _POINTS, self._system.rounding), _AHEAD if ahead else _BETWEEN
+            ),
             max_angle=self._angle,
         )
         problem = Problem(self._system, {LOAD: self._start}, (LOAD,), parameter_scales=options.units([LOAD]))

@@ -205,17 +205,18 @@ def stress_free_shape(shell: Shell, loaded: np.ndarray, pressure: float) -> Shel
         raise SolveError(refused) from error
     nodal = shell.dofs.expand(outside.q)
     place, off = np.hstack([mesh.nodes + nodal[:, :3], shell.directors(nodal)[0]]), np.inf
-    mixing = _Mixing()
+    mixing, enough = _Mixing(), _BALANCED
     for _ in range(_MOST):
         shape = replace(mesh, nodes=place[:, :3], directors=place[:, 3:])
         pressed = PressedShell(shell.preset(shape, pressure), 1.0, loaded)
         q, before = pressed.rest(), off
         off = np.linalg.norm(pressed.residual(q, pressure)) / pressed.force_scale(q, pressure)
-        if off <= _BALANCED or _BALANCED * 1e3 >= off > 0.5 * before:  # the latter is rounding
+        if off <= enough or _BALANCED * 1e3 >= off > 0.5 * before:  # the latter is rounding
             return shape
         found = EquilibriumSolver(pressed, _NEWTON).solve(q, pressure)
         if not found.converged:
             break
+        enough = max(_BALANCED, found.rounding)
         nodal = pressed.nodal(found.q)
         moved = np.hstack([nodal[:, :3], pressed.shell.directors(nodal)[0] - mesh.directors])
         place = mixing.step(place, moved)

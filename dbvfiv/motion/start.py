@@ -145,7 +145,7 @@ def kicked(
         If there is no such mode, or it does not move the lip.
     """
     model = motion.model
-    linear = linearise(model, q, inlet)
+    linear = linearise(model, q, max(inlet, model.flow.back))  # below that nothing flows either
     pencil = linear.pencil(motion.mu)
     try:
         found, index = _find_mode(pencil, motion.mu, push, linear.resolved(motion.mu))

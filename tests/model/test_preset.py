@@ -279,6 +279,34 @@ def test_motions_of_a_lightly_pressed_bill_begin_at_rest():
     assert unbalanced[1] <= min(unbalanced[0], 1.001 * model.rounding(q, model.tangent(q, pressure)))
 
 
+def test_a_curve_of_small_loads_takes_no_shorter_steps_for_rounding():
+    """The load's thousandth, which residuals are measured against, is near what rounding leaves on this mesh."""
+    keys = {"mesh.around": 12, "mesh.along": 20, "valve.sealing_pressure": 0.02, "fluid.density": 3.0}
+    model, pressure = ValveModel(thesis_case(keys)), 1000.0
+    path = LoadPath(model)
+    state = path.go_to(pressure)
+    assert len(path.curve.pressures) < 50
+    assert np.linalg.norm(model.residual(state.q, pressure)) < 1e-8 * model.force_scale(state.q, pressure)
+
+
+@pytest.mark.parametrize("sound_speed", [None, 343.0])
+def test_a_curve_begins_at_any_pressure_downstream(model, sound_speed):
+    """Also at one greater than the thousandth of the load that residuals are measured against."""
+    keys = {"valve.sealing_pressure": 10.0, "downstream.pressure": 14.0, "fluid.density": 1.2}
+    backed, free = (
+        ValveModel(model.case.replace(keys | {"fluid.sound_speed": sound_speed} | more))
+        for more in ({}, {"downstream.pressure": 0.0})
+    )
+    states = LoadPath(backed).go_to(1014.0), LoadPath(free).go_to(1000.0)
+    assert states[0].q == pytest.approx(states[1].q, rel=1e-3, abs=1e-8)
+
+
+def test_a_bill_that_no_preset_lets_crack_so_early_says_when_it_does(model):
+    case = model.case.replace({"valve.sealing_pressure": None, "valve.cracking_head": "1 mm"})
+    with pytest.raises(SolveError, match=r"Pressed by no more than .* Pa it takes .* m"):
+        sealing_for_cracking(case, 2.0)
+
+
 def test_forces_in_front_of_a_seal_do_work_on_the_areas(model):
     """Nodes of a row that carry no pressure have their part too."""
     random = np.random.default_rng(5)

@@ -59,6 +59,13 @@ def test_kick_rings_at_the_eigenvalue(valve):
     assert np.abs(h["lip_displacement"] - still - expected).max() < 0.02 * np.abs(expected).max()
 
 
+def test_a_kick_before_anything_flows_pushes_the_valve_at_rest(valve):
+    """The ramp begins below the pressure downstream."""
+    changes = {"transient.start": "kick", "transient.ramp": 5e-3, "transient.duration": 5e-3}
+    run = Runner(valve(changes | {"downstream.pressure": 400.0, "drive.pressure": 6e3})).start()
+    assert run.progress.eigenvalue.imag > 0 and run.history["lip_displacement"][0] == pytest.approx(1e-4, rel=1e-6)
+
+
 @pytest.mark.parametrize(
     "beta, number",
     [(3e-3, 1), pytest.param(0.0, 1, marks=pytest.mark.slow), pytest.param(0.0, 3, marks=pytest.mark.slow)],
