@@ -35,6 +35,13 @@ def test_the_eigenvalue_is_that_of_modes_and_changes_as_said(valve, found):
     assert first.frequency == pytest.approx((near[0].frequency - near[1].frequency) / 12.0, rel=1e-4)
 
 
+def test_a_flow_that_is_not_there_changes_by_no_per_cent():
+    keys = {"mesh.around": 6, "mesh.along": 8, "drive.kind": "uniform", "drive.pressure": 100.0}
+    found = dbvfiv.load(thesis_case(), keys).sensitivity(["pressure"])
+    shares = found.summary()["sensitivities"][0]["per_cent_per_cent"]
+    assert shares["flow"] is None and shares["opening"] > 0 and found.lines()[-1].count(" - ") >= 1
+
+
 def test_another_mode_and_a_state(valve, found):
     second = valve.sensitivity("density", mode=2)
     assert second.number == 2 and second.growth_rate < found.growth_rate
