@@ -86,12 +86,15 @@ class CoupledFactor:
         self._padded[: self.size] = rhs
         return self._factor.solve(self._padded)[: self.size]
 
-    def solve_with_inner(self, rhs: np.ndarray, inner: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Solution (n,) and fluid unknowns (l,) for right-hand sides r (n,) and s (l,)."""
-        self._padded[:] = 0.0
-        self._padded[: self.size] = rhs
-        self._padded[len(self._padded) - self.inner :] = inner
-        solution = self._factor.solve(self._padded)
+    def solve_with_inner(self, rhs: np.ndarray, inner: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray]:
+        """Solution (n,) and fluid unknowns (l,) for right-hand sides r (n,) and s (l,), zero where it is not given; or
+        columns of them.
+        """
+        padded = np.zeros((len(self._padded), *rhs.shape[1:]))
+        padded[: self.size] = rhs
+        if inner is not None:
+            padded[len(padded) - self.inner :] = inner
+        solution = self._factor.solve(padded)
         return solution[: self.size], solution[len(solution) - self.inner :]
 
     def solve_transposed(self, rhs: np.ndarray) -> np.ndarray:

@@ -119,7 +119,8 @@ class OutsideCorrection:
     Parameters
     ----------
     solve : callable
-        From forces (n,) and the flow's rows (l,) to changes of q (n,) and of its unknowns (l,), by A.
+        From forces (n,) and the flow's rows (l,), or None, to changes of q (n,) and of its unknowns (l,), by A; of
+        columns of forces too.
     columns : (n, r) array W
     weight : float
         c.
@@ -127,9 +128,7 @@ class OutsideCorrection:
 
     def __init__(self, solve: Callable, columns: np.ndarray, weight: float):
         self._solve, self.columns = solve, columns
-        found = [solve(column, None) for column in columns.T]
-        self._q = np.array([q for q, _ in found]).T
-        self._u = np.array([u for _, u in found]).T
+        self._q, self._u = solve(columns, None)
         small = np.eye(columns.shape[1]) + weight * (columns.T @ self._q)
         self._small = la.lu_factor(small, check_finite=False)
         self._weight = weight
@@ -310,9 +309,7 @@ class ValveMotion:
     def _add_outside(self, weight: float) -> None:
         """Take a multiple of the added mass, if there is one, into the solves with the factors just made."""
         if self.outside is not None:
-            none = np.zeros(self._factor.inner)
-            solve = self._factor.solve_with_inner
-            self._correction = self.outside.correction(lambda f, r: solve(f, none if r is None else r), weight)
+            self._correction = self.outside.correction(self._factor.solve_with_inner, weight)
 
     def solve(self, force: np.ndarray) -> np.ndarray:
         """Change of q (n,) that the last factored matrix gives for a force (n,)."""
@@ -451,5 +448,4 @@ class MassSolver:
         factor.refactor()
         if outside is None:
             return factor.solve(force)
-        none = np.zeros(0)
-        return outside.correction(lambda f, _: (factor.solve(f), none), 1.0).solve(force, none)[0]
+        return outside.correction(lambda f, _: (factor.solve(f), np.zeros_like(f[:0])), 1.0).solve(force, None)[0]

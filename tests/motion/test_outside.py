@@ -53,7 +53,7 @@ def test_the_correction_solves_the_sum():
     matrix, columns = rng.standard_normal((9, 9)) + 9 * np.eye(9), rng.standard_normal((7, 3))
 
     def solve(force, rest):
-        found = np.linalg.solve(matrix, np.concatenate([force, np.zeros(2) if rest is None else rest]))
+        found = np.linalg.solve(matrix, np.concatenate([force, np.zeros_like(force[:2]) if rest is None else rest]))
         return found[:7], found[7:]
 
     whole = matrix.copy()
