@@ -177,7 +177,8 @@ def allowed_words(field: FieldInfo) -> str:
         return f"{noun} {bounds}".strip()
     if kind == "integer":
         return f"an integer {bounds}".strip()
-    if field.annotation is str and any(type(m).__name__ == "AfterValidator" for m in field.metadata):
+    marks = [*field.metadata, *(m for a in typing.get_args(field.annotation) for m in getattr(a, "__metadata__", ()))]
+    if _strip_none(field.annotation) is str and any(type(mark).__name__ == "AfterValidator" for mark in marks):
         return FORM
     return "a text that is not empty"
 
