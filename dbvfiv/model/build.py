@@ -6,6 +6,7 @@ import numpy as np
 
 from ..case.model import Case
 from ..case.quantity import GRAVITY
+from ..errors import CaseError
 from ..fit.cards import law_from_case, relaxation_from_case
 from ..flow.channel import Channel
 from ..flow.elastic_line import ElasticLine, LineChannel
@@ -59,6 +60,14 @@ def build_shell(case: Case, section: Section | None = None) -> tuple[ValveMesh, 
 def _preset(case: Case, mesh: ValveMesh, shell: Shell) -> Shell:
     """The shell of a bill that is moulded shut, without stress in another shape."""
     valve, loaded = case.valve, moulded_share(mesh, case)
+    opening = (mesh.rest_area - mesh.wall_deduction) / mesh.perimeter * (mesh.z < valve.moulded_length)
+    widest = int(np.argmax(opening))
+    if opening[widest] > 2.0 * valve.initial_gap:
+        raise CaseError(
+            f"The faces of a bill that is moulded shut touch as drawn, and at z = {1e3 * mesh.z[widest]:.4g} mm these "
+            f"leave {2e3 * opening[widest]:.3g} mm; the wall must be thicker there, or valve.lip_radius smaller.",
+            "valve.lip_radius",
+        )
     pressure = valve.sealing_pressure
     if valve.sealing_force:
         pressure = valve.sealing_force / valve.moulded_length

@@ -195,6 +195,18 @@ def test_presets_that_cannot_be_are_refused_in_a_sentence(keys, words):
         thesis_case(keys)
 
 
+@pytest.mark.parametrize(
+    "keys",
+    [
+        {"valve.lip_radius": "9 mm", "valve.duckbill_wall_deduction": "6 mm"},
+        {"valve.patches": [{"end": "60 mm", "thickness": "6 mm"}]},
+    ],
+)
+def test_a_bill_whose_faces_do_not_touch_as_drawn_is_not_moulded_shut(keys):
+    with pytest.raises(CaseError, match=r"touch as drawn, and at z = .* mm these leave .* mm"):
+        ValveModel(thesis_case({**COARSE, "valve.sealing_pressure": 800.0, **keys}))
+
+
 def shut_channel(count: int):
     """Inertia (m, m) of still fluid of 900 kg/m3 between the flange and a seal at 0.1 m, in sections of 20 cm2 that end
     at 0.5 m, stations z, and lengths; a film of 0.1 cm2 is left before the seal.

@@ -139,6 +139,11 @@ def test_an_onset_scan_of_one_value_shows_it():
     assert line.get_marker() == "." and low < line.get_xdata()[0] < high
 
 
+def test_a_scan_without_a_valid_state_is_drawn_empty():
+    figure = onset_study.onset(onset_result([2e3, 6e3], np.array([np.nan, np.nan]), [False, False]))
+    assert np.isfinite(figure.axes[0].get_ylim()).all() and not np.isfinite(figure.axes[0].lines[0].get_ydata()).any()
+
+
 def map_result(certified=None):
     case = thesis_case({"map.x": "pressure=1000:12000:6", "map.y": "density=1:1000:5:log"})
     plan = MapPlan(case)

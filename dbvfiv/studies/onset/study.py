@@ -395,7 +395,7 @@ def onset(result: StudyResult) -> Figure:
     for row in result.points:
         _mark(row, scale, axis.parameter, top, bottom)
     # room for the words at the marks
-    top.set_ylim(low, max(1.1 * np.nanmax(result.growth_rates), -0.3 * low))
+    top.set_ylim(low, max(1.1 * np.nanmax(result.growth_rates, initial=0.0), -0.3 * low))
     top.set_ylabel("Growth rate, 1/s")
     bottom.set_ylabel("Frequency, Hz")
     bottom.set_ylim(bottom=0)
@@ -470,8 +470,8 @@ def _unit(parameter: str) -> str:
 
 
 def _floor(growth: np.ndarray) -> float:
-    leading = growth[:, 0]
-    return float(min(-5.0, 1.25 * np.nanmin(leading), -0.6 * np.nanmax(np.abs(leading))))
+    leading = growth[:, 0]  # not numbers where no mode was found
+    return float(min(-5.0, 1.25 * np.nanmin(leading, initial=0.0), -0.6 * np.nanmax(np.abs(leading), initial=0.0)))
 
 
 def _jumps(frequency: np.ndarray) -> np.ndarray:

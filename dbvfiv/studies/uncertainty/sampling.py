@@ -362,9 +362,10 @@ def shares(scores: np.ndarray, values: np.ndarray) -> np.ndarray:
     """
     known = np.isfinite(values)
     scores, values = scores[known], values[known]
-    count, total = len(values), float(np.var(values)) * len(values)
+    count = len(values)
     groups = max(2, round(2 * count ** (1 / 3)))
-    if count < 4 * groups or total == 0:
+    total = float(np.var(values)) * count if count >= 4 * groups else 0.0
+    if total == 0:
         return np.full(scores.shape[1], np.nan)
     found = []
     for column in scores.T:
