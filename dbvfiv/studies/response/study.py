@@ -188,7 +188,8 @@ class Transfer:
     def _project(self, vectors: np.ndarray) -> None:
         pencil = self.pencil
         # orthogonal factors keep what Gram's matrix loses: a lip that stops hold moves by a millionth of the wall
-        factor, triangle, _ = qr(vectors / np.linalg.norm(vectors, axis=0), mode="economic", pivoting=True)
+        length = np.linalg.norm(vectors, axis=0)
+        factor, triangle, _ = qr(vectors[:, length > 0.0] / length[length > 0.0], mode="economic", pivoting=True)
         strength = np.abs(np.diag(triangle))
         self._V = factor[:, strength > WEAK * strength[0]]
         self._images = [matrix @ self._V for matrix in (pencil.M, pencil.C, pencil.K, *pencil.relaxing)]
