@@ -16,6 +16,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any, Literal
 
+from pydantic import AfterValidator
 from pydantic.fields import FieldInfo
 
 from ..errors import CaseError
@@ -177,8 +178,7 @@ def allowed_words(field: FieldInfo) -> str:
         return f"{noun} {bounds}".strip()
     if kind == "integer":
         return f"an integer {bounds}".strip()
-    marks = [*field.metadata, *(m for a in typing.get_args(field.annotation) for m in getattr(a, "__metadata__", ()))]
-    if _strip_none(field.annotation) is str and any(type(mark).__name__ == "AfterValidator" for mark in marks):
+    if _strip_none(field.annotation) is str and mark_of(field, AfterValidator):
         return FORM
     return "a text that is not empty"
 

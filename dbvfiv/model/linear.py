@@ -64,7 +64,6 @@ class CoupledFactor:
         self._values = np.ones(offsets[-1])
         self._parts = [slice(a, b) for a, b in zip(offsets[:-1], offsets[1:])]
         self._factor = DirectFactor(whole.indptr, whole.indices)
-        self._padded = np.zeros(n + 2 * m + inner)
 
     @property
     def factorisations(self) -> int:
@@ -82,22 +81,22 @@ class CoupledFactor:
 
     def solve(self, rhs: np.ndarray) -> np.ndarray:
         """Solution (n,) for a right-hand side (n,), nothing on the fluid's own equations."""
-        self._padded[:] = 0.0
-        self._padded[: self.size] = rhs
-        return self._factor.solve(self._padded)[: self.size]
+        return self.solve_with_inner(rhs)[0]
 
     def solve_with_inner(self, rhs: np.ndarray, inner: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray]:
         """Solution (n,) and fluid unknowns (l,) for right-hand sides r (n,) and s (l,), zero where it is not given; or
         columns of them.
         """
-        padded = np.zeros((len(self._padded), *rhs.shape[1:]))
-        padded[: self.size] = rhs
-        if inner is not None:
-            padded[len(padded) - self.inner :] = inner
-        solution = self._factor.solve(padded)
+        solution = self._factor.solve(self._padded(rhs, inner))
         return solution[: self.size], solution[len(solution) - self.inner :]
 
     def solve_transposed(self, rhs: np.ndarray) -> np.ndarray:
-        self._padded[:] = 0.0
-        self._padded[: self.size] = rhs
-        return self._factor.solve_transposed(self._padded)[: self.size]
+        return self._factor.solve_transposed(self._padded(rhs))[: self.size]
+
+    def _padded(self, rhs: np.ndarray, inner: np.ndarray | None = None) -> np.ndarray:
+        """Right-hand sides of the whole matrix, nothing on rows that are not given."""
+        padded = np.zeros((self._factor.size, *rhs.shape[1:]))
+        padded[: self.size] = rhs
+        if inner is not None:
+            padded[len(padded) - self.inner :] = inner
+        return padded

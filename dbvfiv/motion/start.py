@@ -18,7 +18,6 @@ from ..errors import SolveError
 from ..model.dynamics import linearise
 from ..model.equilibria import LoadPath, SteadyOptions
 from ..model.leading import select_search
-from ..model.newton import EquilibriumSolver
 from ..model.valve import ValveModel
 from ..observer import Observer
 from .equations import ValveMotion
@@ -88,17 +87,15 @@ def steady_fluid(motion: ValveMotion, q: np.ndarray, inlet: float, velocity: flo
 def steady_positions(model: ValveModel, inlet: float, options: SteadyOptions | None = None) -> np.ndarray:
     """Equilibrium (n,) at an inlet pressure, Pa.
 
-    It is as exact as rounding allows: what is left of a residual would shake light parts of the wall. The way there
-    need not be, and cannot where pressures are small against the wall's stiffness. Without a flow the valve is at rest;
-    with gravity it hangs, the fluid in it still.
+    It is as exact as rounding allows: what is left of a residual would shake light parts of the wall. Without a flow
+    the valve is at rest; with gravity it hangs, the fluid in it still.
     """
     if inlet <= model.flow.back and model.weight is None:
         return model.rest()
     options = SteadyOptions.of(model.case) if options is None else options
-    path = LoadPath(model, options)
-    found = path.go_to(max(inlet, model.flow.back))
-    exact = EquilibriumSolver(model, replace(options.newton, tolerance=1e-13)).solve(path.q, path.pressure)
-    return exact.q if exact.residual < found.residual else path.q
+    path = LoadPath(model, replace(options, newton=replace(options.newton, tolerance=1e-13)))
+    path.go_to(max(inlet, model.flow.back))
+    return path.q
 
 
 @dataclass(frozen=True)

@@ -446,8 +446,8 @@ def _grazing_notes(model, grazing: dict[str, Any]) -> list[str]:
     said = []
     for name in ("parted", "held"):  # highly damped walls may have no mode within reach of the search
         first = "no mode is listed"
-        for mode in grazing[name][:1]:
-            first = f"the first mode has {mode['growth_rate']:+.4g} 1/s at {mode['frequency']:.4g} Hz"
+        if listed := grazing[name]:
+            first = f"the first mode has {listed[0]['growth_rate']:+.4g} 1/s at {listed[0]['frequency']:.4g} Hz"
         said.append(f"{first} with them {name}")
     within = 1e6 * GRAZING * model.contact.law.rounding
     faces = "1 node whose face is" if grazing["faces"] == 1 else f"{grazing['faces']} nodes whose faces are"

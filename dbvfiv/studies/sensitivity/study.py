@@ -167,8 +167,8 @@ class SensitivityResult(StudyResult):
         """Per cent of flow, opening, loss coefficient and mass for one per cent of a parameter; None of what is not
         there, such as a flow under an even pressure.
         """
-        own = {name: value or np.nan for name, value in self.performance.items()}
-        per_cent = {name: slope * found.value / own[name] for name, slope in found.performance.items()}
+        own = self.performance
+        per_cent = {name: slope * found.value / (own[name] or np.nan) for name, slope in found.performance.items()}
         return {name: value if np.isfinite(value) else None for name, value in per_cent.items()}
 
     def summary(self) -> dict[str, Any]:
