@@ -12,11 +12,14 @@ from typing import Annotated, Any
 from pydantic import AfterValidator, StrictStr, ValidationInfo
 
 from ..errors import CaseError
-from .parameters import PARAMETERS, SWEPT, Parameter
+from .parameters import DESIGN, PARAMETERS, SWEPT, Parameter
 from .quantity import number_or_text
+from .section import Described
 
 FORM = 'PARAMETER=START:STOP:COUNT, with ":log" behind it for logarithmic steps, or PARAMETER=VALUE,VALUE,...'
 _LARGEST = 100_000
+#: Parameters that say where something was measured.
+PLACES = tuple(name for name in PARAMETERS if name not in DESIGN)
 #: A head of the fluid in the text of a range.
 _HEAD = re.compile(r"\d\s*(m|ft)\s*([:,]|$)")
 
@@ -110,6 +113,28 @@ def _value(row: Parameter, text: str, density: float | None) -> float:
         return row.quantity.parse(text, density)
 
 
+def parse_point(text: str, density: float | None = None) -> dict[str, float]:
+    """Read ``PARAMETER=VALUE, ...``, SI values by name; a pressure may be a head of a fluid of the density, kg/m3, that
+    is given, or that stands in front of it.
+
+    Raises
+    ------
+    ValueError
+        With a clause that completes "key is given as X, ...".
+    """
+    found: dict[str, float] = {}
+    for part in filter(None, (part.strip() for part in text.split(","))):
+        name, equals, given = (piece.strip() for piece in part.partition("="))
+        if name not in PLACES or not equals:
+            raise ValueError("which is not of that form")
+        row = PARAMETERS[name]
+        value = _value(row, given, found.get("density", density))
+        if not row.low <= value <= row.high:
+            raise ValueError(f"whose {name} is not within {row.low:g} to {row.high:g} {row.quantity.si}".rstrip())
+        found[name] = value
+    return found
+
+
 def _readable(text: str, info: ValidationInfo) -> str:
     """The text of a range that can be read, heads of the fluid as pressures."""
     return _in_pascal(text, parse_axis(text, density=_density(info)))
@@ -152,6 +177,17 @@ def _readable_range(text: str, info: ValidationInfo) -> str:
 
 #: A key that holds the text of such a range.
 StabilityRange = Annotated[StrictStr, AfterValidator(_readable_range)]
+
+
+def _readable_point(text: str, info: ValidationInfo) -> str:
+    parse_point(text, _density(info))
+    return text
+
+
+#: A key that holds the text of values of parameters.
+Point = Annotated[
+    StrictStr, AfterValidator(_readable_point), Described("text", f"such as 'pressure=1 m', of {', '.join(PLACES)}")
+]
 
 
 _PRESSURE = PARAMETERS["pressure"]

@@ -194,13 +194,12 @@ _DEFAULTS = {
     "rayleigh": {"alpha": 5.0, "beta": 0.003, "loss_factor": 0.0},
     "loss factor": {"alpha": 0.0, "beta": 0.0, "loss_factor": 1.0},
 }
-#: What a model does not have, and what to do instead.
-_FOREIGN = {
-    "rayleigh": ("loss_factor", "set damping.model to 'loss factor', or leave it out"),
-    "loss factor": (
-        "beta",
-        "leave it out, as the materials' loss factors take its place, or set damping.model to 'rayleigh'",
-    ),
+#: The parameter that a model does not have.
+MEANINGLESS = {"rayleigh": "loss_factor", "loss factor": "beta"}
+#: What to do instead of giving it.
+_INSTEAD = {
+    "rayleigh": "set damping.model to 'loss factor', or leave it out",
+    "loss factor": "leave it out, as the materials' loss factors take its place, or set damping.model to 'rayleigh'",
 }
 
 
@@ -286,13 +285,13 @@ class Damping(Section):
     @property
     def meaningless(self) -> str:
         """Name of the parameter that the model does not have."""
-        return _FOREIGN[self.model][0]
+        return MEANINGLESS[self.model]
 
     def lacks(self, name: str) -> str | None:
         """Why a parameter means nothing under the model, as a clause; None where it means something."""
         if name != self.meaningless:
             return None
-        return f"{self.meaningless} means nothing with damping.model = {self.model!r}; {_FOREIGN[self.model][1]}"
+        return f"{self.meaningless} means nothing with damping.model = {self.model!r}; {_INSTEAD[self.model]}"
 
     @model_serializer(mode="wrap")
     def _leave_what_follows(self, handler: Any) -> dict[str, Any]:
@@ -308,10 +307,8 @@ class Damping(Section):
         numbers = _DEFAULTS[self.model] | {"branches": branches}
         self._following = frozenset(name for name in numbers if getattr(self, name) is None or name in before)
         self.__dict__.update({name: numbers[name] for name in self._following})
-        foreign, remedy = _FOREIGN[self.model]
+        foreign = self.meaningless
         if getattr(self, foreign):
-            value = PARAMETERS[foreign].quantity.si
-            raise BrokenRule(
-                foreign, f"{getattr(self, foreign):g} {value}".strip() + f" with damping.model = {self.model!r}", remedy
-            )
+            given = f"{getattr(self, foreign):g} {PARAMETERS[foreign].quantity.si}".strip()
+            raise BrokenRule(foreign, f"{given} with damping.model = {self.model!r}", _INSTEAD[self.model])
         return self

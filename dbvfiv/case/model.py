@@ -10,7 +10,7 @@ from pydantic import ValidationInfo, model_validator
 
 from ..errors import CaseError
 from . import physics
-from .damping import SHIPPED_LOSSES, Damping
+from .damping import MEANINGLESS, SHIPPED_LOSSES, Damping
 from .load import make_case, put, toml_value
 from .materials import AUTO, DEFAULT_LAYERS, RUBBERS, Layer, Materials
 from .mesh import Mesh
@@ -21,7 +21,7 @@ from .pipes import Downstream, Upstream
 from .project import Life, Project, Report
 from .section import BrokenRule, Section, key
 from .units import Units, unit_of
-from .valve import Valve
+from .valve import PRESETS, Valve
 from .wall import edges_of
 
 #: Pressure over depth with which faces resist, Pa/m: nearly rigid; where contact spreads, some modulus over thickness
@@ -29,6 +29,8 @@ from .wall import edges_of
 FACE_STIFFNESS, SPREADING_STIFFNESS = 1e10, 1e9
 #: Share of the gap between rough faces in contact below which no passage of a bill that is moulded shut narrows.
 PRESET_FILM = 0.75
+#: Keys of a section that say one thing in different ways.
+_ALTERNATIVES = {"drive": ("pressure", "head"), "upstream": ("friction", "roughness"), "valve": PRESETS}
 
 
 class Case(Section):
@@ -317,10 +319,17 @@ class Case(Section):
 
     @classmethod
     def make_way(cls, data: dict[str, Any], changed: Collection[tuple[str, ...]]) -> None:
-        """A head that is asked for stands in the place of a pressure that was there before."""
-        drive = data.get("drive")
-        if ("drive", "head") in changed and ("drive", "pressure") not in changed and isinstance(drive, dict):
-            drive.pop("pressure", None)
+        """A key that is asked for stands in the place of one that was there before and says the same otherwise."""
+        for name, keys in _ALTERNATIVES.items():
+            before, asked = data.get(name), {key for key in keys if (name, key) in changed}
+            if asked and isinstance(before, dict):
+                for other in set(keys) - asked:
+                    before.pop(other, None)
+        damping = data.get("damping")
+        if ("damping", "model") in changed and isinstance(damping, dict):
+            meaningless = MEANINGLESS.get(str(damping.get("model")), "")
+            if ("damping", meaningless) not in changed:
+                damping.pop(meaningless, None)
 
     def to_dict(self) -> dict[str, Any]:
         """Return plain SI data (numbers, strings, lists, dicts) that JSON and HDF5 can hold."""

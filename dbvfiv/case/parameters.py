@@ -100,9 +100,9 @@ class Parameter:
         """Limits of the case's key, as `section.key` takes them."""
         return {"ge" if self.low_included else "gt": self.low, "le": self.high}
 
-    def amount(self, value: float) -> str:
+    def amount(self, value: float, digits: int = 6) -> str:
         """A value with its unit, "6 kPa"."""
-        return f"{value / self.scale:g} {self.shown_unit}".strip()
+        return f"{value / self.scale:.{digits}g} {self.shown_unit}".strip()
 
     def text(self, value: float) -> str:
         """A value for people, "6 kPa" or "α = 5 1/s"."""

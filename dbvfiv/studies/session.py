@@ -49,6 +49,8 @@ class Study:
         the record holds already, from an interrupted attempt, is not computed again. Ctrl-C may end it at any point.
     result : type
         `StudyResult` of its records.
+    check : callable, optional
+        Raises the `CaseError` or `SolveError` of a case that the study cannot answer, before anything is solved.
     rows_to_keep : callable, optional
         From what an earlier attempt kept and the case as it is to go on, to how many rows of each table the run goes on
         from. Without it a run goes on from all rows.
@@ -66,6 +68,7 @@ class Study:
     tables: Callable[[MeshData], tuple[TableSpec, ...]]
     run: Callable[..., None]
     result: type[Any]
+    check: Callable[[Case], None] = lambda _case: None
     rows_to_keep: Callable[[Record, Case], Mapping[str, int]] | None = None
     extends: bool = False
     live: Callable[[Case], Callable[[Any], str]] | None = None
@@ -297,7 +300,8 @@ class Session:
         SolveError
             If nothing can be found at all.
         """
-        require_consistent(self.case, kind)  # before levels are settled
+        require_consistent(self.case, kind)
+        find_study(kind).check(self.case)
         if self.case.seeks_levels and kind != "levels":
             return self.settle(observer).perform(kind, output, observer, **choices)
         if self.case.valve.cracking_head:

@@ -7,6 +7,7 @@ import math
 import pickle
 import subprocess
 import sys
+from operator import attrgetter
 from pathlib import Path
 
 import pytest
@@ -369,6 +370,34 @@ def test_word_of_the_trade_leads_to_a_key_that_exists(word):
     with pytest.raises(CaseError, match="is not a key") as raised:
         explain(Case, f"valve.{word}")
     assert key in str(raised.value)
+
+
+ALTERNATIVES = """
+drive.head = "1 m"
+damping = { model = "rayleigh", beta = "3 ms" }
+upstream = { length = 3, roughness = "1 mm" }
+valve.sealing_force = "500 N/m"
+"""
+
+
+@pytest.mark.parametrize(
+    ("override", "other"),
+    [
+        ("drive.pressure=2 kPa", "drive.head"),
+        ("upstream.friction=0.02", "upstream.roughness"),
+        ("valve.sealing_pressure=1 kPa", "valve.sealing_force"),
+        ("valve.overlap=3 mm", "valve.sealing_force"),
+        ("damping.model=loss factor", "damping.beta"),
+    ],
+)
+def test_override_stands_in_the_place_of_the_key_that_says_the_same(tmp_path, override, other):
+    path = tmp_path / "case.toml"
+    path.write_text(ALTERNATIVES)
+    before, after, name = load_case(path), load_case(path, [override]), override.partition("=")[0]
+    where = other.replace("drive.head", "drive.pressure")
+    replaced = before.replace({name: override.partition("=")[2]})
+    for key in (name, where):
+        assert attrgetter(key)(before) != attrgetter(key)(after) == attrgetter(key)(replaced)
 
 
 @pytest.mark.parametrize(

@@ -143,9 +143,7 @@ def phase_plane(result: StudyResult) -> Figure:
             np.append(point.orbit.lip_rate, point.orbit.lip_rate[0]),
         )
         look = {"ls": "--"} if point.stable is False else {}
-        axes.plot(
-            1e3 * lip, rate, color=colour, label=f"{point.value / row.scale:.4g} {row.shown_unit}".strip(), **look
-        )
+        axes.plot(1e3 * lip, rate, color=colour, label=row.amount(point.value, 4), **look)
     axes.set_xlabel("Displacement of one lip, mm")
     axes.set_ylabel("Its velocity, m/s")
     axes.set_title(_title(result), loc="left", fontweight="bold")
@@ -202,7 +200,7 @@ def spectrum(result: StudyResult) -> Figure:
     row = PARAMETERS[result.parameter]
     for point, colour in zip(shown, pressure_colours([point.value for point in shown])):
         parts = 1e3 * point.orbit.lip_harmonics[1:]
-        label = f"{point.value / row.scale:.4g} {row.shown_unit}".strip()
+        label = row.amount(point.value, 4)
         axes.semilogy(np.arange(1, len(parts) + 1), parts, "o-", ms=4, lw=1.0, color=colour, label=label)
     axes.set_xlabel("Harmonic")
     axes.set_ylabel("Amplitude of one lip, mm")

@@ -56,13 +56,13 @@ def _without(case: Case, scan: Scan) -> str:
     if not scan.samples:
         return f"No steady state was found over {axis.parameter}: {next(iter(scan.failures.values()), 'empty range')}"
     row = PARAMETERS[axis.parameter]
-    low, high = (f"{v / row.scale:.6g}" for v in (axis.values[0], axis.values[-1]))
+    first, last = axis.values[0], axis.values[-1]
     unstable = {sample.pairs > 0 for sample in scan.samples.values()}
     state = "stable" if unstable == {False} else "unstable" if unstable == {True} else "never neutral with a frequency"
     return (
-        f"No oscillation starts between {axis.parameter} = {low} and {high} {row.shown_unit}: the steady state is "
-        f"{state} there, and a branch of cycles starts where it loses stability. `dbvfiv onset` looks over a wider "
-        "range."
+        f"No oscillation starts between {axis.parameter} = {first / row.scale:.6g} and {row.amount(last)}: the steady "
+        f"state is {state} there, and a branch of cycles starts where it loses stability. `dbvfiv onset` looks over a "
+        "wider range."
     )
 
 

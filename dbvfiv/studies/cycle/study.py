@@ -238,10 +238,7 @@ AWAY = 0.02
 
 def run(session: Session, record: GrowingRecord) -> None:
     """Cycles along `cycle.over` of the case; every one is kept as it is found."""
-    case, axis = session.case, session.case.cycle.axis
-    check_scan(case, axis.parameter)
-    if axis.parameter == "density" and case.has_pump:
-        raise CaseError("Over the density a pump has no steady state to keep; give drive.pressure.", key="cycle.over")
+    case = session.case
     check_periodic(session.model)
     record.begin("cycle", None)
     walk = StabilityWalk(case, record, session.model)
@@ -526,4 +523,11 @@ class CycleResult(StudyResult):
         return found
 
 
-STUDY = Study("cycle", tables_of, run, CycleResult, live=lambda case: print_rows(COLUMNS))
+STUDY = Study(
+    "cycle",
+    tables_of,
+    run,
+    CycleResult,
+    lambda case: check_scan(case, case.cycle.axis.parameter),
+    live=lambda case: print_rows(COLUMNS),
+)

@@ -70,6 +70,14 @@ def rows_to_keep(known: Record, _case: Case) -> dict[str, int]:
     return {DESIGNS: 0, VERIFIED: 0}
 
 
+def check(case: Case) -> None:
+    """Refuse a case without flow or with a pump, and statements that cannot be read."""
+    check_scan(case)
+    if case.has_pump:
+        raise CaseError("Behind a pump a head is no input; give drive.pressure and no upstream.pump.", "upstream.pump")
+    statements_of(case)
+
+
 def run(session: Session, record: GrowingRecord, cases: Path | None = None) -> None:
     """Designs for the aim and constraints of `design` of the case.
 
@@ -84,9 +92,6 @@ def run(session: Session, record: GrowingRecord, cases: Path | None = None) -> N
         For variables or statements that cannot be used.
     """
     case = session.case
-    check_scan(case)
-    if case.has_pump:
-        raise CaseError("Behind a pump a head is no input; give drive.pressure and no upstream.pump.", "upstream.pump")
     aim, *constraints = statements_of(case)
     problem = DesignProblem(case, _known(record), partial(_keep, record))
     result = DesignResult(record, session)
@@ -420,7 +425,7 @@ def _shown(quantity: str, value: float) -> str:
     return text if isinstance(text, str) and row.shown else f"{value:.5g}"
 
 
-STUDY = Study("design", tables_of, run, DesignResult, rows_to_keep=rows_to_keep)
+STUDY = Study("design", tables_of, run, DesignResult, check, rows_to_keep=rows_to_keep)
 
 
 #: Columns of verdicts that are drawn, their labels and factors.

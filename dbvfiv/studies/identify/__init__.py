@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 from pydantic import Field, StrictInt, StrictStr
 
-from ...case.axis import Axis, StabilityRange, parse_stability_axis
+from ...case.axis import Axis, Point, StabilityRange, parse_stability_axis
 from ...case.model import Case
 from ...case.parameters import listed
 from ...case.quantity import Frequency, Number, number_or_text
@@ -27,7 +27,7 @@ class MeasuredRecord(Section):
     file: ExistingFile | None = key(None, "CSV of times and values: a ring-down, or motion that noise drives.")
     column: StrictStr = key("", "Column of the values by name or number from 1; all by default.")
     rate: Annotated[Frequency, Field(gt=0)] | None = key(None, "Sampling rate, where no column holds times.")
-    at: StrictStr = key("", "Where it was taken: 'pressure=1 m', or several, 'pressure=1 m, density=1025'.")
+    at: Point = key("", "Where it was taken: 'pressure=1 m', or several, 'pressure=1 m, density=1025'.")
     frequency: Annotated[Frequency, Field(gt=0)] | None = key(None, "Of a measured mode, in place of a file.")
     frequency_interval: Annotated[Frequency, Field(gt=0)] | None = key(None, "Half its 95 % interval.")
     damping_ratio: Annotated[Number, Field(gt=-1, lt=1)] | None = key(None, "Of that mode.")

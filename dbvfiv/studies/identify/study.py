@@ -63,6 +63,18 @@ def rows_to_keep(known: Record, _case: Case) -> dict[str, int]:
     return {name: known.rows(name) for name in (VALVES, SPECTRA, BEGINS)} | {POSTERIOR: 0}
 
 
+def check(case: Case) -> None:
+    """Refuse a range of what the case does not have, a pump, and a case without records."""
+    check_scan(case, Places(case).parameter)
+    if case.has_pump:
+        raise CaseError("Behind a pump a head is no input; give drive.pressure and no upstream.pump.", "upstream.pump")
+    if not case.identify.records:
+        raise CaseError(
+            "There is no record to identify the valve from; give RECORD.csv and --at, or identify.records.",
+            key="identify.records",
+        )
+
+
 def run(
     session: Session,
     record: GrowingRecord,
@@ -87,13 +99,7 @@ def run(
     """
     case, plan, places = session.case, Plan(session.case), Places(session.case)
     asked = case.identify
-    check_scan(case, places.parameter)
-    if case.has_pump:
-        raise CaseError(
-            "Behind a pump a head is no input; give drive.pressure and no upstream.pump.", key="upstream.pump"
-        )
-    places.of_records  # places are read before anything is solved, as are correlations
-    plan.scores_of(np.zeros((1, len(plan.inputs))))
+    plan.scores_of(np.zeros((1, len(plan.inputs))))  # correlations are checked before anything is solved
     lines, said = records_said(case)
     if not record.notes(_MEASURED):
         record.note(_MEASURED, lines=[asdict(line) for line in lines], records=said)
@@ -513,4 +519,4 @@ def onset(result: StudyResult) -> Figure:
     return figure
 
 
-STUDY = Study("identify", tables_of, run, IdentifyResult, rows_to_keep=rows_to_keep)
+STUDY = Study("identify", tables_of, run, IdentifyResult, check, rows_to_keep=rows_to_keep)

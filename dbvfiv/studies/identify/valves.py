@@ -13,7 +13,8 @@ from scipy.optimize import brentq, linear_sum_assignment
 
 from eigen.columns import ColumnSolver
 
-from ...case.parameters import DESIGN, PARAMETERS, Mu
+from ...case.axis import parse_point
+from ...case.parameters import PARAMETERS, Mu
 from ...case.quantity import head_of
 from ...errors import CaseError, SolveError
 from ...verdict.reading import Reading, judge_file
@@ -98,33 +99,8 @@ class Places:
 
     @cached_property
     def of_records(self) -> list[dict[str, float]]:
-        """Parameters of each record by name, SI.
-
-        Raises
-        ------
-        CaseError
-        """
-        return [self._read(f"identify.records.{i}.at", one.at) for i, one in enumerate(self.case.identify.records)]
-
-    def _read(self, key: str, text: str) -> dict[str, float]:
-        found = {}
-        for part in filter(None, (part.strip() for part in text.split(","))):
-            name, equals, given = (piece.strip() for piece in part.partition("="))
-            if name not in PARAMETERS or name in DESIGN or not equals:
-                known = ", ".join(name for name in PARAMETERS if name not in DESIGN)
-                raise CaseError(f"{key} is given as {text!r}; it must be such as 'pressure=1 m', of {known}.", key=key)
-            row = PARAMETERS[name]
-            try:
-                value = row.quantity.parse(given, found.get("density", self.case.fluid.density))
-            except ValueError as error:
-                raise CaseError(f"{key} is given as {text!r}, {error}.", key=key) from None
-            if not row.low <= value <= row.high:
-                raise CaseError(
-                    f"{key} is given as {text!r}; {name} must be within {row.low:g} to {row.high:g} {row.quantity.si}.",
-                    key=key,
-                )
-            found[name] = value
-        return found
+        """Parameters of each record by name, SI."""
+        return [parse_point(one.at, self.case.fluid.density) for one in self.case.identify.records]
 
     @cached_property
     def parameter(self) -> str:
@@ -373,13 +349,8 @@ def records_said(case: Case) -> tuple[list[Measured], list[dict[str, Any]]]:
     Raises
     ------
     CaseError
-        Without records, or where none holds a mode.
+        Where none holds a mode.
     """
-    if not case.identify.records:
-        raise CaseError(
-            "There is no record to identify the valve from; give RECORD.csv and --at, or identify.records.",
-            key="identify.records",
-        )
     found, said = [], []
     for number, record in enumerate(case.identify.records):
         lines, words = measured_of(case, number)

@@ -128,9 +128,9 @@ def find_chances(case: Case, record: GrowingRecord, workers: int | str) -> None:
 
     def keep(value: float, found: dict[str, Any]) -> None:
         record.note(_CHANCE, value=value, **found)
-        record.progress(f"probability at {value / row.scale:.4g} {row.shown_unit}".rstrip())
+        record.progress(f"probability at {row.amount(value, 4)}")
         if "failure" in found:
-            record.warn(f"No probability at {value / row.scale:.4g} {row.shown_unit}: {found['failure']}")
+            record.warn(f"No probability at {row.amount(value, 4)}: {found['failure']}")
 
     with Workers(workers, _start, (case.to_dict(),), record.warn) as team:
         if team.is_here:

@@ -268,6 +268,11 @@ def rows_to_keep(known: Record, case: Case) -> dict[str, int]:
     return {SAMPLES: samples, ONSETS: onsets, cycles.ROWS: cycles.vouched_rows(known, MapPlan(case))}
 
 
+def check(case: Case) -> None:
+    """Refuse axes of what the case does not have."""
+    check_scan(case, *(axis.parameter for axis in case.map.axes))
+
+
 def run(session: Session, record: GrowingRecord, workers: int | None = None) -> None:
     """The map of `map` of the case; every column is kept as it is finished. A run that goes on repeats the decisions of
     the one before with its columns, so that it ends with the numbers of one that was never interrupted.
@@ -285,7 +290,6 @@ def run(session: Session, record: GrowingRecord, workers: int | None = None) -> 
         If the case has no flow, or no column was found at all.
     """
     case, plan = session.case, MapPlan(session.case)
-    check_scan(case, plan.x.parameter, plan.y.parameter)
     if case.map.samples:
         chances.Chances(case).check()
     walk = StabilityWalk(case, record, session.model)
@@ -514,4 +518,4 @@ def _axis(axis) -> dict[str, Any]:
     return {"parameter": axis.parameter, "values": list(axis.values), "log": axis.log}
 
 
-STUDY = Study("map", tables_of, run, MapResult, rows_to_keep=rows_to_keep)
+STUDY = Study("map", tables_of, run, MapResult, check, rows_to_keep=rows_to_keep)

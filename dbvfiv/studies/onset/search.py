@@ -21,7 +21,7 @@ from ...texts import digits
 from ..case import Case
 from ..stability.dimensions import Variant, own_variant
 from ..stability.line import ParameterLine
-from ..stability.place import check_scan, models_of
+from ..stability.place import models_of
 from ..stability.samples import Sample, SampleKey
 from ..stability.scan import Crossing
 from ..stability.verdict import not_valid_at
@@ -367,13 +367,10 @@ def run_onset(
 
     Raises
     ------
-    CaseError
-        If the case has nothing that the parameter could change.
     SolveError
-        If the case has no flow, or no state of the scan was found.
+        If no state of the scan was found.
     """
     options = options or OnsetOptions.of(case)
-    check_scan(case, options.parameter)
     observer, known = observer or Observer(), list(known)
     search = OnsetSearch(case, options, observer, walk, known=known)
     crossings = search.scan.run(options.values)

@@ -21,7 +21,7 @@ from ...texts import digits
 from ..result import StudyResult
 from ..session import Session, Study
 from ..stability.dimensions import Variant, compare_ranges, leading_class, own_variant, variants
-from ..stability.place import describe_fixed, fixed_conditions
+from ..stability.place import check_scan, describe_fixed, fixed_conditions
 from ..stability.samples import SAMPLE_TABLE, Sample, keep_samples, read_samples
 from ..stability.verdict import DIVERGES, FLUTTERS, NOT_VALID, STABLE, UNDECIDED, Verdict, lowered
 from ..stability.walk import StabilityWalk
@@ -279,8 +279,8 @@ class OnsetResult(StudyResult):
 
     def _without_onset(self) -> str:
         row = self._row
-        low, high = (self.values[[0, -1]] / row.scale) if len(self.values) else (math.nan, math.nan)
-        scanned = f"from {low:.6g} to {high:.6g} {row.shown_unit}".rstrip()
+        low, high = self.values[[0, -1]] if len(self.values) else (math.nan, math.nan)
+        scanned = f"from {low / row.scale:.6g} to {row.amount(high)}"
         if not self.complete:
             return f"No onset has been located yet: the search ended early, after {len(self.values)} values {scanned}."
         sure, outcomes = sum(self.leading["certified"]), [verdict.outcome for verdict in self.verdicts]
@@ -457,16 +457,13 @@ def _mark(row: dict, scale: float, parameter: str, top, bottom) -> None:
         reach = row["uncertainty"] / scale
         top.plot([x - reach, x + reach], [0, 0], color=ACCENT, lw=3.5, alpha=0.75, zorder=4, solid_capstyle="butt")
     kind = {"super": "supercritical", "sub": "subcritical"}.get(row["criticality"], "")
-    words = f"{x:.4g}{_unit(parameter)}\n{digits(row['frequency'])} Hz" + (f"\n{kind}" if kind else "")
+    words = f"{PARAMETERS[parameter].amount(row['value'], 4)}\n{digits(row['frequency'])} Hz" + (
+        f"\n{kind}" if kind else ""
+    )
     # on the side of the mark that the curve leaves free
     place = {"xytext": (9, -8), "va": "top"} if row["gains"] else {"xytext": (9, 8), "va": "bottom"}
     look = {"textcoords": "offset points", "fontsize": 8.5, "color": PUBLISHED, "path_effects": HALO}
     top.annotate(words, (x, 0.0), **look, **place)
-
-
-def _unit(parameter: str) -> str:
-    unit = PARAMETERS[parameter].shown_unit
-    return f" {unit}" if unit else ""
 
 
 def _floor(growth: np.ndarray) -> float:
@@ -484,4 +481,4 @@ def _title(result: StudyResult) -> str:
     return f"{result.header.name}, {describe_fixed(result.case, result.parameter)}"
 
 
-STUDY = Study("onset", tables_of, run, OnsetResult)
+STUDY = Study("onset", tables_of, run, OnsetResult, lambda case: check_scan(case, case.onset.axis.parameter))

@@ -295,6 +295,11 @@ def rows_to_keep(known: Record, _case: Case) -> dict[str, int]:
     return own | {POINTS: len(done)}
 
 
+def check(case: Case) -> None:
+    """Refuse a range of what the case does not have."""
+    check_scan(case, "pressure" if case.response.axis is None else case.response.axis.parameter)
+
+
 def run(session: Session, record: GrowingRecord) -> None:
     """Response at the state of the case, or at every value of response.over.
 
@@ -308,7 +313,6 @@ def run(session: Session, record: GrowingRecord) -> None:
     case, asked = session.case, session.case.response
     axis = asked.axis
     parameter, values = ("pressure", (case.drive.pressure,)) if axis is None else (axis.parameter, axis.values)
-    check_scan(case, parameter)
     require_inertia(session.model)
     rows = asked.density()
     walk = StabilityWalk(case, record, session.model)
@@ -506,4 +510,4 @@ def precursors(result: StudyResult) -> Figure:
     return figure
 
 
-STUDY = Study("response", tables_of, run, ResponseResult, rows_to_keep=rows_to_keep)
+STUDY = Study("response", tables_of, run, ResponseResult, check, rows_to_keep=rows_to_keep)

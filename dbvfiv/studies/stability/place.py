@@ -137,7 +137,7 @@ def require_parameter(case: Case, name: str) -> None:
             "upstream.wave_speed.",
             key=PARAMETERS[name].key,
         )
-    if name == "sealing" and not case.valve.sealing_pressure:
+    if name == "sealing" and not (case.valve.sealing_pressure or case.valve.cracking_head):
         raise CaseError(
             "There is no sealing pressure to change: the bill is not moulded shut; give valve.sealing_pressure.",
             key=PARAMETERS[name].key,

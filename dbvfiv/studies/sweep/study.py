@@ -252,24 +252,26 @@ def tables_of(_mesh: MeshData) -> tuple[TableSpec, ...]:
     return SAMPLE_TABLE, TableSpec(BRANCHES, _BRANCHES), states
 
 
+def check(case: Case) -> None:
+    """Refuse a range of what the case does not have."""
+    require_parameter(case, case.sweep.axis.parameter)
+    if case.sweep.axis.parameter == "density" and case.drive.kind != "flow":
+        raise CaseError(
+            "sweep.over ranges over density, but drive.kind is 'uniform' and there is no fluid; choose "
+            "pressure, alpha or beta."
+        )
+
+
 def run(session: Session, record: GrowingRecord) -> None:
     """Modes along `sweep.over` of the case. An interrupt, or a value that has no steady state, ends the sweep and keeps
     what was found.
 
     Raises
     ------
-    CaseError
-        If the case has no flow and density is swept.
     SolveError
         If not even the first value was solved.
     """
     case, model, axis = session.case, session.model, session.case.sweep.axis
-    require_parameter(case, axis.parameter)
-    if axis.parameter == "density" and not model.flow.has_fluid:
-        raise CaseError(
-            "sweep.over ranges over density, but drive.kind is 'uniform' and there is no fluid; choose "
-            "pressure, alpha or beta."
-        )
     (variant,) = variants(case, "sweep")
     walk = StabilityWalk(case, record, model, variant.motion)
     if is_surrounding(case, axis.parameter):
@@ -572,7 +574,7 @@ def crossing_line(result: SweepResult, crossing: Crossing) -> str:
     shown = result.case.units.parameter(result.parameter)
     becomes = "unstable" if crossing.to_unstable else "stable"
     how = f"at {crossing.frequency:.4g} Hz" if crossing.frequency > 0 else "without oscillation"
-    place = f"{crossing.value / shown.scale:.4g} {shown.shown_unit}".rstrip()
+    place = shown.amount(crossing.value, 4)
     under = f" under {result.case.continuity}" if result.case.continuity else ""
     return f"Branch {crossing.branch} becomes {becomes} near {result.parameter} {place} {how}{under} (interpolated)."
 
@@ -581,4 +583,4 @@ def _row(value: float, growth: float, frequency: float, unstable: int) -> str:
     return f"{value:>12.6g} {growth:>12.4f} {frequency:>11.4f} {unstable:>9d}"
 
 
-STUDY = Study("sweep", tables_of, run, SweepResult, rows_to_keep=rows_to_keep, live=print_live)
+STUDY = Study("sweep", tables_of, run, SweepResult, check, rows_to_keep=rows_to_keep, live=print_live)

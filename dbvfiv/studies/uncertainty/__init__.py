@@ -51,7 +51,11 @@ class Keys(Section):
     continuity: Literal["case", "both"] = key(
         "case", "The flow model of the case, or both models with the same samples."
     )
-    inputs: Annotated[dict[StrictStr, StrictStr], BeforeValidator(flattened)] = key(
+    inputs: Annotated[
+        dict[StrictStr, StrictStr],
+        BeforeValidator(flattened),
+        Described("tables", 'names and distributions, such as { thickness = "normal(1, 0.03)" }'),
+    ] = key(
         {},
         "Distribution of each uncertain number: a parameter (thickness, loss_factor, ...) or a key of the case "
         "(materials.CR.stiffness_factor, valve.initial_gap, ...); without them those shipped for its materials.",

@@ -122,7 +122,7 @@ def what_decides(result: StudyResult) -> Figure:
     right.set(xlabel=f"{titles[first]}, {unit}".rstrip(", "), ylabel="Least damping ratio, %")
     right.legend()
     shown = PARAMETERS[result.parameter]
-    headline(figure, f"What decides at {point['value'] / shown.scale:.4g} {shown.shown_unit}".rstrip())
+    headline(figure, f"What decides at {shown.amount(point['value'], 4)}")
     _under(figure, result)
     return figure
 
@@ -149,6 +149,6 @@ def tornado(result: StudyResult) -> Figure:
     axes.set_xlabel("Median of the least damping ratio, %")
     axes.legend()
     shown = PARAMETERS[result.parameter]
-    headline(figure, f"Each input low and high at {point['value'] / shown.scale:.4g} {shown.shown_unit}".rstrip())
+    headline(figure, f"Each input low and high at {shown.amount(point['value'], 4)}")
     _under(figure, result)
     return figure

@@ -77,6 +77,24 @@ def rows_to_keep(known: Record, _case: Case) -> dict[str, int]:
     return {SAMPLES: known.rows(SAMPLES), NUMBERS: each * len(vouched)}
 
 
+def check(case: Case) -> None:
+    """Refuse a range of what the case does not have, samples of the head behind a pump, and methods with a range."""
+    plan = Plan(case)
+    check_scan(case, plan.parameter)
+    if case.has_pump and "pressure" in case.uncertainty.inputs:
+        raise CaseError(
+            "uncertainty.inputs holds the pressure, and behind a pump each sampled valve has that at which both meet; "
+            "leave it out, or the pump.",
+            key="uncertainty.inputs",
+        )
+    if case.uncertainty.method != "plain" and len(plan.values) > 1:
+        raise CaseError(
+            f"uncertainty.method is {case.uncertainty.method!r} with {len(plan.values)} values of {plan.parameter}, "
+            "and samples are drawn towards the flutter of one state; leave uncertainty.over out, or method.",
+            key="uncertainty.method",
+        )
+
+
 def run(session: Session, record: GrowingRecord, workers: int | str | None = None) -> None:
     """Samples of the inputs of `uncertainty` of the case, and the verdict on each at every value of its range.
 
@@ -93,19 +111,6 @@ def run(session: Session, record: GrowingRecord, workers: int | str | None = Non
         If the valve of the case has no steady state at any value.
     """
     case, plan, laws = session.case, Plan(session.case), flow_models(session.case, "uncertainty")
-    check_scan(case, plan.parameter)
-    if case.has_pump and any(one.name == "pressure" for one in plan.inputs):
-        raise CaseError(
-            "uncertainty.inputs holds the pressure, and behind a pump each sampled valve has that at which both meet; "
-            "leave it out, or the pump.",
-            key="uncertainty.inputs",
-        )
-    if case.uncertainty.method != "plain" and len(plan.values) > 1:
-        raise CaseError(
-            f"uncertainty.method is {case.uncertainty.method!r} with {len(plan.values)} values of {plan.parameter}, "
-            "and samples are drawn towards the flutter of one state; leave uncertainty.over out, or method.",
-            key="uncertainty.method",
-        )
     count = case.uncertainty.workers if workers is None else workers
     require_answer(count)
     plan.scores_of(np.zeros((1, len(plan.inputs))))  # correlations are checked before anything is solved
@@ -179,7 +184,7 @@ def _neighbours(plan: Plan, states: list[Start | None], record: GrowingRecord, t
     for i, (value, state) in enumerate(zip(plan.values, states)):
         if state is None:
             continue
-        where = f"{value / row.scale:.4g} {row.shown_unit}".rstrip()
+        where = row.amount(value, 4)
         record.progress(f"space that samples share at {where}, of {3 + len(near)} valves")
         try:
             valves = origin, ahead, state.q, near[:TAKEN], near[TAKEN:], plan.numbers
@@ -539,7 +544,7 @@ class UncertaintyResult(StudyResult):
             return []
         row, first = PARAMETERS[self.parameter], point["decides"][0]["parameter"]
         parts = [f"{d['parameter']} {100 * d['share']:.0f} %" for d in point["decides"] if (d["share"] or 0) >= 0.01]
-        where = f"{point['value'] / row.scale:.4g} {row.shown_unit}".rstrip()
+        where = row.amount(point["value"], 4)
         lines = [f"Share of the variance of the least damping ratio at {where}: {', '.join(parts)}."]
         known = self.measured(point["value"], first, 0.1)
         if known is not None:
@@ -583,4 +588,4 @@ def _plain(value: float) -> float | None:
     return float(value) if np.isfinite(value) else None
 
 
-STUDY = Study("uncertainty", tables_of, run, UncertaintyResult, rows_to_keep=rows_to_keep)
+STUDY = Study("uncertainty", tables_of, run, UncertaintyResult, check, rows_to_keep=rows_to_keep)

@@ -7,8 +7,10 @@ import pytest
 
 from dbvfiv.case.parameters import Mu
 from dbvfiv.errors import CaseError, SolveError
-from dbvfiv.studies.case import thesis_case
+from dbvfiv.studies import session
+from dbvfiv.studies.case import Case, thesis_case
 from dbvfiv.studies.onset.search import OnsetOptions, run_onset
+from dbvfiv.studies.session import Session
 from dbvfiv.studies.stability.walk import StabilityWalk
 from tests.small_valves import FORMER
 from tests.studies.map.axes import run_map
@@ -51,7 +53,7 @@ def test_unstable_intervals(over_density):
 
 def test_no_flow_no_onset(coarse_case):
     with pytest.raises(SolveError, match="flow"):
-        run_onset(coarse_case.replace({"drive.kind": "uniform"}))
+        Session(coarse_case.replace({"drive.kind": "uniform"})).perform("onset")
 
 
 @pytest.mark.parametrize(
@@ -145,12 +147,33 @@ def test_what_a_case_does_not_have_is_no_parameter(one_sentence, parameter, word
     own = {"kind": "neo-hookean", "shear_modulus": "1 MPa", "density": 1200}
     case = thesis_case({"materials.own": own, "layers": [{"material": "own", "thickness": 0.01}]})
     for ask in (
-        lambda: run_onset(case.replace({"onset.over": parameter})),
+        lambda: Session(case.replace({"onset.over": parameter})).perform("onset"),
         lambda: run_map(case.replace({"map.x": USUAL[parameter], "map.y": "density=1:10:2"})),
     ):
         with pytest.raises(CaseError, match=words) as caught:
             ask()
         assert one_sentence(str(caught.value))
+
+
+@pytest.mark.parametrize(
+    "kind, keys",
+    [
+        ("sweep", {"sweep.over": "tail_length=1:3:3"}),
+        ("onset", {"onset.over": "tail_length=1:3:3"}),
+        ("map", {"map.x": "tail_length=1:3:3"}),
+        ("cycle", {"cycle.over": "tail_length=1:3:3"}),
+        ("response", {"response.over": "tail_length=1:3:3"}),
+        ("uncertainty", {"uncertainty.over": "tail_length=1:3:3"}),
+        ("identify", {"identify.over": "tail_length=1:3:3"}),
+        ("design", {"drive.kind": "uniform"}),
+    ],
+)
+def test_refusal_precedes_the_search_for_levels(kind, keys, monkeypatch):
+    monkeypatch.setattr(session, "settle_levels", None)
+    case = Case()
+    assert case.seeks_levels
+    with pytest.raises((CaseError, SolveError), match="no tail_length to change|without flow|Without flow"):
+        Session(case.replace(keys)).perform(kind)
 
 
 USUAL = {"strain": "strain=0.1:0.6:3", "angle": "angle=20:80:3"}

@@ -209,6 +209,7 @@ MALFORMED = [
     ("inputs = 3", "inputs is given as 3"),
     ("inputs.thickness = 3", "thickness is given as 3"),
     ('inputs.thickness = ""', "must be a text that is not empty|no distribution"),
+    ("inputs.thickness = 1", "must be names and distributions, such as"),
     ('inputs.thickness = "wide"', "no distribution; it must be such as"),
     ('inputs.thickness = "gamma(1, 2)"', "no distribution; it must be such as"),
     ('inputs.thickness = "normal(1, 0.5)"', "0.029 lies where thickness cannot be"),
