@@ -215,7 +215,8 @@ class Recognition:
         upper.axhline(0.0, color="black", lw=0.8)
         upper.set_ylabel("Damping ratio, %")
         lower.set(xlabel="Frequency, Hz", ylabel="Amplitude of the record", xlim=(0, 1.2 * highest))
-        lower.legend()
+        if lower.lines:
+            lower.legend()
         headline(figure, f"Measured (squares) beside computed, {self.result.header.name}")
         return figure
 

@@ -12,6 +12,7 @@ from dbvfiv.cfd.foam import FlowCase
 from dbvfiv.errors import CaseError
 from dbvfiv.record.mesh import WholeValve
 from dbvfiv.studies.case import thesis_case
+from dbvfiv.studies.closure.figures import passage
 from dbvfiv.studies.measured import WallSections, distances
 
 FLAT = {
@@ -115,6 +116,9 @@ def test_it_shuts_under_back_pressure():
     assert [part["symmetry"] for part in said["classes"]] == ["A"]
     for state in found.states:
         assert abs(state.force_balance) < 1e-6
+    lines = passage(found).axes[0].get_lines()
+    for state, line in zip(sorted(found.states, key=lambda state: state.pressure), lines):
+        assert min(line.get_ydata()) == pytest.approx(max(1e6 * state.least_opening, 0.01), rel=1e-9)
 
 
 @pytest.mark.slow

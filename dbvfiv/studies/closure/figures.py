@@ -231,11 +231,11 @@ def passage(result: StudyResult) -> Figure:
     figure = new_figure(7.2, 4.4)
     axes = figure.add_subplot()
     states = some_of(sorted(result.states, key=lambda s: s.pressure))
-    z = result.mesh.z * 1e3
+    z, copies = result.mesh.z * 1e3, result.mesh.part.copies
     for state, colour in zip(states, pressure_colours([s.pressure for s in states])):
         axes.semilogy(
             z,
-            np.maximum(4e6 * state.opening, _SHUT),
+            np.maximum(1e6 * copies * state.opening, _SHUT),
             color=colour,
             marker=".",
             ms=3,
@@ -251,7 +251,7 @@ def passage(result: StudyResult) -> Figure:
         loc="left",
         fontweight="bold",
     )
-    log_axis(axes.yaxis, _SHUT, 4e6 * max(float(state.opening.max()) for state in states))
+    log_axis(axes.yaxis, _SHUT, 1e6 * copies * max(float(state.opening.max()) for state in states))
     axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.14), ncols=4)
     return figure
 
