@@ -45,6 +45,8 @@ CHOKED = 50.0
 VAPOUR = 1e-3
 #: Absolute pressure, Pa, below which a fluid is a gas: by no more can its pressure fall.
 GAS = 1e6
+#: Absolute pressure of next to nothing over that around the jet.
+NOTHING = 1e-15
 #: Steps within which a steady flow must be found, and the relative size of the last one.
 _SETTLING, _SETTLED = 200, 1e-12
 #: What is left, over rho c^2, where such a step is as long as a wave takes through the passage.
@@ -137,9 +139,11 @@ class GasChannel(AroundChannel):
         return jnp.maximum(sigma, limit), jnp.minimum(sigma - limit, 0.0)
 
     def compression(self, pressure, parameters):
-        """sigma, m/s, of pressures over that around the jet, Pa; traceable."""
+        """sigma, m/s, of pressures over that around the jet, Pa; of those that no gas has, as of next to none;
+        traceable.
+        """
         c, ratio = parameters["sound_speed"], parameters["heat_capacity_ratio"]
-        return c / ratio * jnp.log1p(ratio * pressure / (parameters["density"] * c * c))
+        return c / ratio * jnp.log1p(jnp.maximum(ratio * pressure / (parameters["density"] * c * c), NOTHING - 1.0))
 
     def outlet(self, speed, parameters):
         """sigma, m/s, at the outlet with a speed, m/s: zero up to that of sound, beyond such that it is that."""
@@ -274,7 +278,7 @@ class GasChannel(AroundChannel):
         return _settled(*jax.lax.stop_gradient((self.without_drives(), area, self._driven_at_all(parameters))))
 
     def _driven_at_all(self, parameters):
-        """Parameters with a pressure that drives the flow where there is none."""
+        """Parameters with a pressure of one, Pa, that drives the flow where there is none."""
         still = parameters["inlet"] == self.channel.back
         return {**parameters, "inlet": jnp.where(still, self.channel.back + 1.0, parameters["inlet"])}
 
@@ -299,9 +303,10 @@ class GasChannel(AroundChannel):
         for _ in range(2):
             inner = inner + _newton_step(own, area, driven, inner, drive)
         _, sigma = own.split(inner, parameters)
-        rest = jnp.zeros_like(area) + self.channel.static
-        pressure = jnp.where(still, rest, self.pressure(sigma, parameters) + self.channel.static)
-        return pressure, jnp.where(still, 0.0, inner)
+        pressure, over = self.pressure(sigma, parameters), parameters["inlet"] - self.channel.back
+        # where nothing flows their derivative by the inlet pressure is that of the flow that 1 Pa drives
+        pressure = jnp.where(still, over * jax.lax.stop_gradient(pressure), pressure)
+        return pressure + self.channel.static, jnp.where(still, 0.0, inner)
 
     def without_drives(self) -> GasChannel:
         """Copy of the law with only those terms that act on steady flow, which is that of an open passage."""

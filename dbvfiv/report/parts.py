@@ -182,7 +182,8 @@ _MEASURED = {
 
 
 def _pressure_title(found: Gathered) -> str:
-    where = "in the reservoir" if found.case.has_line and found.case.drive.at == "reservoir" else "at the inlet"
+    case, far = found.case, {"reservoir": "in the reservoir", "line": "at the far end of the line"}
+    where = far[case.drive.at] if case.has_line else "at the inlet"
     return f"{'head' if found.case.units.heads else 'pressure'} {where}"
 
 
@@ -342,7 +343,7 @@ def cycle_part(found: Gathered) -> Part | None:
         for p in result.points
     )
     head = (
-        f"{row.title}, {row.shown_unit}",
+        f"{row.title}, {row.shown_unit}".rstrip(", "),
         f"amplitude of a lip, {unit}",
         "frequency, Hz",
         f"lip from .. to, {unit}",

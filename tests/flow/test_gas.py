@@ -141,6 +141,16 @@ def test_derivatives_of_the_steady_flow():
     assert np.abs(law.steady_operator(area, 40e3)[1] @ a - expected).max() < 1e-7 * np.abs(expected).max()
 
 
+def test_pressures_at_rest_rise_as_those_of_a_slow_flow():
+    """Equilibria of a wall begin there; without the derivative their curve turned at its first step."""
+    z, area = passage()
+    law = gas_of(z)
+    values = law.values(given(0.0))
+    slope = jax.jacfwd(lambda inlet: law.steady(area, {**values, "inlet": inlet})[0])
+    np.testing.assert_allclose(slope(0.0), slope(2.0), rtol=1e-3)
+    assert slope(0.0)[-1] == pytest.approx(1.0, rel=1e-12)
+
+
 def test_a_fluid_of_unit_density_that_is_compressed_alike():
     """Same pressures at speeds that are larger by the root of the density, which stability over a plane goes by."""
     z, area = passage()
@@ -292,6 +302,20 @@ def test_a_liquid_that_boils_keeps_its_pressure():
         assert slopes[0] == pytest.approx(thick * speed**2 / WAVES, rel=2e-3)  # liquid: Tait's exponent
     assert float(law.pressure(limit, given_here)) == pytest.approx(BOILS, rel=1e-12)
     assert 0.0 < BOILS - float(law.pressure(-0.7 * WAVES, given_here)) < 0.6 * LIQUID * (VAPOUR * WAVES) ** 2
+
+
+def test_a_gas_has_no_pressure_below_none():
+    """A vapour pressure further below that around the jet than its absolute pressure is met nowhere."""
+    z = np.linspace(0.0, 0.2, 9)
+    absolute = DENSITY * SOUND**2 / RATIO
+    boils = GasChannel(Channel(z, TINY, 1.0, reversible=True, density=DENSITY), SOUND, RATIO, -1.2 * absolute)
+    values = boils.values(given(0.0))
+    for sigma in (-2.0 * SOUND, 0.0, 0.3 * SOUND):
+        for name in ("pressure", "enthalpy"):
+            part, plain = getattr(boils, name), getattr(gas_of(z, TINY), name)
+            assert float(part(sigma, values)) == pytest.approx(float(plain(sigma, values)), rel=1e-12)
+            slope = jax.grad(lambda rho, part=part: part(sigma, {**values, "density": rho}))(DENSITY)
+            assert np.isfinite(slope)
 
 
 def law_values() -> dict[str, float]:

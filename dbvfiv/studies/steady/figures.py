@@ -133,10 +133,12 @@ def jet_velocity(result: StudyResult) -> Figure:
         "inlet": (_kilopascals, lambda s: s.station_velocity[-1], _SECOND),
     }
     figure, axes = _over(result, parameter_label(result.case, "pressure"), "Velocity, m/s", curves)
-    fine = np.linspace(0.0, max(s.pressure for s in result.states), 200)
+    rest = result.case.rest_pressure
+    fine = np.linspace(rest, max(rest, *(s.pressure for s in result.states)), 200)
+    over = f"(p-{rest / 1e3:.4g}\\,\\mathrm{{kPa}})" if rest else "\\,p"
     ideal, label = (
-        np.sqrt(2 * fine / result.case.fluid.density),
-        r"$\sqrt{2\,p/\rho}$, without the velocity at the inlet",
+        np.sqrt(2 * (fine - rest) / result.case.fluid.density),
+        f"$\\sqrt{{2{over}/\\rho}}$, without the velocity at the inlet",
     )
     axes.plot(fine / 1e3, ideal, ":", color="0.35", lw=1.3, label=label)
     return _finish(figure, axes, "Jet velocity")

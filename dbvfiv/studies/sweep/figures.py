@@ -25,6 +25,7 @@ from ...drawing.style import (
     limits,
     log_axis,
     new_figure,
+    parameter_label,
 )
 from ...texts import digits
 from ..result import StudyResult
@@ -45,8 +46,7 @@ def curves(result: StudyResult) -> Figure:
     """Growth rate, frequency and damping ratio of each branch; crossings of zero growth marked, spans with unstable
     modes shaded.
     """
-    row = PARAMETERS[result.parameter]
-    name, unit, factor = row.words, row.shown_unit, 1.0 / row.scale
+    label, factor = parameter_label(result.case, result.parameter), 1.0 / PARAMETERS[result.parameter].scale
     figure = new_figure(7.6, 8.6)
     ratios = {"height_ratios": [1.25, 1.0, 0.9]}
     growth, frequency, ratio = panels = figure.subplots(3, 1, sharex=True, gridspec_kw=ratios)
@@ -61,13 +61,13 @@ def curves(result: StudyResult) -> Figure:
             log_axis(axes.xaxis, x[0], x[-1])
         axes.set_xlim(*limits(x, result.axis.log))
         axes.tick_params(labelbottom=True)
-    for axes, label in ((growth, "Growth rate, 1/s"), (frequency, "Frequency, Hz"), (ratio, "Damping ratio, %")):
-        axes.set_ylabel(label)
+    for axes, title in ((growth, "Growth rate, 1/s"), (frequency, "Frequency, Hz"), (ratio, "Damping ratio, %")):
+        axes.set_ylabel(title)
     growth.axhline(0.0, color="0.25", lw=1.1)
     ratio.axhline(0.0, color="0.25", lw=1.1)
     frequency.set_ylim(bottom=min(0.0, frequency.get_ylim()[0]))
-    ratio.set_xlabel(f"{name}, {unit}")
-    over = f"{name[0].lower()}{name[1:]}"
+    ratio.set_xlabel(label)
+    over = f"{label[0].lower()}{label[1:]}".partition(",")[0]
     growth.set_title(f"Modes over {over}, {surroundings_of(result)}", loc="left", fontweight="bold")
     handles, labels = growth.get_legend_handles_labels()
     if any(np.nanmin(b.confidence, initial=1.0) < DOUBTFUL for b in result.branches):
@@ -97,14 +97,13 @@ def _draw_branch(panels, x: np.ndarray, branch: Any, look: dict) -> None:
 def _mark_crossing(axes, crossing: Any, result: StudyResult, x: np.ndarray) -> None:
     """A crossing of zero growth and its numbers, beside it where there is room."""
     row = PARAMETERS[result.parameter]
-    unit, factor = row.shown_unit, 1.0 / row.scale
-    at = factor * crossing.value
+    at = crossing.value / row.scale
     axes.plot(at, 0.0, "D", color=UNSTABLE, ms=6, zorder=4)
     side = -1 if _share(at, x, result.axis.log) > 0.7 else 1
     swing = f"{digits(crossing.frequency, 2)} Hz" if crossing.frequency > 0 else "no oscillation"
     look = {"textcoords": "offset points", "fontsize": 9, "color": UNSTABLE, "path_effects": HALO}
     look["ha"] = "left" if side > 0 else "right"
-    axes.annotate(f"≈ {at:.3g} {unit}, {swing}", (at, 0.0), (7 * side, 7), **look)
+    axes.annotate(f"≈ {row.amount(crossing.value, 3)}, {swing}", (at, 0.0), (7 * side, 7), **look)
 
 
 def surroundings_of(result: StudyResult) -> str:
@@ -146,11 +145,9 @@ def root_locus(result: StudyResult) -> Figure:
     """Growth rate and frequency of each branch, coloured by the parameter; a ring where it begins, crossings of the
     axis marked.
     """
-    row = PARAMETERS[result.parameter]
-    name, unit, factor = row.words, row.shown_unit, 1.0 / row.scale
     figure = new_figure(7.6, 5.4)
     axes = figure.add_subplot()
-    x = result.values * factor
+    x = result.values / PARAMETERS[result.parameter].scale
     colours = matplotlib.colors.ListedColormap(matplotlib.colormaps[MAGNITUDE](np.linspace(0.0, 0.9, 256)))
     ends_of_x = limits(x, result.axis.log)
     scale = LogNorm(*ends_of_x) if result.axis.log else Normalize(*ends_of_x)
@@ -181,7 +178,7 @@ def root_locus(result: StudyResult) -> Figure:
     axes.set_xlim(low, high)
     axes.set_ylim(bottom=-0.03 * axes.get_ylim()[1])
     axes.text(0.995, 0.015, "unstable", transform=axes.transAxes, ha="right", va="bottom", color=UNSTABLE, fontsize=9)
-    bar = colour_bar(figure, ScalarMappable(scale, colours), axes, f"{name}, {unit}")
+    bar = colour_bar(figure, ScalarMappable(scale, colours), axes, parameter_label(result.case, result.parameter))
     if result.axis.log:
         log_axis(bar.ax.yaxis, x[0], x[-1])
     axes.set_xlabel("Growth rate, 1/s")
@@ -196,8 +193,7 @@ def root_locus(result: StudyResult) -> Figure:
 
 def _mark_axis(axes, result: StudyResult) -> None:
     row = PARAMETERS[result.parameter]
-    unit, factor = row.shown_unit, 1.0 / row.scale
     look = {"textcoords": "offset points", "fontsize": 9, "color": UNSTABLE, "path_effects": HALO}
     for crossing in result.crossings():
         axes.plot(0.0, crossing.frequency, "D", color=UNSTABLE, ms=6, zorder=5)
-        axes.annotate(f"≈ {factor * crossing.value:.3g} {unit}", (0.0, crossing.frequency), (9, 6), **look)
+        axes.annotate(f"≈ {row.amount(crossing.value, 3)}", (0.0, crossing.frequency), (9, 6), **look)

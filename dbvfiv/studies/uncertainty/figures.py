@@ -27,7 +27,6 @@ def draw(result: StudyResult) -> Iterator[tuple[str, Callable[[], Figure]]]:
     yield "margin", lambda: margin(result)
     if (result.deciding or {}).get("decides") and result.deciding["decides"][0]["share"] is not None:
         yield "what-decides", lambda: what_decides(result)
-
     if result.deciding and result.deciding["samples"] >= LEAST:
         yield "tornado", lambda: tornado(result)
 
@@ -85,14 +84,15 @@ def margin(result: StudyResult) -> Figure:
         found = result.at(result.points[0]["value"])
         plain = (found["stage"] == 0) & np.isfinite(found["damping_ratio"])
         ratio, outcome = 100 * found["damping_ratio"][plain], found["outcome"][plain]
-        edges = np.histogram_bin_edges(ratio, bins="auto")
+        edges = np.histogram_bin_edges(ratio, max(1, round(len(ratio) ** 0.5)))
         for name in (STABLE, FLUTTERS):
             here = ratio[outcome == OUTCOMES.index(name)]
             if here.size:
                 axes.hist(here, edges, color=_LOOKS[name], label=f"{name}, {here.size} samples")
         axes.set(xlabel="Least damping ratio, %", ylabel="Samples")
         axes.axvline(0.0, color="black", lw=0.8)
-    axes.legend()
+    if axes.get_legend_handles_labels()[0]:
+        axes.legend()
     headline(figure, f"Margin of {result.header.name}")
     _under(figure, result)
     return figure
