@@ -68,7 +68,7 @@ class Study:
     tables: Callable[[MeshData], tuple[TableSpec, ...]]
     run: Callable[..., None]
     result: type[Any]
-    check: Callable[[Case], None] = lambda _case: None
+    check: Callable[[Case], Any] = lambda _case: None
     rows_to_keep: Callable[[Record, Case], Mapping[str, int]] | None = None
     extends: bool = False
     live: Callable[[Case], Callable[[Any], str]] | None = None

@@ -22,7 +22,7 @@ from ...texts import digits
 from ..case import Case
 from ..result import StudyResult
 from ..session import Session, Study
-from ..stability.dimensions import leading_class
+from ..stability.dimensions import flow_models, leading_class
 from ..stability.place import check_scan, describe_fixed, fixed_conditions
 from ..stability.samples import SAMPLE_TABLE, SAMPLES, Sample, keep_samples, read_samples
 from ..stability.verdict import DIVERGES, FLUTTERS, NOT_VALID, OUTCOMES, STABLE, Verdict
@@ -269,8 +269,9 @@ def rows_to_keep(known: Record, case: Case) -> dict[str, int]:
 
 
 def check(case: Case) -> None:
-    """Refuse axes of what the case does not have."""
+    """Refuse axes of what the case does not have, and flow models that do not differ."""
     check_scan(case, *(axis.parameter for axis in case.map.axes))
+    flow_models(case, "map")
 
 
 def run(session: Session, record: GrowingRecord, workers: int | None = None) -> None:

@@ -361,4 +361,4 @@ def _cells(modes: Sequence[ModeShape]) -> str:
     return "".join(f"{m.growth_rate:14.4f}{m.frequency:13.4f}{m.damping_ratio:13.4f}" for m in modes) or " " * 40
 
 
-STUDY = Study("modes", tables_of, run, ModesResult, rows_to_keep=rows_to_keep)
+STUDY = Study("modes", tables_of, run, ModesResult, lambda case: variants(case, "modes"), rows_to_keep=rows_to_keep)

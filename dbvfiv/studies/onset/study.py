@@ -18,6 +18,7 @@ from ...record.mesh import MeshData
 from ...record.record import GrowingRecord, Record
 from ...record.table import TableSpec
 from ...texts import digits
+from ..case import Case
 from ..result import StudyResult
 from ..session import Session, Study
 from ..stability.dimensions import Variant, compare_ranges, leading_class, own_variant, variants
@@ -53,6 +54,12 @@ class _Keeper(Observer):
 
     def progress(self, text: str) -> None:
         self.record.progress(text)
+
+
+def check(case: Case) -> None:
+    """Refuse a range of what the case does not have, and flow models that do not differ."""
+    check_scan(case, case.onset.axis.parameter)
+    variants(case, "onset")
 
 
 def run(session: Session, record: GrowingRecord) -> None:
@@ -481,4 +488,4 @@ def _title(result: StudyResult) -> str:
     return f"{result.header.name}, {describe_fixed(result.case, result.parameter)}"
 
 
-STUDY = Study("onset", tables_of, run, OnsetResult, lambda case: check_scan(case, case.onset.axis.parameter))
+STUDY = Study("onset", tables_of, run, OnsetResult, check)

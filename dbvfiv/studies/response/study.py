@@ -30,7 +30,6 @@ from ...errors import CaseError, SolveError
 from ...flow.law import FlowMotion
 from ...model.dynamics import LinearisedState
 from ...model.state import LipCentre
-from ...model.valve import ValveModel
 from ...record.mesh import MeshData
 from ...record.record import GrowingRecord, Record
 from ...record.table import Column, TableSpec
@@ -68,14 +67,14 @@ class Spread:
     correlation_time: np.ndarray
 
 
-def require_inertia(model: ValveModel) -> None:
-    """Refuse a valve whose fluid has no inertia.
+def require_inertia(case: Case) -> None:
+    """Refuse a valve without a fluid that has inertia.
 
     Raises
     ------
     CaseError
     """
-    if not (model.flow.has_fluid and model.flow.unsteady):
+    if not (case.drive.kind == "flow" and case.fluid.unsteady):
         raise CaseError(
             "The response to the pressure at the inlet needs a fluid with inertia (fluid.unsteady = true).",
             key="fluid.unsteady",
@@ -109,7 +108,7 @@ class Transfer:
 
     def __init__(self, linear: LinearisedState, mu: Mu, frequencies: np.ndarray):
         flow = linear.model.flow
-        require_inertia(linear.model)
+        require_inertia(linear.model.case)
         if linear.seal is not None:
             raise SolveError("the faces of the bill touch and nothing flows, so there is no response of a flow.")
         self.linear, self.mu = linear, mu
@@ -296,8 +295,9 @@ def rows_to_keep(known: Record, _case: Case) -> dict[str, int]:
 
 
 def check(case: Case) -> None:
-    """Refuse a range of what the case does not have."""
+    """Refuse a range of what the case does not have, and a fluid without inertia."""
     check_scan(case, "pressure" if case.response.axis is None else case.response.axis.parameter)
+    require_inertia(case)
 
 
 def run(session: Session, record: GrowingRecord) -> None:
@@ -313,7 +313,6 @@ def run(session: Session, record: GrowingRecord) -> None:
     case, asked = session.case, session.case.response
     axis = asked.axis
     parameter, values = ("pressure", (case.drive.pressure,)) if axis is None else (axis.parameter, axis.values)
-    require_inertia(session.model)
     rows = asked.density()
     walk = StabilityWalk(case, record, session.model)
     done = set(record.column(POINTS, "value"))

@@ -81,6 +81,7 @@ def check(case: Case) -> None:
     """Refuse a range of what the case does not have, samples of the head behind a pump, and methods with a range."""
     plan = Plan(case)
     check_scan(case, plan.parameter)
+    flow_models(case, "uncertainty")
     if case.has_pump and "pressure" in case.uncertainty.inputs:
         raise CaseError(
             "uncertainty.inputs holds the pressure, and behind a pump each sampled valve has that at which both meet; "
