@@ -69,8 +69,9 @@ def opens(found: Gathered) -> Answer:
     crack = steady.cracking
     if crack is None:
         return Answer(question, UNKNOWN, "No cracking head was found below the heads examined.")
-    if crack.pressure is None:
-        return Answer(question, NO, f"The lips do not crack up to {units.pressure(top)}.")
+    if crack.pressure is None or state.hydraulics is None:
+        beyond = "" if crack.pressure is None else f"; they do at {units.pressure(crack.pressure, 3)}"
+        return Answer(question, NO, f"The lips do not crack up to {units.pressure(top)}{beyond}.")
     text = (
         f"Cracks at {units.pressure(crack.pressure, 3)}; at {units.pressure(top)} the opening is "
         f"{units.text_of('size', state.lip_opening, 3)}, {units.text_of('flow', state.volume_flow, 3)} flow with a jet "

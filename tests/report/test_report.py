@@ -23,11 +23,12 @@ from dbvfiv.errors import CaseError
 from dbvfiv.model import ValveModel
 from dbvfiv.model.material_stability import material_stability
 from dbvfiv.report import gather, write_page, write_pdf
-from dbvfiv.report.answers import UNKNOWN, answers
+from dbvfiv.report.answers import UNKNOWN, answers, opens
 from dbvfiv.report.gather import following, heads_of, planned
 from dbvfiv.report.parts import heads_part, steady_part
 from dbvfiv.studies.case import load_case
 from dbvfiv.studies.stability.verdict import Verdict
+from dbvfiv.studies.steady.study import Cracking
 from dbvfiv.studies.workers import Lost, Workers
 from tests.child import start
 from tests.small_valves import THESIS_SET
@@ -245,7 +246,8 @@ def test_heads_at_which_the_bill_is_sealed_have_rows_without_losses(made):
             pressure=1e4, volume_flow=0.02, lip_opening=0.03, residual=0.0, hydraulics=losses, outlet_velocity=4.0
         ),
     ]
-    nothing = SimpleNamespace(states=states, cracking=None, failures=(), drawers=dict, case=case)
+    cracking = Cracking(2.0, 6e3, 0.6118, sealed=True)
+    nothing = SimpleNamespace(states=states, cracking=cracking, failures=(), drawers=dict, case=case)
     found = SimpleNamespace(
         case=case,
         get={"steady": nothing}.get,
@@ -258,6 +260,8 @@ def test_heads_at_which_the_bill_is_sealed_have_rows_without_losses(made):
     assert {len(row) for row in table.rows} == {len(table.head)} == {9}
     assert table.rows[0][3:] == ("-",) * 6 and table.rows[1][5:8] == ("1230", "20", "23")
     assert [row[1] for row in heads_part(found).tables[0].rows][-1] == "flutters (sealed)"
+    answer = opens(found)  # the bill cracks above the heads examined, at a pressure that the case has besides
+    assert answer.answer == "no" and answer.text.endswith("; they do at 0.612 m.")
 
 
 @pytest.mark.parametrize("name, span, along", [("in-line", "4:100:6:log", None), ("moulded", "4:100:3:log", 24)])

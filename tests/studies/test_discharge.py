@@ -163,6 +163,14 @@ def test_measured_points_at_one_pressure():
 # ----
 
 
+def test_a_sealed_bill_has_no_operating_point():
+    """It drew a curve of no states."""
+    keys = {"mesh.around": 6, "mesh.along": 8, "materials.strain_level": 0.1, "outside.fluid": "none"}
+    found = results(dbvfiv.load("cases/dbv6-moulded.toml", keys), [240.0])
+    assert found.case.has_line and not found.states[0].volume_flow
+    assert "operating-point" not in found.drawers() and "deflection" in found.drawers()
+
+
 def test_line_and_valve_cross_at_the_operating_point():
     found = results(load(upstream__length=50.0, upstream__loss=20.0, upstream__friction=0.02), ["6 kPa", "18 kPa"])
     (axes,) = found.figures(["operating-point"])["operating-point"].axes

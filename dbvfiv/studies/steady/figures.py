@@ -39,7 +39,7 @@ def draw(result: StudyResult, pressure: float | None = None) -> Iterator[tuple[s
         if result.measured.area is not None:
             yield "area-pressure", lambda: area_pressure(result)
         yield "jet-velocity", lambda: jet_velocity(result)
-        if result.case.has_line:
+        if result.case.has_line and any(state.hydraulics is not None for state in result.states):
             yield "operating-point", lambda: operating_point(result)
     yield "deflection", lambda: deflection(result)
     yield "lip-shapes", lambda: lip_shapes(result)
