@@ -36,13 +36,14 @@ PICTURES = {
 
 
 def arguments_of(case: Any, title: str) -> list[str]:
-    """Arguments of the study of a picture for a case: heads up to 1.5 times its own, damping from a quarter to three
-    times its own.
+    """Arguments of the study of a picture for a case: heads over that downstream up to 1.5 times its own, damping from
+    a quarter to three times its own.
     """
     name = next((n for n in ("loss_factor", "beta", "alpha") if not case.damping.lacks(n)), "density")
     own = getattr(case.damping, name, case.fluid.density) or 1.0
-    high = 1.5 * case.drive.pressure
-    heads = {"low": 0.1 * high, "high": high, "kpa_low": 1e-4 * high, "kpa_high": 1e-3 * high}
+    back = max(case.rest_pressure, 0.0)
+    low, high = (back + share * (case.drive.pressure - back) for share in (0.15, 1.5))
+    heads = {"low": low, "high": high, "kpa_low": 1e-3 * low, "kpa_high": 1e-3 * high}
     values = heads | {"damping": f"{name}={0.25 * own:.6g}:{3 * own:.6g}"}
     return [argument.format(**values) for argument in PICTURES[title][1]]
 

@@ -9,6 +9,7 @@ import pytest
 from hypothesis import given as drawn
 from hypothesis import strategies as st
 
+from dbvfiv.app.see import arguments_of
 from dbvfiv.app.sheet import change, check, given, read_sheet, usual_value, write_sheet
 from dbvfiv.errors import CaseError
 from dbvfiv.studies.case import Case, load_case
@@ -79,3 +80,11 @@ def test_changes_of_any_data_are_made_or_refused(data, typed):
 
 def test_usual_values_have_units():
     assert usual_value(Case().drive, "pressure") == "18 kPa" and usual_value(Case().layers[2], "angle") == "54 deg"
+
+
+def test_pictures_begin_above_the_pressure_downstream():
+    case = load_case(None, ["drive.pressure=10 kPa", "downstream.pressure=5 kPa"])
+    assert arguments_of(case, "Head-loss curve") == ["-p", "5.75 kPa:12.5 kPa:10"]
+    assert arguments_of(case, "Root locus over head") == ["--over", "pressure=5750:12500:10"]
+    case = load_case(None, ["drive.pressure=10 kPa"])
+    assert arguments_of(case, "Root locus over head") == ["--over", "pressure=1500:15000:10"]
