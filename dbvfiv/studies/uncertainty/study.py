@@ -82,7 +82,7 @@ def check(case: Case) -> None:
     plan = Plan(case)
     check_scan(case, plan.parameter)
     flow_models(case, "uncertainty")
-    if case.has_pump and "pressure" in case.uncertainty.inputs:
+    if case.has_pump and {"pressure", PARAMETERS["pressure"].key} & set(case.uncertainty.inputs):
         raise CaseError(
             "uncertainty.inputs holds the pressure, and behind a pump each sampled valve has that at which both meet; "
             "leave it out, or the pump.",

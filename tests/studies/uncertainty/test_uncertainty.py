@@ -252,6 +252,7 @@ MALFORMED = [
     ('workers = "few"', "neither a number nor an address"),
     ("workers = 0", "out of range"),
     (f'inputs.pressure = "normal(5 %)"\n[upstream]\n{PUMP_KEYS}', "that at which both meet"),
+    (f'inputs."drive.pressure" = "normal(5 %)"\n[upstream]\n{PUMP_KEYS}', "that at which both meet"),
 ]
 
 
