@@ -75,6 +75,7 @@ def test_onsets_under_both_laws_are_those_of_each():
         ("modes", {"drive__kind": "uniform"}, "drive.kind is 'uniform'"),
         ("onset", {"onset__over": "storage"}, "onset.over moves the flow model itself"),
         ("onset", {"fluid__unsteady": False}, "fluid.unsteady is false"),
+        ("modes", {"fluid__sound_speed": 343, "fluid__continuity": "storage"}, "compressed .* stores mass"),
     ],
 )
 def test_where_no_law_is_at_work_there_are_not_two(study, keys, words):

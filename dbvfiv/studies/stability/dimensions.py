@@ -125,6 +125,12 @@ def _require_two_laws(case: Case, study: str) -> None:
             "'case' then.",
             key=f"{study}.continuity",
         )
+    if case.is_compressed:
+        raise CaseError(
+            f"{study}.continuity is given as 'both', but a fluid that is compressed (fluid.sound_speed) stores mass, "
+            "and the quasi-steady model does not; it must be 'case' then.",
+            key=f"{study}.continuity",
+        )
     if study == "modes" and not asks_for_equilibria(keys.symmetry):
         own = equilibria_of(case.part).name
         raise CaseError(

@@ -125,6 +125,11 @@ def require_parameter(case: Case, name: str) -> None:
             "There is no tail_length to change: no pipe follows the valve; give downstream.pipe_diameter.",
             key=PARAMETERS[name].key,
         )
+    if name == "storage" and case.is_compressed:
+        raise CaseError(
+            "There is no flow model to change: a fluid that is compressed (fluid.sound_speed) stores mass.",
+            key=PARAMETERS[name].key,
+        )
     if name == "density" and case.has_pump:
         raise CaseError(
             "Over the density a pump has no steady state to keep: its head is another pressure in another fluid; set "

@@ -166,6 +166,7 @@ def test_what_a_case_does_not_have_is_no_parameter(one_sentence, parameter, word
         ("uncertainty", {"uncertainty.over": "tail_length=1:3:3"}),
         ("identify", {"identify.over": "tail_length=1:3:3"}),
         ("design", {"drive.kind": "uniform"}),
+        ("onset", {"onset.over": "storage", "fluid.sound_speed": 343}),
         ("modes", {"modes.continuity": "both", "modes.symmetry": "all"}),
         ("map", {"map.continuity": "both", "fluid.unsteady": False}),
         ("response", {"fluid.unsteady": False}),
@@ -175,7 +176,9 @@ def test_refusal_precedes_the_search_for_levels(kind, keys, monkeypatch):
     monkeypatch.setattr(session, "settle_levels", None)
     case = Case()
     assert case.seeks_levels
-    with pytest.raises((CaseError, SolveError), match="no tail_length to|Without flow|differ in|at work|inertia"):
+    with pytest.raises(
+        (CaseError, SolveError), match="no tail_length to|Without flow|differ in|no flow model to|at work|inertia"
+    ):
         Session(case.replace(keys)).perform(kind)
 
 
