@@ -125,7 +125,7 @@ class Explorer:
         for name in ("pressure", "density", *damped[:1], "pipe_length"):
             own, (low, high) = self.base.get(name, 0.0), OFFERED.get(name, DAMPED)
             if own > 0 and not (name == "pipe_length" and self.case.upstream.pieces):
-                above = self.model.flow.back if name == "pressure" else 0.0
+                above = max(self.model.flow.back, 0.0) if name == "pressure" else 0.0
                 yield name, (above + low * (own - above), min(above + high * (own - above), PARAMETERS[name].high))
 
     def moves(self, name: str) -> bool:
@@ -269,7 +269,9 @@ class Explorer:
             if enriched:
                 space = reduction.deeper(space, [place], OPTIONS.held)
                 self._space = reduction, space, corners
-            bound = np.nan if self.interrupted() else reduction.error(space, [place])
+            if self.interrupted():
+                return np.nan
+            bound = max(reduction.error(space, [place]), reduction.lack(space, place))
             if not bound > OPTIONS.tolerance:
                 break
         return bound

@@ -305,6 +305,19 @@ class FamilyReduction:
         top = times(*own, here) - times(*own, there) * times(added[1], none, here) / both
         return -top / times(*own, T.apply_derivative(pairs.values, pairs.q, pairs.u))
 
+    def lack(self, model: ReducedFamily, mu: Hashable) -> float:
+        """Largest product of the shares by which a correction with the full matrices changes right and left leading
+        vectors, by which eigenvalues err; large too where corrections do not converge and `error` says nothing.
+        """
+        pairs, mass = model.pairs(mu, self.options.held), self.family.mass
+        corrected = self._corrected([pairs], [mu])[0]
+
+        def size(x: np.ndarray) -> np.ndarray:
+            return np.sqrt(np.abs(np.einsum("ij,ij->j", x.conj(), mass @ x)))
+
+        right, left = (size(new - old) / size(old) for new, old in zip(corrected, (pairs.q, pairs.w)))
+        return float((right * left).max(initial=0.0))
+
     def error(self, model: ReducedFamily, points, most: int | None = None) -> float:
         """Largest relative change of leading eigenvalues of a reduced model under a correction with the full matrices,
         at some points.
