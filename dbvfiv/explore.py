@@ -269,9 +269,7 @@ class Explorer:
             if enriched:
                 space = reduction.deeper(space, [place], OPTIONS.held)
                 self._space = reduction, space, corners
-            if self.interrupted():
-                return np.nan
-            bound = max(reduction.error(space, [place]), reduction.lack(space, place))
+            bound = np.nan if self.interrupted() else reduction.bound(space, place)
             if not bound > OPTIONS.tolerance:
                 break
         return bound

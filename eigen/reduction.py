@@ -284,14 +284,14 @@ class FamilyReduction:
         corrected = self._corrected(several, points)
         return np.hstack([part for both in corrected for x in both for part in (x.real, x.imag)])
 
-    def correction(self, pairs: Pairs, mu) -> np.ndarray:
+    def correction(self, pairs: Pairs, mu, corrected: tuple[np.ndarray, np.ndarray] | None = None) -> np.ndarray:
         """Corrections of eigenvalues by the full matrices, complex (k,): those of the projection on each pair of
         vectors and what a correction with the full matrices adds to it.
 
         What the space lacks shows in it. Of the vectors' corrections only the directions count, so that motions faster
         than those left out of the space, whose inertia the corrections lack, are not made worse.
         """
-        right, left = self._corrected([pairs], [mu])[0]
+        right, left = self._corrected([pairs], [mu])[0] if corrected is None else corrected
         added, T = (right - pairs.q, left - pairs.w), self.operator(mu)
         own, none = (pairs.w, pairs.c), np.zeros_like(pairs.c)
         here = T.apply(pairs.values, pairs.q, pairs.u)
@@ -305,9 +305,9 @@ class FamilyReduction:
         top = times(*own, here) - times(*own, there) * times(added[1], none, here) / both
         return -top / times(*own, T.apply_derivative(pairs.values, pairs.q, pairs.u))
 
-    def lack(self, model: ReducedFamily, mu: Hashable) -> float:
-        """Largest product of the shares by which a correction with the full matrices changes right and left leading
-        vectors, by which eigenvalues err; large too where corrections do not converge and `error` says nothing.
+    def bound(self, model: ReducedFamily, mu: Hashable) -> float:
+        """Relative error of leading eigenvalues at one point, at most: their change, as in `error`, or the product of
+        the shares by which right and left vectors change, which is large where corrections do not converge.
         """
         pairs, mass = model.pairs(mu, self.options.held), self.family.mass
         corrected = self._corrected([pairs], [mu])[0]
@@ -316,15 +316,15 @@ class FamilyReduction:
             return np.sqrt(np.abs(np.einsum("ij,ij->j", x.conj(), mass @ x)))
 
         right, left = (size(new - old) / size(old) for new, old in zip(corrected, (pairs.q, pairs.w)))
-        return float((right * left).max(initial=0.0))
+        return max(self._change(pairs, mu, corrected), float((right * left).max(initial=0.0)))
 
     def error(self, model: ReducedFamily, points, most: int | None = None) -> float:
         """Largest relative change of leading eigenvalues of a reduced model under a correction with the full matrices,
         at some points.
         """
-        worst = 0.0
-        for mu in points:
-            pairs = model.pairs(mu, most or self.options.held)
-            change = np.abs(self.correction(pairs, mu)) / np.maximum(np.abs(pairs.values), 1.0)
-            worst = max(worst, float(change.max(initial=0.0)))
-        return worst
+        pairs = ((model.pairs(mu, most or self.options.held), mu) for mu in points)
+        return max((self._change(*own) for own in pairs), default=0.0)
+
+    def _change(self, pairs: Pairs, mu: Hashable, corrected: tuple[np.ndarray, np.ndarray] | None = None) -> float:
+        change = np.abs(self.correction(pairs, mu, corrected)) / np.maximum(np.abs(pairs.values), 1.0)
+        return float(change.max(initial=0.0))

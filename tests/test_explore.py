@@ -35,7 +35,7 @@ WET = THIN | {"fluid.density": 813.1, "outside.fluid": "same", "outside.lips": "
 
 @pytest.mark.parametrize("keys", [{"materials.strain_level": 0.1}, THIN, WET])
 def test_bounds_hold_where_corrections_do_not_converge(keys):
-    """Of a wall that relaxes on a coarse mesh: the sign of the last one's leading mode was wrong, and called exact."""
+    """Walls that relax, on a coarse mesh: the leading mode of the last one had the wrong sign, and was called exact."""
     explorer = dbvfiv.load(None, COARSE | keys).explore()
     predicted, exact = explorer.bounded(), explorer.confirm()
     errors = [min(abs(exact.eigenvalues - value)) / abs(value) for value in predicted.eigenvalues[:2]]

@@ -104,6 +104,10 @@ class Parameter:
         """A value with its unit, "6 kPa"."""
         return f"{value / self.scale:.{digits}g} {self.shown_unit}".strip()
 
+    def span(self, low: float, high: float) -> str:
+        """Two values with their unit, "1 to 6 kPa"."""
+        return f"{low / self.scale:.6g} to {self.amount(high)}"
+
     def text(self, value: float) -> str:
         """A value for people, "6 kPa" or "α = 5 1/s"."""
         return f"{self.symbol} = {self.amount(value)}" if self.symbol else self.amount(value)

@@ -182,8 +182,7 @@ _MEASURED = {
 
 
 def _pressure_title(found: Gathered) -> str:
-    case, far = found.case, {"reservoir": "in the reservoir", "line": "at the far end of the line"}
-    where = far[case.drive.at] if case.has_line else "at the inlet"
+    where = found.case.pressure_at.removeprefix("static ") if found.case.has_line else "at the inlet"
     return f"{'head' if found.case.units.heads else 'pressure'} {where}"
 
 

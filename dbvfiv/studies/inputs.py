@@ -126,7 +126,7 @@ def correlation_of(case: Case, inputs: Sequence[Input]) -> np.ndarray:
     names = [one.name for one in inputs]
     matrix = np.eye(len(names))
     for *pair, value in case.uncertainty.correlation:
-        first, second = map(_parameter_of, pair)
+        first, second = map(parameter_of, pair)
         unknown = next((name for name in (first, second) if name not in names), None)
         if unknown or first == second:
             raise CaseError(
@@ -278,7 +278,7 @@ class Plan:
         return StabilityWalk(self.redescribed(row), solver=solver)
 
 
-def _parameter_of(name: str) -> str:
+def parameter_of(name: str) -> str:
     """Parameter that a key of the case holds, so that nothing has two names; those of the design count from what the
     case has, and their keys do not.
     """
@@ -286,7 +286,7 @@ def _parameter_of(name: str) -> str:
 
 
 def _input(case: Case, name: str, text: str, source: str) -> Input:
-    key, name = f"uncertainty.inputs.{name}", _parameter_of(name)
+    key, name = f"uncertainty.inputs.{name}", parameter_of(name)
     if name in PARAMETERS:
         row = PARAMETERS[name]
         try:

@@ -321,6 +321,7 @@ class Session:
 
     def resume(self, known: Record, observer: Observer | None = None, **choices: Any) -> Any:
         """Go on with a run in its file; `known` is what it holds."""
+        find_study(known.header.kind).check(self.case)
         header = Header(**(vars(known.header) | {"case": self.case, "complete": False}))
         return self._run(header.kind, header, known.path, observer, known, choices)
 

@@ -15,7 +15,7 @@ from ...case.parameters import Mu
 from ...case.statement import QUANTITIES, Statement
 from ...case.write import case_toml
 from ...drawing.style import headline, limits, log_axis, new_figure
-from ...errors import CaseError, SolveError
+from ...errors import SolveError
 from ...model.closed import close_valve
 from ...record.mesh import MeshData
 from ...record.record import GrowingRecord, Record
@@ -24,7 +24,7 @@ from ...texts import digits
 from ..case import Case
 from ..result import StudyResult
 from ..session import Session, Study
-from ..stability.place import check_scan
+from ..stability.place import check_scan, require_head
 from ..stability.verdict import OUTCOMES, STABLE
 from .problem import (
     AtHead,
@@ -73,8 +73,7 @@ def rows_to_keep(known: Record, _case: Case) -> dict[str, int]:
 def check(case: Case) -> None:
     """Refuse a case without flow or with a pump, and statements that cannot be read."""
     check_scan(case)
-    if case.has_pump:
-        raise CaseError("Behind a pump a head is no input; give drive.pressure and no upstream.pump.", "upstream.pump")
+    require_head(case)
     statements_of(case)
 
 

@@ -25,7 +25,7 @@ from ..case import Case
 from ..inputs import Plan
 from ..result import StudyResult
 from ..session import Session, Study
-from ..stability.place import check_scan, describe_fixed
+from ..stability.place import check_scan, describe_fixed, require_head
 from ..stability.walk import StabilityWalk
 from ..workers import Workers
 from .learning import Learned, Learning, coordinates
@@ -66,8 +66,7 @@ def rows_to_keep(known: Record, _case: Case) -> dict[str, int]:
 def check(case: Case) -> None:
     """Refuse a range of what the case does not have, a pump, and a case without records."""
     check_scan(case, Places(case).parameter)
-    if case.has_pump:
-        raise CaseError("Behind a pump a head is no input; give drive.pressure and no upstream.pump.", "upstream.pump")
+    require_head(case)
     if not case.identify.records:
         raise CaseError(
             "There is no record to identify the valve from; give RECORD.csv and --at, or identify.records.",

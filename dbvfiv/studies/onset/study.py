@@ -287,7 +287,7 @@ class OnsetResult(StudyResult):
     def _without_onset(self) -> str:
         row = self._row
         low, high = self.values[[0, -1]] if len(self.values) else (math.nan, math.nan)
-        scanned = f"from {low / row.scale:.6g} to {row.amount(high)}"
+        scanned = f"from {row.span(low, high)}"
         if not self.complete:
             return f"No onset has been located yet: the search ended early, after {len(self.values)} values {scanned}."
         sure, outcomes = sum(self.leading["certified"]), [verdict.outcome for verdict in self.verdicts]
@@ -464,9 +464,8 @@ def _mark(row: dict, scale: float, parameter: str, top, bottom) -> None:
         reach = row["uncertainty"] / scale
         top.plot([x - reach, x + reach], [0, 0], color=ACCENT, lw=3.5, alpha=0.75, zorder=4, solid_capstyle="butt")
     kind = {"super": "supercritical", "sub": "subcritical"}.get(row["criticality"], "")
-    words = f"{PARAMETERS[parameter].amount(row['value'], 4)}\n{digits(row['frequency'])} Hz" + (
-        f"\n{kind}" if kind else ""
-    )
+    told = (PARAMETERS[parameter].amount(row["value"], 4), f"{digits(row['frequency'])} Hz", kind)
+    words = "\n".join(filter(None, told))
     # on the side of the mark that the curve leaves free
     place = {"xytext": (9, -8), "va": "top"} if row["gains"] else {"xytext": (9, 8), "va": "bottom"}
     look = {"textcoords": "offset points", "fontsize": 8.5, "color": PUBLISHED, "path_effects": HALO}

@@ -99,6 +99,17 @@ def check_scan(case: Case, *names: str) -> None:
         require_parameter(case, name)
 
 
+def require_head(case: Case) -> None:
+    """Refuse a pump, behind which the head is no input.
+
+    Raises
+    ------
+    CaseError
+    """
+    if case.has_pump:
+        raise CaseError("Behind a pump a head is no input; give drive.pressure and no upstream.pump.", "upstream.pump")
+
+
 def require_parameter(case: Case, name: str) -> None:
     """Refuse a parameter that nothing in a case depends on.
 

@@ -216,8 +216,9 @@ def _of_modes(modes: np.ndarray) -> dict[str, float]:
 def not_valid_at(parameter: str, unsound: Mapping[float, str]) -> str:
     """Sentence on the values of a parameter at which the constants of the rubber do not hold."""
     row, values = PARAMETERS[parameter], sorted(unsound)
-    low, high = values[0], row.amount(values[-1])
-    where = high if row.amount(low) == high else f"{len(values)} values from {low / row.scale:.6g} to {high}"
+    low, high = values[0], values[-1]
+    alike = row.amount(low) == row.amount(high)
+    where = row.amount(low) if alike else f"{len(values)} values from {row.span(low, high)}"
     return f"Not valid at {where}: {unsound[values[0]]}"
 
 

@@ -16,7 +16,7 @@ from ...record.record import GrowingRecord, Record
 from ...record.table import Column, TableSpec
 from ...texts import digits
 from ..case import Case
-from ..inputs import CONFIDENCE, Plan, Probability, counted, quasi_random
+from ..inputs import CONFIDENCE, Plan, Probability, counted, parameter_of, quasi_random
 from ..result import StudyResult
 from ..session import Session, Study
 from ..stability.dimensions import flow_models
@@ -82,7 +82,7 @@ def check(case: Case) -> None:
     plan = Plan(case)
     check_scan(case, plan.parameter)
     flow_models(case, "uncertainty")
-    if case.has_pump and {"pressure", PARAMETERS["pressure"].key} & set(case.uncertainty.inputs):
+    if case.has_pump and "pressure" in map(parameter_of, case.uncertainty.inputs):
         raise CaseError(
             "uncertainty.inputs holds the pressure, and behind a pump each sampled valve has that at which both meet; "
             "leave it out, or the pump.",
