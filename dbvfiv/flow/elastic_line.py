@@ -54,8 +54,11 @@ class Element(NamedTuple):
         Where the flow's unknowns are.
     points, weights : (N,) arrays
         Gauss's, where those of the pressure are.
-    value, slope : (N, N + 1) arrays
-        Flow and its derivative at the points from its unknowns.
+    slope : (N, N + 1) array
+        Derivative of the flow at the points from its unknowns.
+    finer, value : (N + 1,) and (N + 1, N + 1) arrays
+        Gauss's weights for one point more, and the flow there from its unknowns: friction that is summed over the
+        points of the pressure does not see a flow of degree N whose zeros they are, the quickest wave of an element.
     mass : (N + 1, N + 1) array
         Integral of the product of two shapes.
     """
@@ -63,8 +66,9 @@ class Element(NamedTuple):
     nodes: np.ndarray
     points: np.ndarray
     weights: np.ndarray
-    value: np.ndarray
     slope: np.ndarray
+    finer: np.ndarray
+    value: np.ndarray
     mass: np.ndarray
 
 
@@ -81,9 +85,9 @@ def element(degree: int = DEGREE) -> Element:
 
     points, weights = (0.5 * x for x in legendre.leggauss(degree))
     points = points + 0.5
-    finer, share = legendre.leggauss(degree + 1)
-    exact = at(0.5 * (1.0 + finer))
-    return Element(nodes, points, weights, at(points), at(points, 1), exact.T @ (0.5 * share[:, None] * exact))
+    exact, finer = (0.5 * x for x in legendre.leggauss(degree + 1))
+    value = at(exact + 0.5)
+    return Element(nodes, points, weights, at(points, 1), finer, value, value.T @ (finer[:, None] * value))
 
 
 def chain(count: int, degree: int = DEGREE) -> np.ndarray:
@@ -244,7 +248,7 @@ class ElasticLine(Traceable):
         """Friction (k + 1,) at the nodes, m2/s2; traceable."""
         one, nodes, segments = element(), chain(self.elements), self.segments(inlet_area, parameters)
         flows = velocity[nodes] @ one.value.T
-        spread = segments.lost[:, None] * ((one.weights * flows * jnp.abs(flows)) @ one.value)
+        spread = segments.lost[:, None] * ((one.finer * flows * jnp.abs(flows)) @ one.value)
         return (segments.loss * velocity * jnp.abs(velocity)).at[nodes].add(spread)
 
     def steady_head(self, velocity, source, inlet_area, parameters):

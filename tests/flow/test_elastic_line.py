@@ -8,7 +8,7 @@ import pytest
 import scipy.linalg as la
 
 from dbvfiv.flow import Channel, FlowMotion
-from dbvfiv.flow.elastic_line import ElasticLine, LineChannel, default_elements, element
+from dbvfiv.flow.elastic_line import DEGREE, ElasticLine, LineChannel, default_elements, element
 from dbvfiv.flow.stepping import FluidState, MovingFluid, packed_size
 from dbvfiv.flow.terms.line import Line
 from tests.flow.test_channel import FLOOR, passage
@@ -216,5 +216,19 @@ def test_a_rigid_column_of_its_length_where_the_step_is_long():
 def test_the_element():
     one = element(4)
     assert one.mass.sum() == pytest.approx(1.0, rel=1e-14) and one.weights.sum() == pytest.approx(1.0, rel=1e-14)
-    assert one.value @ one.nodes**4 == pytest.approx(one.points**4, rel=1e-12)
+    assert one.finer @ (one.value @ one.nodes**4) ** 2 == pytest.approx(1 / 9, rel=1e-12)
     assert one.slope @ one.nodes**4 == pytest.approx(4 * one.points**3, rel=1e-12)
+
+
+def test_friction_damps_all_waves_alike():
+    """Around a uniform flow friction is 2 |w| times the mass, on the quickest wave of an element too, which is 0 at the
+    points of the pressure.
+    """
+    line, parameters = line_of(elements=3, friction=0.02), {"pipe_length": 20.0, "wave_speed": 1000.0}
+    flow = np.full(DEGREE * 3 + 1, 1.7)
+    slope = jax.jacfwd(lambda w: line.friction(w, 0.05, parameters))(flow)
+    mass = jax.jacfwd(lambda w: line.held(w, np.zeros(DEGREE * 3), 0.05, parameters)[0])(flow)
+    lost = line.segments(0.05, parameters).lost.sum()
+    ratio = line.segments(0.05, parameters).ratio[0]
+    assert lost > 0
+    np.testing.assert_allclose(slope, 2 * 1.7 * lost / (ratio * 20.0) * mass, atol=1e-12 * np.abs(slope).max())

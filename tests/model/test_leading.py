@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from dbvfiv.case.parameters import Mu
-from dbvfiv.model import BandOrigin, growth_floor, limit_point, select_search
+from dbvfiv.model import BandOrigin, LeadingSearch, growth_floor, limit_point, select_search
 from eigen import SearchOptions
 
 FREQUENCIES = np.array([14.0, 20.0, 28.0, 41.0])
@@ -78,3 +78,11 @@ def test_loss_factors_do_not_order_the_modes(beta):
         SearchOptions(max_frequency=60.0), Mu(density=10.0, alpha=0.0, beta=beta, loss_factor=1.0), never, 3
     )
     assert asked.band == 60.0 and asked.note is None and "creep" in asked.notes[0]
+
+
+def test_what_a_band_left_open():
+    """Growing pairs above what a line resolves are named, the fastest first, and how far off it is."""
+    line = LeadingSearch(SearchOptions(max_frequency=10.0), BandOrigin.LINE)
+    said = line.left_open([0.5 + 2j * np.pi * 20, 2.0 + 2j * np.pi * 60, 3.0])
+    assert "60 Hz by 2 1/s, 20 Hz by 0.5 1/s" in said and "6 times as far" in said and "upstream.elements" in said
+    assert "may be unstable" in line.left_open([])

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from eigen.basis import TransferBasis
-from eigen.certificate import CertifiedSpectrum, certified_spectrum
+from eigen.certificate import CertifiedSpectrum, certified_spectrum, missing_pairs
 from eigen.factor import Workspace
 from eigen.operator import CoupledPencil
 from eigen.search import leading_modes
@@ -402,6 +402,12 @@ def run_modes(
         notes = (*notes, _NO_PLUG)
     searched = family.is_searched(certified.spectrum.eigenvalues, place, search.band)
     verdict = _verdict(certified, searched, search, linear.seal is not None)
+    if verdict.outcome == STABLE and certified.count.band < asked.whole:
+        beyond = missing_pairs(
+            pencil, certified.spectrum, basis, certified.count.line, replace(asked, max_frequency=None), workspace
+        )
+        said = search.left_open(() if beyond is None else beyond.values)
+        verdict = replace(verdict, outcome=UNDECIDED, reason=f"{verdict.reason} {said}")
     modes = _shapes(model, pencil, linear, certified.spectrum, symmetry, in_vacuo)
     grazing = _one_sided(model, state, pencil, asked, options.count) if symmetry.of_equilibria else {}
     notes = (*notes, *_contact_notes(model, state, linear, modes, symmetry), *_grazing_notes(model, grazing))
@@ -457,7 +463,7 @@ def _grazing_notes(model, grazing: dict[str, Any]) -> list[str]:
 def _verdict(found: CertifiedSpectrum, searched: np.ndarray, search: LeadingSearch, sealed: bool) -> Verdict:
     """Verdict from the modes in the region that every study searches, up to the frequency that is claimed."""
     count = found.count
-    verdict = Verdict.of(
+    return Verdict.of(
         found.spectrum.eigenvalues[searched],
         found.unstable_count,
         found.unstable_count_independent,
@@ -467,10 +473,6 @@ def _verdict(found: CertifiedSpectrum, searched: np.ndarray, search: LeadingSear
         statement="" if found.agrees else found.statement,
         sealed=sealed,
     )
-    if count.band >= search.options.whole or verdict.outcome != STABLE:
-        return verdict
-    beyond = f" Above that the count finds more: modes may be unstable there; {search.end_key} moves the end."
-    return replace(verdict, outcome=UNDECIDED, reason=verdict.reason + beyond)
 
 
 def _shapes(model, pencil: CoupledPencil, linear, spectrum, symmetry, in_vacuo) -> tuple[ModeShape, ...]:
