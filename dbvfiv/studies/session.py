@@ -14,6 +14,7 @@ from ..case.parameters import PARAMETERS
 from ..errors import CaseError
 from ..model.equilibria import (
     find_equilibrium,
+    model_warnings,
     operating_pressure,
     redescribe,
     rest_state,
@@ -253,10 +254,10 @@ class Session:
             self._at_levels.settled = found
         return self._at_levels
 
-    def equilibrium(self, observer: Observer) -> SteadyState:
-        """The steady state at drive.pressure: the one known already, the valve at rest, or by load steps.
+    def equilibrium(self, observer: Observer, known: Sequence[SteadyState] = ()) -> SteadyState:
+        """The steady state at drive.pressure: one known already, the valve at rest, or by load steps.
 
-        What is worth knowing about model and state is told to the observer.
+        What is worth knowing about model and state is told to the observer, again where the state is known.
 
         Raises
         ------
@@ -264,10 +265,11 @@ class Session:
             If it is not reached.
         """
         model, pressure = self.model, self.case.drive.pressure
-        if self.start is not None and self.start.pressure == pressure:
-            for sentence in state_warnings(model, [self.start]):
+        starts = known or [start for start in [self.start] if start is not None and start.pressure == pressure]
+        if starts:
+            for sentence in (*model_warnings(model), *state_warnings(model, starts)):
                 observer.warn(sentence)
-            return redescribe(model, self.start)  # flow and jet follow the density of this case
+            return redescribe(model, starts[0])  # flow and jet follow the density of this case
         if pressure == model.flow.back:
             return rest_state(model)
         return find_equilibrium(model, pressure, observer)

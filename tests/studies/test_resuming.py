@@ -35,6 +35,8 @@ RUNS = {
     "modes": {"modes.symmetry": "all", "modes.count": 2},
     "modes-undecided": {"modes.symmetry": "all", "modes.count": 2, "upstream.wave_speed": 300.0, **LONG},
     "sweep": {"sweep.over": "density=1:1000:5:log", "sweep.count": 3},
+    # a rubber that is unstable at the state is said again by who goes on
+    "sensitivity": {"sensitivity.of": ["pressure", "density", "alpha"], "drive.pressure": "36 kPa"},
     "onset": ONSET,
     "onset-classes": SCAN | {"onset.symmetry": "all"},
     "map": AXES,
@@ -97,6 +99,7 @@ def slow(*where):
         ("modes", 0.5),
         ("modes-undecided", 0.5),
         ("sweep", 0.5),
+        ("sensitivity", 0.5),
         slow("onset", 0.1),
         slow("onset", 0.4),
         slow("onset", 0.7),

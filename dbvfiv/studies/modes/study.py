@@ -15,7 +15,7 @@ from ...errors import CaseError, NotValidError, SolveError
 from ...model.symmetry import asks_for_equilibria, symmetry_named
 from ...record.mesh import MeshData, WholeValve
 from ...record.record import GrowingRecord, Record
-from ...record.states import state_row, state_table
+from ...record.states import read_states, state_row, state_table
 from ...record.table import TableSpec
 from ...record.vtkhdf import Step, motion
 from ..case import Case
@@ -46,7 +46,8 @@ def tables_of(mesh: MeshData) -> tuple[TableSpec, TableSpec, TableSpec]:
 def run(session: Session, record: GrowingRecord) -> None:
     """Leading modes of the steady state at drive.pressure, in every variant asked for."""
     case, model, options = session.case, session.model, ModesOptions.of(session.case)
-    state, place = session.equilibrium(record), Mu.of(model.case)
+    kept = read_states(record, STATE)
+    state, place = session.equilibrium(record, kept), Mu.of(model.case)
     if record.notes(_REFUSAL):
         return
     known = _notes(record)
@@ -54,7 +55,7 @@ def run(session: Session, record: GrowingRecord) -> None:
         if verdict.stable is None:
             record.warn(verdict.reason)
     missing = [variant for variant in variants(case, "modes") if variant not in known]
-    if not record.rows(STATE):
+    if not kept:
         record.append(STATE, state_row(model, state))
     walk = StabilityWalk(model.case, model=model)
     walk.give(place, state)

@@ -67,9 +67,10 @@ def run(session: Session, record: GrowingRecord) -> None:
         if lacking:
             raise CaseError(f"sensitivity.of names {name!r}, but {lacking}.", key="sensitivity.of")
         require_number(model, name)
-    if not record.rows(STATE):
-        record.append(STATE, state_row(model, session.equilibrium(record)))
-    (state,) = read_states(record, STATE)
+    kept = read_states(record, STATE)
+    state = session.equilibrium(record, kept)
+    if not kept:
+        record.append(STATE, state_row(model, state))
     mu = Mu.of(session.case)
     mode, linear = _find_mode(session, state, mu)
     beside = Neighbourhood(model, state.q, state.pressure, mu, [mode], asked.step, linear)
