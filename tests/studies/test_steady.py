@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from dbvfiv import resume
 from dbvfiv.case.load import make_case, parse_toml
 from dbvfiv.errors import CaseError, SolveError
 from dbvfiv.model import ValveModel
@@ -14,8 +15,10 @@ from dbvfiv.model.newton import NewtonOptions
 from dbvfiv.model.state import LipCentre, describe_state
 from dbvfiv.record.states import summarise
 from dbvfiv.studies.case import Case, load_case, thesis_case
+from dbvfiv.studies.session import Session
 from dbvfiv.studies.stability.place import redesigned
-from dbvfiv.studies.steady.study import _met
+from dbvfiv.studies.steady import study
+from dbvfiv.studies.steady.study import PARTED, _met, parted_width
 
 
 @pytest.fixture(scope="module")
@@ -181,3 +184,20 @@ def test_a_load_meets_limit_points_beyond_those_before():
     limits = [LimitPoint(pressure, highest=i % 2 == 0) for i, pressure in enumerate(pressures)]
     assert _met(limits, rising=True) == [1018.0, 1073.0]
     assert _met(limits, rising=False) == [985.0, 871.0, 831.0]
+
+
+def test_what_a_curve_holds_is_kept_once(tmp_path, monkeypatch):
+    """An interrupt while widths that have parted are kept: who goes on keeps those that are missing."""
+    keys = {"mesh.around": 6, "mesh.along": 8, "valve.sealing_pressure": 300.0, "materials.strain_level": 0.1}
+    case = load_case("cases/dbv4-moulded.toml").replace(keys | {"steady.pressures": [600.0, 900.0]})
+    whole = Session(case).perform("steady").record.notes(PARTED)
+
+    def stopped(model, q, calls=iter(range(9))):
+        if next(calls):
+            raise KeyboardInterrupt
+        return parted_width(model, q)
+
+    monkeypatch.setattr(study, "parted_width", stopped)
+    assert not Session(case).perform("steady", tmp_path / "part.h5").complete
+    monkeypatch.undo()
+    assert resume(tmp_path / "part.h5").record.notes(PARTED) == whole and len(whole) == 2

@@ -92,23 +92,28 @@ def _note_curve(model: ValveModel, states: Sequence[SteadyState], record: Growin
     the lip has parted.
     """
     path, case = LoadPath(model, SteadyOptions.of(model.case), observer=record), model.case
+
+    def keep(what: str, **found: Any) -> None:
+        if {"what": what} | found not in record.notes(what):  # an interrupted run may have kept it
+            record.note(what, **found)
+
     with suppress(SolveError):
         path.go_to(max(state.pressure for state in states))
     limits = path.curve.limits()
-    for limit in limits if not record.notes(LIMIT) else ():
-        record.note(LIMIT, **limit._asdict())
+    for limit in limits:
+        keep(LIMIT, **limit._asdict())
     span = [limit.pressure for limit in limits]
     for state in states:
         if case.valve.is_preset and not state.is_sealed and state.pressure > model.flow.back:
             width, pressed = parted_width(model, state.q)
-            record.note(PARTED, pressure=state.pressure, width=width, pressed=pressed)
+            keep(PARTED, pressure=state.pressure, width=width, pressed=pressed)
         if len(span) < 2 or not min(span) <= state.pressure <= max(span):
             continue
         for q in path.curve.passages(state.pressure):
             other = redescribe(model, replace(state, q=q))
             if abs(other.lip_displacement - state.lip_displacement) > _SAME * abs(state.max_displacement):
                 found = {name: getattr(other, name) for name in ("lip_opening", "mass_flow", "max_displacement")}
-                record.note(FURTHER, pressure=state.pressure, **found)
+                keep(FURTHER, pressure=state.pressure, **found)
 
 
 def _met(limits: Sequence[LimitPoint], rising: bool) -> list[float]:
