@@ -266,13 +266,12 @@ class Session:
         """
         model, pressure = self.model, self.case.drive.pressure
         starts = known or [start for start in [self.start] if start is not None and start.pressure == pressure]
-        if starts:
-            for sentence in (*model_warnings(model), *state_warnings(model, starts)):
-                observer.warn(sentence)
-            return redescribe(model, starts[0])  # flow and jet follow the density of this case
-        if pressure == model.flow.back:
-            return rest_state(model)
-        return find_equilibrium(model, pressure, observer)
+        if not starts and pressure != model.flow.back:
+            return find_equilibrium(model, pressure, observer)
+        for sentence in (*model_warnings(model), *state_warnings(model, starts)):
+            observer.warn(sentence)
+        # flow and jet follow the density of this case
+        return redescribe(model, starts[0]) if starts else rest_state(model)
 
     def perform(
         self, kind: str, output: str | Path | None = None, observer: Observer | None = None, **choices: Any
