@@ -85,8 +85,8 @@ def element(degree: int = DEGREE) -> Element:
 
     points, weights = (0.5 * x for x in legendre.leggauss(degree))
     points = points + 0.5
-    exact, finer = (0.5 * x for x in legendre.leggauss(degree + 1))
-    value = at(exact + 0.5)
+    more, finer = (0.5 * x for x in legendre.leggauss(degree + 1))
+    value = at(more + 0.5)
     return Element(nodes, points, weights, at(points, 1), finer, value, value.T @ (finer[:, None] * value))
 
 
