@@ -36,11 +36,14 @@ class Cell:
         Its `counted` is -1 where nobody asked.
     how : int
         `REDUCED`, `DIRECT` or `MISSING`.
+    open_above : bool
+        Stable up to the end of the band, above which a count finds more.
     """
 
     leading: np.ndarray = field(default_factory=lambda: np.zeros(0, complex))
     certificate: Certificate = Certificate(-1, -1, False)
     how: int = MISSING
+    open_above: bool = False
 
     @classmethod
     def of(cls, listed: np.ndarray, values: np.ndarray, found: Count | Certificate, certain: bool, how: int) -> Cell:
@@ -294,7 +297,7 @@ class ColumnSolver:
 
     def counted_whole(self, family: PencilFamily, mu: Hashable, cell: Cell) -> Cell:
         """The cell of a parameter point; where it is stable up to the end of a band above which more is counted that is
-        resolved, that of the full operator, or one without agreement.
+        resolved, that of the full operator, or the same left open above the band.
 
         Raises
         ------
@@ -312,7 +315,7 @@ class ColumnSolver:
             return found
         if found.certificate.band >= end:
             return cell
-        return replace(cell, certificate=replace(own, counted=max(whole.number, 1), band=end))
+        return replace(cell, open_above=True)
 
 
 def cell_beside(reduction: FamilyReduction, mu: Hashable, error: float, safety: float) -> Cell:

@@ -10,6 +10,7 @@ import numpy as np
 
 from eigen.spectrum import CLEAR, SearchOptions
 
+from ..case.model import Case
 from ..case.parameters import Mu
 from ..texts import digits
 
@@ -104,6 +105,14 @@ class LeadingSearch:
     def notes(self) -> tuple[str, ...]:
         """The note, if there is one, and what a reader has to know about creep."""
         return (() if self.note is None else (self.note,)) + ((CREEP,) if self.creeps else ())
+
+
+def other_end(case: Case) -> str:
+    """Clause on the keys of a case that move the end of its bands."""
+    waves = (
+        ", upstream.elements or mesh.along that of the waves resolved" if case.has_waves or case.is_compressed else ""
+    )
+    return f"modes.max_frequency chooses another end{waves}"
 
 
 def limit_point(beta: float) -> float | None:

@@ -15,6 +15,7 @@ from dbvfiv.studies.case import thesis_case
 from dbvfiv.studies.modes.search import ModesOptions, run_modes
 from dbvfiv.studies.session import Session
 from dbvfiv.studies.sweep import study as tracked
+from eigen import SearchOptions
 from tests.observers import Stop
 
 LIGHT = Mu(density=10.0, alpha=0.0, beta=0.003)
@@ -50,6 +51,17 @@ def over_density(model, state):
 
 def nearest(found, column, eigenvalue):
     return np.nanmin(np.abs(eigenvalues(found)[:, column] - eigenvalue)) / abs(eigenvalue)
+
+
+def test_a_band_below_the_flutter_leaves_every_value_open(model, state):
+    """Said as by `modes`, with the key that moves the end, and the same when it is read again."""
+    found = sweep(model, "density=5:20:4:log", state, **{"modes.max_frequency": 25.0})
+    whole = run_modes(model, state, LIGHT, ModesOptions(3, search=SearchOptions(max_frequency=25.0)))
+    assert not found.certified and len(found.samples) == 4
+    for sample in found.samples:
+        assert sample.verdict.outcome == whole.verdict.outcome == "undecided" and sample.certified is False
+        own, said = sample.verdict.reason.split(" Above that ")
+        assert whole.verdict.reason.startswith(own) and said.endswith("modes.max_frequency moves the end.")
 
 
 def test_every_value_agrees_with_a_full_solve(model, state, over_density):

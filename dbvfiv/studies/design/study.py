@@ -17,6 +17,7 @@ from ...case.write import case_toml
 from ...drawing.style import headline, limits, log_axis, new_figure
 from ...errors import SolveError
 from ...model.closed import close_valve
+from ...model.leading import other_end
 from ...record.mesh import MeshData
 from ...record.record import GrowingRecord, Record
 from ...record.table import Column, TableSpec
@@ -376,9 +377,7 @@ class DesignResult(StudyResult):
         if self.case.uncertainty.inputs:
             lines.append("Margins are those that 95 % of valves with the inputs of [uncertainty] have, to first order.")
         if self.band:
-            lines.append(
-                f"Modes up to {digits(self.band, 4)} Hz count in margins; modes.max_frequency chooses another end."
-            )
+            lines.append(f"Modes up to {digits(self.band, 4)} Hz count in margins; {other_end(self.case)}.")
         for number, design in self.best.items():
             lines.append(f"Design {number + 1}{_for(self.bounds[number], self.bounds)}:")
             for one, value in zip(self.variables, design.values):

@@ -15,6 +15,7 @@ from eigen.columns import DIRECT, MISSING
 
 from ...errors import SolveError
 from ...fit.cards import outside_band
+from ...model.leading import other_end
 from ...record.mesh import MeshData
 from ...record.record import GrowingRecord, Record
 from ...record.table import Column, TableSpec
@@ -155,12 +156,15 @@ def _doubts(plan: MapPlan, columns: Iterable[MapColumn], checks: Iterable[dict[s
         cells = [s for c in solved if not c.level for part in parts for s in c.samples[part]]
         lost = [s.failure for s in cells if s.failure]
         refused = sum(bool(s.refusal) for s in cells)
-        doubtful = sum(not (s.certified or s.is_missing) for s in cells)
+        left_open = [s.left_open for s in cells if s.left_open]
+        doubtful = sum(not (s.certified or s.is_missing or s.left_open) for s in cells)
         if lost:
             said.append(f"{prefix}{len(lost)} cells have no steady state that was found; the first: {lost[0]}")
         if refused:
             first = next(c for c in solved if c.refusal)
             said.append(f"{prefix}{refused} cells are not valid; the first at {first.value:.6g}: {first.refusal}")
+        if left_open:
+            said.append(f"{prefix}{len(left_open)} cells are stable up to the end of their band. {left_open[0]}")
         if doubtful:
             said.append(
                 f"{prefix}{doubtful} cells are uncertain: spectrum and independent count disagree, or the count is not "
@@ -171,7 +175,7 @@ def _doubts(plan: MapPlan, columns: Iterable[MapColumn], checks: Iterable[dict[s
         said.append(
             f"Verdicts hold for modes up to {digits(min(bands), 4)} Hz"
             + (f" to {digits(max(bands), 4)} Hz, by the column" if max(bands) > min(bands) else "")
-            + "; modes.max_frequency chooses another end."
+            + f"; {other_end(plan.case)}."
         )
     for check in checks:
         if not check["agrees"]:

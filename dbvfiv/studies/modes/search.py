@@ -29,7 +29,7 @@ from ...texts import shortly
 from ..stability.dimensions import VARIANT
 from ..stability.line import ParameterLine
 from ..stability.scan import Crossing, Scan
-from ..stability.verdict import FLUTTERS, STABLE, UNDECIDED, Verdict, lowered, oscillates
+from ..stability.verdict import FLUTTERS, STABLE, Verdict, lowered, oscillates
 from ..stability.walk import StabilityWalk, ValveFamily, name_state_in_failures
 from ..state import State
 
@@ -406,8 +406,7 @@ def run_modes(
         beyond = missing_pairs(
             pencil, certified.spectrum, basis, certified.count.line, replace(asked, max_frequency=None), workspace
         )
-        said = search.left_open(() if beyond is None else beyond.values)
-        verdict = replace(verdict, outcome=UNDECIDED, reason=f"{verdict.reason} {said}")
+        verdict = verdict.open_above(search.left_open(() if beyond is None else beyond.values))
     modes = _shapes(model, pencil, linear, certified.spectrum, symmetry, in_vacuo)
     grazing = _one_sided(model, state, pencil, asked, options.count) if symmetry.of_equilibria else {}
     notes = (*notes, *_contact_notes(model, state, linear, modes, symmetry), *_grazing_notes(model, grazing))

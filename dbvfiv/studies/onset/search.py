@@ -16,6 +16,7 @@ from ...case.parameters import DESIGN, PARAMETERS, Mu
 from ...errors import SolveError
 from ...fit.cards import outside_band
 from ...model.forms import ValveForms
+from ...model.leading import other_end
 from ...observer import Observer
 from ...texts import digits
 from ..case import Case
@@ -148,15 +149,14 @@ class OnsetSearch:
             else:
                 joined.append([low, high])
         for low, high in joined:
+            left = next((s.left_open for s in self.asked if low <= s.value <= high and s.left_open), "")
             said.append(
                 f"Between {name} = {low:.6g} and {high:.6g} spectrum and independent count do not agree everywhere, so "
-                "nothing is claimed there."
+                f"nothing is claimed there. {left}".rstrip()
             )
         bands = [s.verdict.band for s in self.line.samples.values() if np.isfinite(s.verdict.band)]
         if bands:
-            said.append(
-                f"Verdicts hold for modes up to {digits(min(bands), 4)} Hz; modes.max_frequency chooses another end."
-            )
+            said.append(f"Verdicts hold for modes up to {digits(min(bands), 4)} Hz; {other_end(self.walk.case)}.")
         return said
 
     @property

@@ -19,7 +19,7 @@ from ...record.record import GrowingRecord, Record
 from ...record.table import Column, TableSpec
 from ...texts import shortly
 from .dimensions import CLASS_NAMES, VARIANT
-from .verdict import OUTCOMES, Verdict
+from .verdict import OUTCOMES, UNDECIDED, Verdict
 
 #: Modes whose order is watched.
 WATCHED = 4
@@ -62,6 +62,8 @@ class Sample:
         Why there is no spectrum; empty if there is one.
     refusal : str
         Why the constants of the rubber do not hold; empty where they do.
+    left_open : str
+        What a count finds above the band up to which the state is stable; empty where it finds nothing.
     key : SampleKey
     """
 
@@ -76,15 +78,17 @@ class Sample:
     how: int = MISSING
     failure: str = ""
     refusal: str = ""
+    left_open: str = ""
     key: SampleKey = SampleKey()
 
     @classmethod
-    def of(cls, value: float, cell: Cell, claimed: float, sealed: bool = False) -> Sample:
+    def of(cls, value: float, cell: Cell, claimed: float, sealed: bool = False, left_open: str = "") -> Sample:
         """Sample of a cell; `claimed` is the frequency, Hz, up to which the search speaks for the state."""
         own = cell.certificate
         band = min(own.band, claimed) if own.agrees else own.band
         counts = own.unstable, own.counted, own.certain
-        return cls(value, np.asarray(cell.leading)[:KEPT], *counts, own.line, band, sealed, cell.how)
+        leading = np.asarray(cell.leading)[:KEPT]
+        return cls(value, leading, *counts, own.line, band, sealed, cell.how, left_open=left_open)
 
     @cached_property
     def growth(self) -> np.ndarray:
@@ -101,8 +105,9 @@ class Sample:
 
     @property
     def certified(self) -> bool | None:
-        """True where both counts agree; None where nobody counted."""
-        return None if self.counted < 0 else bool(self.certain and self.unstable == self.counted)
+        """True where both counts agree and leave nothing open; None where nobody counted."""
+        agrees = self.certain and self.unstable == self.counted and not self.left_open
+        return None if self.counted < 0 else bool(agrees)
 
     @property
     def is_missing(self) -> bool:
@@ -116,7 +121,8 @@ class Sample:
         if self.failure:
             return Verdict.undecided(self.failure)
         counts, region = (self.unstable, self.counted, self.certain), {"line": self.line, "band": self.band}
-        return Verdict.of(self.eigenvalues, *counts, proven=self.how == DIRECT, sealed=self.sealed, **region)
+        found = Verdict.of(self.eigenvalues, *counts, proven=self.how == DIRECT, sealed=self.sealed, **region)
+        return found.open_above(self.left_open) if self.left_open else found
 
     def number(self, name: str) -> float:
         """A quantity by its name, for tables over several parameters: growth_rate, frequency (of the leading mode),
@@ -135,6 +141,7 @@ class Sample:
 # ----
 
 SAMPLES, _TEXT = "samples", "no sample"
+_MISSING, _OPEN = ("failure", "refusal"), ("left_open",)
 #: Of these a sample is read; what follows from it stands besides for whoever reads the table.
 _OWN = (
     *VARIANT,
@@ -162,11 +169,11 @@ SAMPLE_TABLE = TableSpec(SAMPLES, (*_OWN, *_MODES, *_FURTHER), chunk=512)
 
 
 def keep_samples(record: GrowingRecord, samples: Sequence[Sample]) -> None:
-    """Keep samples as rows; why one is missing is noted before its row, which vouches for it."""
+    """Keep samples as rows; why one is missing or open is noted before its row, which vouches for it."""
     rows = []
     for number, sample in enumerate(samples, record.rows(SAMPLES)):
-        if sample.is_missing:
-            record.note(_TEXT, row=number, failure=sample.failure, refusal=sample.refusal)
+        if texts := {name: text for name in _MISSING + _OPEN if (text := getattr(sample, name))}:
+            record.note(_TEXT, row=number, **texts)
         modes = np.full(KEPT, complex(np.nan, np.nan))
         modes[: len(sample.eigenvalues)] = sample.eigenvalues[:KEPT]
         row = vars(sample) | sample.key._asdict() | {column.name: sample.number(column.name) for column in _FURTHER}
@@ -177,13 +184,15 @@ def keep_samples(record: GrowingRecord, samples: Sequence[Sample]) -> None:
 
 def read_samples(record: Record) -> list[Sample]:
     """Samples in the order they were found in."""
-    texts = {note["row"]: {name: note[name] for name in ("failure", "refusal")} for note in record.notes(_TEXT)}
+    texts = {note["row"]: note for note in record.notes(_TEXT)}
     modes = 1j * record.column(SAMPLES, "angular_frequencies")
     modes += record.column(SAMPLES, "growth_rates")
     found = []
-    for i, row in enumerate(record.table_rows(SAMPLE_TABLE, [column.name for column in _OWN])):
+    for i, row in enumerate(record.table_rows(SAMPLE_TABLE, [*(column.name for column in _OWN), "outcome"])):
         row["symmetry"] = CLASS_NAMES[row["symmetry"]]
         key = SampleKey(**{name: row.pop(name) for name in SampleKey._fields})
-        text = texts.get(i, {}) if row["how"] == MISSING else {}
+        undecided = row.pop("outcome") == OUTCOMES.index(UNDECIDED)
+        vouched = _MISSING if row["how"] == MISSING else _OPEN if undecided else ()
+        text = {name: texts.get(i, {}).get(name, "") for name in vouched}
         found.append(Sample(eigenvalues=modes[i][np.isfinite(modes[i])], key=key, **row, **text))
     return found

@@ -132,6 +132,10 @@ class Verdict:
             return cls(UNDECIDED, statement, **measures)
         return cls(STABLE, statement, **measures)
 
+    def open_above(self, said: str) -> Verdict:
+        """The verdict on a state that is stable up to the end of a band above which a count finds more, as `said`."""
+        return replace(self, outcome=UNDECIDED, reason=f"{self.reason} {said}", certain=False)
+
     @classmethod
     def not_valid(cls, sentence: str) -> Verdict:
         """Verdict on a wall whose rubber has lost material stability; the sentence says where and what mends it."""

@@ -511,14 +511,16 @@ class StabilityWalk:
 
     def sample(self, place: Mu, cell: Cell, value: float = np.nan) -> Sample:
         """Sample of a place from its cell; `value` is that of the parameter of a line. One that is stable up to the end
-        of a band above which more is counted has a count that disagrees.
+        of a band above which more is counted is left open.
         """
         if refusal := self.refusal(place):
             return Sample(value, refusal=refusal)
         family = self.family(place)
         with name_state_in_failures(place.pressure):
             cell = self.built(place).solver.counted_whole(family, place, cell)
-        return Sample.of(value, cell, family.leading(place).claimed, family.linear.seal is not None)
+        search, sealed = family.leading(place), family.linear.seal is not None
+        left_open = search.left_open(()) if cell.open_above else ""
+        return Sample.of(value, cell, search.claimed, sealed, left_open)
 
     def verdict(self, place: Mu, spectrum=None) -> Verdict:
         """Verdict on one place; its leading modes with the full pencil may be known.
