@@ -88,18 +88,18 @@ class LeadingSearch:
             f"modes.max_frequency chooses another."
         )
 
-    def left_open(self, growing: Iterable[complex]) -> str:
-        """Sentence on a state that is stable up to the end of the band where a count finds more above it, with the
+    def left_open(self, band: float, growing: Iterable[complex] = ()) -> str:
+        """Sentence on a state that is stable up to a frequency, Hz, where a count finds more above it, with the
         growing pairs that were found there, 1/s.
         """
         found = sorted((value for value in growing if value.imag > 0), key=lambda value: -value.real)
-        end = f"{self.end_key} moves the end"
+        end, said = f"{self.end_key} moves the end", f"Above {digits(band, 4)} Hz the count finds more"
         if not found:
-            return f"Above that the count finds more: modes may be unstable there; {end}."
+            return f"{said}: modes may be unstable there; {end}."
         which = ", ".join(f"{v.imag / (2 * np.pi):.4g} Hz by {v.real:.3g} 1/s" for v in found[:3])
         if self.origin is BandOrigin.LINE:
             end += f"; {found[0].imag / (2 * np.pi * self.band):.3g} times as far reaches the first of them"
-        return f"Above that the count finds more: modes grow there as the model has it, {which}; {end}."
+        return f"{said}: modes grow there as the model has it, {which}; {end}."
 
     @property
     def notes(self) -> tuple[str, ...]:

@@ -83,6 +83,7 @@ def test_loss_factors_do_not_order_the_modes(beta):
 def test_what_a_band_left_open():
     """Growing pairs above what a line resolves are named, the fastest first, and how far off it is."""
     line = LeadingSearch(SearchOptions(max_frequency=10.0), BandOrigin.LINE)
-    said = line.left_open([0.5 + 2j * np.pi * 20, 2.0 + 2j * np.pi * 60, 3.0])
+    said = line.left_open(10.0, [0.5 + 2j * np.pi * 20, 2.0 + 2j * np.pi * 60, 3.0])
+    assert said.startswith("Above 10 Hz the count finds more")
     assert "60 Hz by 2 1/s, 20 Hz by 0.5 1/s" in said and "6 times as far" in said and "upstream.elements" in said
-    assert "may be unstable" in line.left_open([])
+    assert "may be unstable" in line.left_open(10.0)

@@ -60,8 +60,9 @@ def test_a_band_below_the_flutter_leaves_every_value_open(model, state):
     assert not found.certified and len(found.samples) == 4
     for sample in found.samples:
         assert sample.verdict.outcome == whole.verdict.outcome == "undecided" and sample.certified is False
-        own, said = sample.verdict.reason.split(" Above that ")
+        own, said = sample.verdict.reason.split(" Above 24.98 Hz ")
         assert whole.verdict.reason.startswith(own) and said.endswith("modes.max_frequency moves the end.")
+        assert any(said in note for note in found.notes)
 
 
 def test_every_value_agrees_with_a_full_solve(model, state, over_density):

@@ -519,7 +519,7 @@ class StabilityWalk:
         with name_state_in_failures(place.pressure):
             cell = self.built(place).solver.counted_whole(family, place, cell)
         search, sealed = family.leading(place), family.linear.seal is not None
-        left_open = search.left_open(()) if cell.open_above else ""
+        left_open = search.left_open(min(cell.certificate.band, search.claimed)) if cell.open_above else ""
         return Sample.of(value, cell, search.claimed, sealed, left_open)
 
     def verdict(self, place: Mu, spectrum=None) -> Verdict:
