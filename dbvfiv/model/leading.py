@@ -48,6 +48,8 @@ class LeadingSearch:
     claimed : float, Hz
         Frequency up to which the search is a verdict on the state: the band, or without one a band that holds as many
         structural frequencies as modes are wanted. Reduced-order models resolve no modes above it, whatever they count.
+    wanted : float, Hz
+        Frequency up to which modes are wanted; infinite where nothing says so.
     """
 
     options: SearchOptions
@@ -55,6 +57,7 @@ class LeadingSearch:
     frequencies: int = 0
     creeps: bool = False
     claimed: float = np.inf
+    wanted: float = np.inf
 
     @property
     def band(self) -> float:
@@ -75,10 +78,14 @@ class LeadingSearch:
     def note(self) -> str | None:
         """Sentence on the origin and limits of the band, for the reader of a result; None where it needs none."""
         if self.origin is BandOrigin.LINE:
-            return (
+            said = (
                 f"The elements of the line, or the rows of the mesh in a fluid that is compressed, resolve waves up to "
-                f"{digits(self.band, 4)} Hz, so the search covers the band up to there; {self.end_key} moves its end."
+                f"{digits(self.band, 4)} Hz, so the search covers the band up to there; {self.end_key} moves its end"
             )
+            if self.band < self.wanted < np.inf:
+                many = f"{self.wanted / self.band:.3g} times as many"
+                said += f", {many} to the {digits(self.wanted, 4)} Hz that were wanted"
+            return f"{said}."
         if self.origin is not BandOrigin.STRUCTURE:
             return None
         why = "Loss factors damp all frequencies alike and" if self.creeps else "Without stiffness damping"
@@ -167,11 +174,12 @@ def select_search(
     -333.3333333333333
     """
     found = _select(options, mu, structural_frequencies, count)
-    if resolved >= min(found.claimed, found.band):  # what is wanted is resolved, and nothing above the waves that are
+    wanted = min(found.claimed, found.band)
+    if resolved >= wanted:  # what is wanted is resolved, and nothing above the waves that are
         found = replace(found, options=replace(found.options, resolved=resolved))
     if found.band > resolved:
         found = replace(found, options=replace(found.options, max_frequency=resolved), origin=BandOrigin.LINE)
-    return replace(found, claimed=min(found.claimed, found.band, resolved))
+    return replace(found, claimed=min(wanted, resolved), wanted=wanted)
 
 
 def _select(options: SearchOptions, mu: Mu, structural_frequencies, count: int) -> LeadingSearch:

@@ -87,3 +87,13 @@ def test_what_a_band_left_open():
     assert said.startswith("Above 10 Hz the count finds more")
     assert "60 Hz by 2 1/s, 20 Hz by 0.5 1/s" in said and "6 times as far" in said and "upstream.elements" in said
     assert "may be unstable" in line.left_open(10.0)
+
+
+def test_elements_of_a_line_that_a_band_takes():
+    """A band of 60 Hz takes four times the elements that resolve 15 Hz; a longer reach than wanted says nothing."""
+    asked = SearchOptions(max_frequency=60.0), Mu(density=10.0), never, 3
+    short, long = (select_search(*asked, resolved=resolved) for resolved in (15.0, 90.0))
+    assert short.note.endswith("moves its end, 4 times as many to the 60 Hz that were wanted.")
+    assert short.claimed == short.band == 15.0 and long.band == long.claimed == 60.0 and long.note is None
+    damped = select_search(SearchOptions(), Mu(density=10.0, beta=0.003), lambda n: np.full(n, 50.0), 2, resolved=90.0)
+    assert damped.band == 90.0 and damped.note.endswith("moves its end.")
