@@ -71,12 +71,6 @@ class AgreedLevels:
         """Level of each rubber."""
         return {layer.material: layer.level for layer in self.layers if np.isfinite(layer.level)}
 
-    def bounded(self) -> Iterator[str]:
-        """Sentences on rubbers whose strain lies beyond the tested levels."""
-        for name, level in self.levels.items():
-            if level in (LOWEST_LEVEL, HIGHEST_LEVEL):
-                yield _bounded(name, level, _peak(self.layers, name), f"{self.state.pressure:.6g} Pa")
-
 
 def agree_levels(
     case: Case, pressure: float, observer: Observer | None = None, first: Mapping[str, float] | None = None
@@ -315,6 +309,16 @@ def _most_strained(states: Iterable[list[LayerLevel]]) -> Iterator[LayerLevel]:
 def _peak(layers: Iterable[LayerLevel], name: str) -> float:
     """Largest strain of the layers of a rubber."""
     return max(layer.peak for layer in layers if layer.material == name)
+
+
+def beyond_tests(layers: Sequence[LayerLevel], pressure: float) -> list[str]:
+    """Sentences on rubbers whose strain at a pressure, Pa, lies beyond the tested levels."""
+    levels = {layer.material: layer.level for layer in layers}
+    return [
+        _bounded(name, level, _peak(layers, name), f"{pressure:.6g} Pa")
+        for name, level in levels.items()
+        if level in (LOWEST_LEVEL, HIGHEST_LEVEL)
+    ]
 
 
 def _told(levels: Mapping[str, float]) -> str:

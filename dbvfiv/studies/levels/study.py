@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import fields
 from typing import Any
 
 import numpy as np
 
 from ...case.materials import RUBBERS
 from ...errors import CaseError, SolveError
-from ...model.strain_level import agree_levels
+from ...model.material_stability import LayerLevel
+from ...model.strain_level import agree_levels, beyond_tests
 from ...record.mesh import MeshData
 from ...record.record import GrowingRecord
 from ...record.table import TEXT, Column, Shown, TableSpec, printed_head, printed_row
@@ -49,6 +51,7 @@ def run(session: Session, record: GrowingRecord) -> None:
     record.begin("levels", len(case.levels.pressures))
     for pressure in case.levels.pressures:
         if pressure in done:
+            _tell_beyond_tests(record, pressure)
             continue
         try:
             found = agree_levels(case, pressure, record, levels)
@@ -60,8 +63,16 @@ def run(session: Session, record: GrowingRecord) -> None:
         record.extend(LEVELS, {c.name: [row[c.name] for row in rows] for c in _COLUMNS})  # whole pressures or none
         levels = found.levels
         record.item(found)
-        for sentence in found.bounded():
-            record.warn(sentence)
+        _tell_beyond_tests(record, pressure)
+
+
+def _tell_beyond_tests(record: GrowingRecord, pressure: float) -> None:
+    """Warn of rubbers that strain beyond their tests at a pressure that is kept."""
+    names = [field.name for field in fields(LayerLevel)]
+    kept = zip(record.column(LEVELS, "pressure"), record.table_rows(_TABLE, ["layer", *names[1:]]))
+    layers = [LayerLevel(row.pop("layer"), **row) for place, row in kept if place == pressure]
+    for sentence in beyond_tests(layers, pressure):
+        record.warn(sentence)
 
 
 def last_levels(record: GrowingRecord) -> dict[str, float] | None:
