@@ -164,7 +164,7 @@ def _doubts(plan: MapPlan, columns: Iterable[MapColumn], checks: Iterable[dict[s
             first = next(c for c in solved if c.refusal)
             said.append(f"{prefix}{refused} cells are not valid; the first at {first.value:.6g}: {first.refusal}")
         if left_open:
-            said.append(f"{prefix}{len(left_open)} cells are stable up to the end of their band. {left_open[0]}")
+            said.append(f"{prefix}{len(left_open)} cells are left open. {left_open[0]}")
         if doubtful:
             said.append(
                 f"{prefix}{doubtful} cells are uncertain: spectrum and independent count disagree, or the count is not "

@@ -150,10 +150,8 @@ class OnsetSearch:
                 joined.append([low, high])
         for low, high in joined:
             left = next((s.left_open for s in self.asked if low <= s.value <= high and s.left_open), "")
-            said.append(
-                f"Between {name} = {low:.6g} and {high:.6g} spectrum and independent count do not agree everywhere, so "
-                f"nothing is claimed there. {left}".rstrip()
-            )
+            why = left or "Spectrum and independent count do not agree everywhere."
+            said.append(f"Between {name} = {low:.6g} and {high:.6g} nothing is claimed. {why}")
         bands = [s.verdict.band for s in self.line.samples.values() if np.isfinite(s.verdict.band)]
         if bands:
             said.append(f"Verdicts hold for modes up to {digits(min(bands), 4)} Hz; {other_end(self.walk.case)}.")

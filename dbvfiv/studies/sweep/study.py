@@ -229,7 +229,7 @@ class Tracking:
             searches = [self.walk.search(place) for place in (sound[:1] if self.line.stays else sound)]
             notes += max(searches, key=lambda search: search.band).notes
         if left_open := [sample.left_open for sample in samples if sample.left_open]:
-            notes.append(f"{len(left_open)} of {len(samples)} values are stable up to there only. {left_open[0]}")
+            notes.append(f"{len(left_open)} of {len(samples)} values are left open. {left_open[0]}")
         if refused := {sample.value: sample.refusal for sample in samples if sample.refusal}:
             notes.append(not_valid_at(self.axis.parameter, refused))
         return notes
