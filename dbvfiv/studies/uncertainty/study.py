@@ -515,18 +515,23 @@ class UncertaintyResult(StudyResult):
         place = f"{self.parameter}, {row.shown_unit}".rstrip(", ")
         head = f"{place:>16}{'flutters':>10}  {'95 % interval':<17}{'not valid':>10}{'undecided':>10}{'samples':>9}"
         lines = [f"At {fixed}:", *(f"  {one.words()}" for one in self.plan.inputs), f"{head}  least damping ratio, %"]
-        lines += [*map(self._line, self.points), *self._shared_lines(), *self.deciding_lines()]
+        lines += [*map(self._line, self.points), *self._verdict_lines(), *self.deciding_lines()]
         if self.other_law:
             law, other = self.other_law
-            rows = [*map(other._line, other.points), *other._shared_lines()]
+            rows = [*map(other._line, other.points), *other._verdict_lines()]
             lines += [f"Under {law}:", *rows, *([self.comparison] if self.case.uncertainty.method == "plain" else [])]
         return lines
 
-    def _shared_lines(self) -> list[str]:
+    def _verdict_lines(self) -> list[str]:
+        """Sentences on how verdicts were found, and on those that are undecided."""
         shared, count = (sum(point[name] for point in self.points) for name in ("shared", "samples"))
-        if not shared:
-            return []
-        return [f"{shared} of {count} verdicts on a space that samples share, the others with their full matrices."]
+        said = f"{shared} of {count} verdicts on a space that samples share, the others with their full matrices."
+        undecided = _are(self._rows, UNDECIDED)
+        places = set(zip(*(self._rows[name][undecided].tolist() for name in ("sample", "value"))))
+        notes = [note for note in self.record.notes(_WHY) if note["law"] == self.plan.law]
+        why = [note["reason"] for note in notes if (note["sample"], note["value"]) in places]
+        first = [f"{undecided.sum()} of {count} verdicts are undecided; the first: {why[0]}"] if why else []
+        return [said] * bool(shared) + first
 
     def _line(self, point: dict[str, Any]) -> str:
         low, middle, high = point["percentiles"]["damping_ratio"]

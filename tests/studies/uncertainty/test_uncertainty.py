@@ -59,6 +59,17 @@ def test_outcomes_are_those_of_modes(valve, found):
         assert modes.state.outlet_area == pytest.approx(samples["opening"][i], rel=1e-6)
 
 
+def test_undecided_samples_say_why():
+    """In a band below the flutter, with the key that moves its end."""
+    light = {"damping.beta": 1e-4}
+    (first, *_) = load(**light).modes().modes
+    assert first.growth_rate > 0
+    below = load(**light | {"modes.max_frequency": 0.6 * first.frequency})
+    (last,) = below.uncertainty(inputs={"beta": "lognormal(1e-4, 1.1)"}).lines()[-1:]
+    assert last.startswith("16 of 16 verdicts are undecided; the first: 0 unstable eigenvalues up to")
+    assert last.endswith("modes.max_frequency moves the end.")
+
+
 def test_the_document_has_probability_interval_and_what_decides(found):
     document = json.loads(json.dumps(found.summary()))
     (point,) = document["points"]
