@@ -230,7 +230,7 @@ class OnsetSearch:
 
     def _beside(self, value: float) -> Sample:
         """Sample of the full model."""
-        return Sample.of(value, self.walk.cell(self.place(value)), np.inf)
+        return Sample.of(value, self.walk.cell(self.place(value)))
 
     def critical(self, place: Mu, eigenvalue: complex):
         """The mode of the full pencil at a place that an eigenvalue found otherwise belongs to.

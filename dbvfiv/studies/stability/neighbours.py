@@ -243,7 +243,7 @@ class Beside:
         with suppress(ArithmeticError, ValueError):
             family, cells = self.cells(walk, [places[i] for i in sound], row) if sound else (None, ())
             for i, cell in zip(sound, cells):
-                claimed, sealed = family.leading(places[i]).claimed, family.linear.seal is not None
-                verdict = Sample.of(np.nan, cell, claimed, sealed).verdict
+                search, sealed = family.leading(places[i]), family.linear.seal is not None
+                verdict = Sample.of(np.nan, cell, search, sealed).verdict
                 found[i] = verdict if verdict.certain else None
         return found

@@ -15,6 +15,7 @@ import numpy as np
 
 from eigen.columns import DIRECT, MISSING, Cell
 
+from ...model.leading import LeadingSearch
 from ...record.record import GrowingRecord, Record
 from ...record.table import Column, TableSpec
 from ...texts import shortly
@@ -82,10 +83,12 @@ class Sample:
     key: SampleKey = SampleKey()
 
     @classmethod
-    def of(cls, value: float, cell: Cell, claimed: float, sealed: bool = False, left_open: str = "") -> Sample:
-        """Sample of a cell; `claimed` is the frequency, Hz, up to which the search speaks for the state."""
-        own = cell.certificate
-        band = min(own.band, claimed) if own.agrees else own.band
+    def of(cls, value: float, cell: Cell, search: LeadingSearch | None = None, sealed: bool = False) -> Sample:
+        """Sample of a cell, which speaks for the state as far as the search for its modes does."""
+        own, left_open = cell.certificate, ""
+        band = min(own.band, search.claimed) if search and own.agrees else own.band
+        if search and cell.open_above:
+            left_open = search.left_open(band)
         counts = own.unstable, own.counted, own.certain
         leading = np.asarray(cell.leading)[:KEPT]
         return cls(value, leading, *counts, own.line, band, sealed, cell.how, left_open=left_open)

@@ -518,9 +518,7 @@ class StabilityWalk:
         family = self.family(place)
         with name_state_in_failures(place.pressure):
             cell = self.built(place).solver.counted_whole(family, place, cell)
-        search, sealed = family.leading(place), family.linear.seal is not None
-        left_open = search.left_open(min(cell.certificate.band, search.claimed)) if cell.open_above else ""
-        return Sample.of(value, cell, search.claimed, sealed, left_open)
+        return Sample.of(value, cell, family.leading(place), family.linear.seal is not None)
 
     def verdict(self, place: Mu, spectrum=None) -> Verdict:
         """Verdict on one place; its leading modes with the full pencil may be known.
