@@ -275,8 +275,8 @@ class ReducedFamily(PencilFamily):
         factor, solve = la.get_lapack_funcs(("getrf", "getrs"), dtype=complex)
         for i, s in enumerate(values):
             x, y = rng.standard_normal((2, k + dense.inner)) + 0j
+            T, slope = dense(s * (1.0 + 1e-7) or 1e-7)  # beside the place, where T has an inverse
             for step in range(steps + 1):
-                T, slope = dense(s if step else s * (1.0 + 1e-7) or 1e-7)
                 lu, pivots, singular = factor(T)
                 if singular > 0:
                     break  # an eigenvalue to the last bit
@@ -284,11 +284,13 @@ class ReducedFamily(PencilFamily):
                 if not (np.isfinite(new).all() and np.isfinite(back).all()):
                     break  # nearly so
                 x, y = new / np.linalg.norm(new), back / np.linalg.norm(back)
-                T, slope = dense(s)
+                if not step:
+                    T, slope = dense(s)
                 change = (y.conj() @ T @ x) / (y.conj() @ slope @ x)
                 s = s - (change if np.isfinite(change) else 0.0)
                 if step and abs(change) <= 1e-13 * abs(s):
                     break
+                T, slope = dense(s)
             values[i] = s
             right.append(x)
             left.append(y)
