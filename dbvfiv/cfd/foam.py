@@ -34,62 +34,27 @@ INTENSITY, EDDIES = 0.03, 0.07
 _C_MU = 0.09
 
 
-@dataclass(frozen=True)
-class Stream:
-    """The flow that is asked for.
-
-    Attributes
-    ----------
-    volume_flow : float, m3/s
-        Of the whole valve.
-    bore : float, m
-        Diameter of the pipe that it comes from.
-    density : float, kg/m3
-    viscosity : float, m2/s
-    free : bool
-        Whether the jet goes into a room instead of a pipe.
-    iterations : int
-        At most.
-    """
-
-    volume_flow: float
-    bore: float
-    density: float
-    viscosity: float
-    free: bool = False
-    iterations: int = 400
-
-    @property
-    def velocity(self) -> float:
-        """Mean velocity of the stream that comes in, m/s."""
-        return self.volume_flow / (0.25 * math.pi * self.bore**2)
-
-    @property
-    def turbulence(self) -> tuple[float, float]:
-        """k, m2/s2, and omega, 1/s, of it."""
-        k = 1.5 * (INTENSITY * self.velocity) ** 2
-        return k, math.sqrt(k) / (_C_MU**0.25 * EDDIES * self.bore)
-
-
 #: Files of a case as they are, and what is put into two of them.
 _FILES = ("Allrun", "constant/turbulenceProperties", "system/fvSchemes", "system/fvSolution")
 
 
-def case_files(stream: Stream) -> dict[str, str]:
+def case_files(case: FlowCase) -> dict[str, str]:
     """All files but the mesh, by their places in the case."""
     texts = files("dbvfiv.cfd").joinpath("case")
-    put_in = {"constant/transportProperties": stream.viscosity, "system/controlDict": stream.iterations}
-    found = {f"0/{name}": text for name, text in _fields(stream).items()}
+    put_in = {"constant/transportProperties": case.viscosity, "system/controlDict": case.iterations}
+    found = {f"0/{name}": text for name, text in _fields(case).items()}
     found |= {name: texts.joinpath(name).read_text() for name in _FILES}
     return found | {name: texts.joinpath(name).read_text() % value for name, value in put_in.items()}
 
 
-def _fields(stream: Stream) -> dict[str, str]:
+def _fields(case: FlowCase) -> dict[str, str]:
     """Boundary and initial values of p, U, k, omega and nut."""
-    k, omega = stream.turbulence
-    wall = "type noSlip;" if not stream.free else "type slip;"
-    start = f"uniform (0 0 {-stream.velocity:.8g})"
-    quarter = stream.volume_flow / 4.0
+    free, velocity = case.pipe is None, case.inlet_velocity
+    k = 1.5 * (INTENSITY * velocity) ** 2
+    omega = math.sqrt(k) / (_C_MU**0.25 * EDDIES * 2.0 * case.domain.bore)
+    wall = "type noSlip;" if not free else "type slip;"
+    start = f"uniform (0 0 {-velocity:.8g})"
+    quarter = case.state.volume_flow / 4.0
     return {
         "p": _field(
             "p", "volScalarField", "0 2 -2 0 0 0 0", "uniform 0", _OPEN, "type fixedValue; value uniform 0;", _OPEN
@@ -104,16 +69,8 @@ def _fields(stream: Stream) -> dict[str, str]:
             "type noSlip;",
             wall,
         ),
-        "k": _field(
-            "k", "volScalarField", "0 2 -2 0 0 0 0", f"uniform {k:.8g}", *_turbulent(k, "kqRWallFunction", stream)
-        ),
-        "omega": _field(
-            "omega",
-            "volScalarField",
-            "0 0 -1 0 0 0 0",
-            f"uniform {omega:.8g}",
-            *_turbulent(omega, "omegaWallFunction", stream),
-        ),
+        "k": _turbulent("k", "0 2 -2 0 0 0 0", k, "kqRWallFunction", free),
+        "omega": _turbulent("omega", "0 0 -1 0 0 0 0", omega, "omegaWallFunction", free),
         "nut": _field(
             "nut",
             "volScalarField",
@@ -122,7 +79,7 @@ def _fields(stream: Stream) -> dict[str, str]:
             "type calculated; value uniform 0;",
             "type calculated; value uniform 0;",
             "type nutUSpaldingWallFunction; value uniform 0;",
-            "type calculated; value uniform 0;" if stream.free else None,
+            "type calculated; value uniform 0;" if free else None,
         ),
     }
 
@@ -130,14 +87,18 @@ def _fields(stream: Stream) -> dict[str, str]:
 _OPEN = "type zeroGradient;"
 
 
-def _turbulent(value: float, wall: str, stream: Stream) -> tuple[str, str, str, str | None]:
-    """Conditions of a quantity of the turbulence: inlet, outlet, walls, and the far side of a room."""
+def _turbulent(name: str, dimensions: str, value: float, wall: str, free: bool) -> str:
+    """A quantity of the turbulence: its conditions at inlet, outlet, walls, and the far side of a room."""
     fixed = f"value uniform {value:.8g};"
-    return (
+    return _field(
+        name,
+        "volScalarField",
+        dimensions,
+        f"uniform {value:.8g}",
         f"type fixedValue; {fixed}",
         f"type inletOutlet; inletValue uniform {value:.8g}; {fixed}",
         f"type {wall}; {fixed}",
-        _OPEN if stream.free else None,
+        _OPEN if free else None,
     )
 
 
@@ -155,11 +116,12 @@ def _field(name, kind, dimensions, start, inlet, outlet, wall, far=None) -> str:
         f"    downstream {{ {far or wall} }}",
         "}",
     ]
-    return _foam(name, "\n".join(lines) + "\n", kind)
+    return _foam(name, kind, "\n".join(lines) + "\n")
 
 
-def _foam(name: str, body: str, kind: str = "dictionary") -> str:
-    return f"FoamFile {{ version 2.0; format ascii; class {kind}; object {name}; }}\n\n{body}"
+def _foam(name: str, kind: str, body: str, more: str = "") -> str:
+    """A file under its head, with further entries in that."""
+    return f"FoamFile {{ version 2.0; format ascii; class {kind};{more} object {name}; }}\n\n{body}"
 
 
 #: Faces of a hexahedron, their normals pointing out of it.
@@ -233,9 +195,8 @@ def _rows(values: np.ndarray, form: str) -> str:
 
 
 def _write(folder: Path, name: str, kind: str, body: str, note: str = "") -> None:
-    note = f' note "{note}";' if note else ""
-    head = f'FoamFile {{ version 2.0; format ascii; class {kind}; location "constant/polyMesh";{note} object {name}; }}'
-    (folder / name).write_text(f"{head}\n\n{body}")
+    more = ' location "constant/polyMesh";' + (f' note "{note}";' if note else "")
+    (folder / name).write_text(_foam(name, kind, body, more))
 
 
 #: Where Debian's package keeps what the programs read.
@@ -455,16 +416,9 @@ class FlowCase:
             raise CaseError(f"No sound mesh of this state: {error}") from error
 
     @property
-    def stream(self) -> Stream:
-        """The flow that is asked for."""
-        return Stream(
-            self.state.volume_flow,
-            2.0 * self.domain.bore,
-            self.density,
-            self.viscosity,
-            self.pipe is None,
-            self.iterations,
-        )
+    def inlet_velocity(self) -> float:
+        """Mean velocity of the stream that comes in, m/s."""
+        return self.state.volume_flow / (0.25 * math.pi * (2.0 * self.domain.bore) ** 2)
 
     @property
     def inputs(self) -> dict[str, Any]:
@@ -495,7 +449,7 @@ class FlowCase:
                 )
             if not known and folder.exists() and any(folder.iterdir()):
                 raise CaseError(f"{str(folder)!r} is not empty and holds no flow of this program; name a new folder.")
-            for name, text in case_files(self.stream).items():
+            for name, text in case_files(self).items():
                 path = folder / name
                 if known and name.startswith("0/"):
                     continue
