@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import base64
 import io
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -39,6 +40,11 @@ class Table:
 
     head: tuple[str, ...]
     rows: tuple[tuple[str, ...], ...]
+
+    @classmethod
+    def of(cls, things: Iterable[Any], columns: Mapping[str, Callable[[Any], str]]) -> Table:
+        """A row for each thing; columns by their titles, each written off the thing."""
+        return cls(tuple(columns), tuple(tuple(write(thing) for write in columns.values()) for thing in things))
 
 
 @dataclass(frozen=True)
@@ -243,25 +249,20 @@ def onset_part(found: Gathered) -> Part | None:
     if result is None:
         return not_there(found, "onset", title) if "onset" in found.failed else None
     row = found.case.units.parameter("pressure")
-    head = (
-        f"{_pressure_title(found)}, {row.shown_unit}",
-        f"+- (second mesh), {row.shown_unit}",
-        "frequency, Hz",
-        "what changes",
-        "how",
-    )
     kinds = {"super": "softly (supercritical)", "sub": "hard (subcritical)"}
-    rows = tuple(
-        (
-            f"{p['value'] / row.scale:.4g}",
-            "no such onset there" if p["uncertainty"] is None else f"{p['uncertainty'] / row.scale:.2g}",
-            f"{p['frequency']:.4g}",
-            ("unstable" if p["gains"] else "stable") + " above",
-            kinds.get(p["criticality"], "-"),
-        )
-        for p in result.points
-    )
-    return Part("onset", title, (), (Table(head, rows),) if rows else (), (), result.failures)
+
+    def apart(p) -> str:
+        return "no such onset there" if p["uncertainty"] is None else f"{p['uncertainty'] / row.scale:.2g}"
+
+    columns = {
+        f"{_pressure_title(found)}, {row.shown_unit}": lambda p: f"{p['value'] / row.scale:.4g}",
+        f"+- (second mesh), {row.shown_unit}": apart,
+        "frequency, Hz": lambda p: f"{p['frequency']:.4g}",
+        "what changes": lambda p: ("unstable" if p["gains"] else "stable") + " above",
+        "how": lambda p: kinds.get(p["criticality"], "-"),
+    }
+    tables = (Table.of(result.points, columns),) if result.points else ()
+    return Part("onset", title, (), tables, (), result.failures)
 
 
 def pipe_part(found: Gathered) -> Part | None:
@@ -294,31 +295,22 @@ def chance_part(found: Gathered) -> Part | None:
     if result is None:
         return not_there(found, "chance", title) if "chance" in found.failed else None
     row = found.case.units.parameter(result.parameter)
-    head = (
-        f"{row.title}, {row.shown_unit}".rstrip(", "),
-        "chatters, %",
-        "95 % interval, %",
-        "not valid, %",
-        "undecided",
-    )
     percent = lambda value: "-" if value is None else digits(100 * value, 2)  # noqa: E731
-    rows = tuple(
-        (
-            f"{p['value'] / row.scale:.4g}",
-            percent(p["probability"]),
-            " to ".join(map(percent, p["interval"])),
-            percent(p["outcomes"]["not valid"]["probability"]),
-            f"{p['undecided']} of {p['samples']}",
-        )
-        for p in result.points
-    )
+    columns = {
+        f"{row.title}, {row.shown_unit}".rstrip(", "): lambda p: f"{p['value'] / row.scale:.4g}",
+        "chatters, %": lambda p: percent(p["probability"]),
+        "95 % interval, %": lambda p: " to ".join(map(percent, p["interval"])),
+        "not valid, %": lambda p: percent(p["outcomes"]["not valid"]["probability"]),
+        "undecided": lambda p: f"{p['undecided']} of {p['samples']}",
+    }
     captions = {
         "probability": "Probability of chatter with its 95 % interval.",
         "margin": "Least damping ratio of the samples.",
         "tornado": "Least damping ratio with each input low and high.",
     }
     said = (*result.deciding_lines(), *(f"Input: {one.words()}." for one in result.plan.inputs))
-    return Part("chance", title, said, (Table(head, rows),), pictures_of(result, captions), result.failures)
+    tables = (Table.of(result.points, columns),)
+    return Part("chance", title, said, tables, pictures_of(result, captions), result.failures)
 
 
 _CYCLES = "What it grows into"
@@ -331,23 +323,13 @@ def cycle_part(found: Gathered) -> Part | None:
         return not_there(found, "cycle", _CYCLES) if "cycle" in found.failed else None
     units, here = found.case.units, Mu.of(found.case)[result.parameter]
     row, size, unit = units.parameter(result.parameter), units.factor("size"), units.name("size")
-    rows = tuple(
-        (
-            f"{p.value / row.scale:.4g}",
-            f"{p.amplitude / size:.3g}",
-            f"{p.frequency:.4g}",
-            f"{p.lip_least / size:.3g} to {p.lip_largest / size:.3g}",
-            {True: "yes", False: "no", None: "not asked"}[p.stable],
-        )
-        for p in result.points
-    )
-    head = (
-        f"{row.title}, {row.shown_unit}".rstrip(", "),
-        f"amplitude of a lip, {unit}",
-        "frequency, Hz",
-        f"lip from .. to, {unit}",
-        "stable",
-    )
+    columns = {
+        f"{row.title}, {row.shown_unit}".rstrip(", "): lambda p: f"{p.value / row.scale:.4g}",
+        f"amplitude of a lip, {unit}": lambda p: f"{p.amplitude / size:.3g}",
+        "frequency, Hz": lambda p: f"{p.frequency:.4g}",
+        f"lip from .. to, {unit}": lambda p: f"{p.lip_least / size:.3g} to {p.lip_largest / size:.3g}",
+        "stable": lambda p: {True: "yes", False: "no", None: "not asked"}[p.stable],
+    }
     point = result.nearest(here)
     if abs(point.value - here) > 1e-6 * abs(here):
         said = f"The limit cycle was followed to {row.text(point.value)} and not to {row.text(here)}: {result.reason}."
@@ -356,7 +338,7 @@ def cycle_part(found: Gathered) -> Part | None:
         swing = units.text_of("size", point.amplitude, 3)
         said = f"{kind} limit cycle of {swing} of each lip, half its swing, at {point.frequency:.4g} Hz."
     pictures = pictures_of(result, {"branch": "Amplitude and frequency of the cycle; dashed where it is unstable."})
-    return Part("cycle", _CYCLES, (said,), (Table(head, rows),), pictures, result.failures)
+    return Part("cycle", _CYCLES, (said,), (Table.of(result.points, columns),), pictures, result.failures)
 
 
 _CLOSURE = "Closing and sealing under back pressure"
@@ -367,32 +349,25 @@ def closure_part(found: Gathered) -> Part:
     result, units = found.get("closure"), found.case.units
     if result is None or not result.states:
         return not_there(found, "closure", _CLOSURE)
-    rows = tuple(
-        (
-            f"{s.pressure / units.factor('pressure'):.4g}" + (" (beyond the limit)" if s.beyond_limit else ""),
-            "yes" if s.closed else "no",
-            f"{s.sealed_length / units.factor('size'):.3g}",
-            digits(s.leak * 3.6e6),
-            digits(s.contact_force),
-            f"{s.max_displacement / units.factor('size'):.3g}",
-        )
-        for s in sorted(result.states, key=lambda s: s.pressure)
-    )
-    head = (
-        f"back pressure, {units.name('pressure')}",
-        "shut",
-        f"sealed length, {units.name('size')}",
-        "leak, L/h",
-        "contact force, N",
-        f"largest displacement, {units.name('size')}",
-    )
+    scale, size, unit = units.factor("pressure"), units.factor("size"), units.name("size")
+    columns = {
+        f"back pressure, {units.name('pressure')}": lambda s: (
+            f"{s.pressure / scale:.4g}{' (beyond the limit)' if s.beyond_limit else ''}"
+        ),
+        "shut": lambda s: "yes" if s.closed else "no",
+        f"sealed length, {unit}": lambda s: f"{s.sealed_length / size:.3g}",
+        "leak, L/h": lambda s: digits(s.leak * 3.6e6),
+        "contact force, N": lambda s: digits(s.contact_force),
+        f"largest displacement, {unit}": lambda s: f"{s.max_displacement / size:.3g}",
+    }
+    table = Table.of(sorted(result.states, key=lambda s: s.pressure), columns)
     caption = "Sealed length, largest displacement and stiffness of the wall over the back pressure."
     curve = picture("closure", caption, lambda: closure_figure(result), units=units)
     rated = found.case.closure.rated_pressure is not None  # a factor of safety is one over the rated pressure
     left = ("Forces balance",) if rated else ("Forces balance", "Safety factor")
     sentences = tuple(line for line in result.remarks() if not line.startswith(left))
     trust = (*result.failures, *(line for line in result.remarks() if line.startswith("Forces")))
-    return Part("closure", _CLOSURE, sentences, (Table(head, rows),), (curve, *pictures_of(result, _MEASURED)), trust)
+    return Part("closure", _CLOSURE, sentences, (table,), (curve, *pictures_of(result, _MEASURED)), trust)
 
 
 def valve_part(found: Gathered) -> Part | None:
