@@ -46,36 +46,11 @@ def damping(
     print_answer(report.summary(frequencies), lambda: report.lines(frequencies), as_json, (figures, plots))
 
 
-class Form(StrEnum):
-    """Forms of the energy."""
-
-    SOFTENING = "softening"
-    NEO_HOOKEAN = "neo-hookean"
-    MOONEY_RIVLIN = "mooney-rivlin"
-    YEOH = "yeoh"
-    OGDEN = "ogden"
-
-
-class Constraint(StrEnum):
-    """Constraints on the constants."""
-
-    NONE = "none"
-    NON_NEGATIVE = "non-negative"
-    STABLE = "stable"
-
-
-class Weighting(StrEnum):
-    """Error that a fit minimises."""
-
-    ABSOLUTE = "absolute"
-    RELATIVE = "relative"
-
-
-class Cycle(StrEnum):
-    """Load cycle that is fitted."""
-
-    FIRST = "first"
-    LAST = "last"
+#: Forms of the energy, constraints on the constants, the error that a fit minimises, and the load cycle fitted.
+Form = StrEnum("Form", ["softening", "neo-hookean", "mooney-rivlin", "yeoh", "ogden"])
+Constraint = StrEnum("Constraint", ["none", "non-negative", "stable"])
+Weighting = StrEnum("Weighting", ["absolute", "relative"])
+Cycle = StrEnum("Cycle", ["first", "last"])
 
 
 def fit(
@@ -93,14 +68,14 @@ def fit(
     ] = None,
     law: Annotated[Form | None, typer.Option("--law", help="Form told in full; softening if not given.")] = None,
     terms: Annotated[int | None, typer.Option("--terms", help="Its number of terms.")] = None,
-    constraint: Annotated[Constraint, typer.Option("--constraint", help="On the constants.")] = Constraint.NONE,
+    constraint: Annotated[Constraint, typer.Option("--constraint", help="On the constants.")] = Constraint("none"),
     stable_to: Annotated[
         str | None, typer.Option("--stable-to", metavar="STRAIN", help='With --constraint stable: up to "30 %".')
     ] = None,
-    error: Annotated[Weighting, typer.Option("--error", help="What is made small.")] = Weighting.ABSOLUTE,
-    cycle: Annotated[
-        Cycle, typer.Option("--cycle", help="Which loading, where the file has a column cycle.")
-    ] = Cycle.LAST,
+    error: Annotated[Weighting, typer.Option("--error", help="What is made small.")] = Weighting("absolute"),
+    cycle: Annotated[Cycle, typer.Option("--cycle", help="Which loading, where the file has a column cycle.")] = Cycle(
+        "last"
+    ),
     name: Annotated[str, typer.Option("--name", help="Name of the material in the table to paste.")] = "rubber",
     density: Annotated[str, typer.Option("--density", help="Its density in the table to paste.")] = "1300 kg/m^3",
     plots: PlotFolder = None,

@@ -28,6 +28,10 @@ if TYPE_CHECKING:
     from ..studies.state import State
     from ..verdict.reading import Signal
 
+#: Kinds of figure files, of other files, and the surfaces and bodies of a state.
+FigureFormat = StrEnum("FigureFormat", ["png", "svg"])
+Format = StrEnum("Format", ["vtkhdf", "stl", "step"])
+Shape = StrEnum("Shape", ["inner", "middle", "outer", "wall", "fluid"])
 #: Kinds of results that can be compared.
 _COMPARED = ("transient", "steady", "closure")
 
@@ -76,13 +80,6 @@ def _describe(result: Any) -> list[str]:
     lines = [f"{name:<10}{value}" for name, value in facts] + ["", *said]
     notes = [("Warning", text) for text in result.warnings] + [("Failure", text) for text in result.failures]
     return lines + [""] * bool(notes) + [f"{kind}: {header.case.units.say(text)}" for kind, text in notes]
-
-
-class FigureFormat(StrEnum):
-    """Kinds of figure files."""
-
-    png = "png"
-    svg = "svg"
 
 
 def plot(
@@ -285,24 +282,6 @@ def life(
     found = Life(result, motion_of(result, value, since, per_day), case.life)
     figures = save_figures(found.figures(), plots)
     print_answer(found.document(), found.lines, as_json, (figures, plots))
-
-
-class Format(StrEnum):
-    """Kinds of files."""
-
-    vtkhdf = "vtkhdf"
-    stl = "stl"
-    step = "step"
-
-
-class Shape(StrEnum):
-    """Surfaces and bodies of a state."""
-
-    inner = "inner"
-    middle = "middle"
-    outer = "outer"
-    wall = "wall"
-    fluid = "fluid"
 
 
 def export(
