@@ -299,25 +299,26 @@ def judge(
     >>> verdict.name, round(verdict.frequency, 6), round(verdict.amplitude, 6)
     ('limit cycle', 1.0, 1.0)
     """
-    time, values = check_samples(time, values)
-    part, notes = longest_part(time)
-    facts = {
-        "smallest": float(values.min()),
-        "largest": float(values.max()),
-        "judged": (float(time[part][0]), float(time[part][-1])),
-        "notes": notes,
-    }
-    time, values = time[part], values[part]
+    time, values, facts = longest_samples(time, values)
     if len(values) < _FEWEST:
-        end = float(values[-1])
-        return Verdict("undecided", False, _too_few(notes), mean=end, amplitude=0.0, rms=0.0, **facts)
+        words = f"There are fewer than {_FEWEST} samples{' between two gaps' if facts['notes'] else ''}."
+        return Verdict("undecided", False, words, mean=float(values[-1]), amplitude=0.0, rms=0.0, **facts)
     found = _judge(Series.of(time, values), options, residual, closed_below)
     return replace(found, **facts)
 
 
-def _too_few(notes: tuple[str, ...]) -> str:
-    between = " between two gaps" if notes else ""
-    return f"There are fewer than {_FEWEST} samples{between}."
+def longest_samples(time, values) -> tuple[np.ndarray, np.ndarray, dict[str, Any]]:
+    """Times and values (k,) of the longest part of a record without a gap, and what a verdict on it says of the whole.
+
+    Raises
+    ------
+    ValueError
+        If the samples are no series.
+    """
+    time, values = check_samples(time, values)
+    part, notes = longest_part(time)
+    facts = {"smallest": float(values.min()), "largest": float(values.max()), "notes": notes}
+    return time[part], values[part], facts | {"judged": (float(time[part][0]), float(time[part][-1]))}
 
 
 def _judge(series: Series, options: JudgeOptions, residual: float | None, closed_below: float | None) -> Verdict:

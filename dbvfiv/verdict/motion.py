@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
 
@@ -11,7 +11,7 @@ import numpy as np
 from scipy.optimize import minimize
 
 from ..texts import digits
-from .judge import FILLED, JudgeOptions, Verdict, judge
+from .judge import FILLED, JudgeOptions, Verdict, judge, longest_samples
 from .lines import (
     LEVEL,
     WIDE,
@@ -27,7 +27,7 @@ from .lines import (
     strongest,
     wave,
 )
-from .series import Series, check_samples, harmonics, longest_part
+from .series import Series, harmonics
 
 #: Gain in the logarithm of the likelihood over a smooth spectrum from which a peak is one: three more numbers gain so
 #: much by chance once in some thousand records of ten candidates.
@@ -42,8 +42,8 @@ _EVEN = 3.5
 _BOX = ((-1.0, 1.0), (-9.0, 1.0), (-30.0, 30.0), (-4.0, 4.0), (-30.0, 30.0))
 
 
-def resonances(series: Series, low: float = 0.0) -> tuple[Line, ...]:
-    """Resonances in even samples, the most certain first; `low`, Hz, is a frequency below which a level moves.
+def resonances(series: Series) -> tuple[Line, ...]:
+    """Resonances in even samples, the most certain first.
 
     Frequency and damping of peaks with 95 % intervals: about a peak the power density of a response to noise is that of
     one pole beside whatever is smooth, other modes and noise of the instrument: S = (a0 + a1 x + a2 x^2) /
@@ -58,7 +58,7 @@ def resonances(series: Series, low: float = 0.0) -> tuple[Line, ...]:
     frequency = np.fft.rfftfreq(count, series.step)[1:-1]
     power = 2.0 * series.step / count * np.abs(np.fft.rfft(values))[1:-1] ** 2
     found: list[tuple[float, Line]] = []
-    for start, width in _candidates(frequency, power, max(low, 8.0 / series.duration)):
+    for start, width in _candidates(frequency, power, 8.0 / series.duration):
         if any(abs(old[1].frequency - start) < 0.5 * _half(old[1]) and width < _half(old[1]) for old in found):
             continue
         one = _fitted(frequency, power, start, width)
@@ -204,7 +204,6 @@ class Motion:
     start: float = np.nan
     noise: float = np.nan
     left: float = np.nan
-    notes: tuple[str, ...] = field(default=())
     returns: bool = False
 
 
@@ -237,14 +236,13 @@ def judge_record(
     ValueError
         If the samples are no series.
     """
-    time, values = check_samples(time, values)
-    part, notes = longest_part(time)
     judged = partial(judge, time, values, options, closed_below=closed_below)
-    if len(time[part]) < _FEWEST or not np.ptp(values[part]):
+    time, values, facts = longest_samples(time, values)
+    if len(time) < _FEWEST or not np.ptp(values):
         return judged()
     if closed_below is not None and (level := judged()).name == "closed":
         return level
-    series = Series.of(time[part], values[part])
+    series = Series.of(time, values)
     found = find_motion(series, detrend, MAINS)
     if found.name not in _LINES:
         level = judged()
@@ -282,13 +280,10 @@ def judge_record(
         amplitude_trend=float(np.expm1(line.rate / line.frequency)),
         harmonics=shape,
         rms=float(swung.std()),
-        smallest=float(values.min()),
-        largest=float(values.max()),
         noise=found.noise,
-        judged=(float(time[part][0]), float(time[part][-1])),
-        notes=(*notes, *found.notes),
         lines=told,
         modulation=spacing,
+        **facts,
     )
 
 

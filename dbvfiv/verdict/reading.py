@@ -219,13 +219,13 @@ def _judged(file: Path, signal: Signal, options: JudgeOptions, closed_below: flo
         ) from None
 
 
-def _peaks(signal: Signal, count: int = 5) -> list[dict[str, float]]:
-    """Largest peaks of the spectrum."""
+def _peaks(signal: Signal) -> list[dict[str, float]]:
+    """Five largest peaks of the spectrum."""
     if len(signal.time) < 16:
         return []
     frequency, amplitude = spectrum(Series.of(signal.time, signal.values))
     inner = [i for i in range(1, len(amplitude) - 1) if amplitude[i - 1] < amplitude[i] >= amplitude[i + 1]]
-    best = sorted(inner, key=lambda i: -amplitude[i])[:count]
+    best = sorted(inner, key=lambda i: -amplitude[i])[:5]
     return [
         {"frequency": float(frequency[i]), "amplitude": float(amplitude[i])}
         for i in best

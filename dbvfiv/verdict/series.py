@@ -289,27 +289,21 @@ def mismatch(values: np.ndarray, largest: int) -> np.ndarray:
         return np.sqrt(np.maximum(both - 2.0 * product, 0.0) / both)
 
 
-def find_period(series: Series, longest: float = 0.5, samples: int = 4) -> tuple[float, float]:
-    """Period to a sample and its mismatch; (nan, nan) if the signal never comes back to itself.
+def find_period(series: Series) -> tuple[float, float]:
+    """Period to a sample, of four samples at least and half the duration at most, and its mismatch; (nan, nan) if the
+    signal never comes back to itself.
 
     The first lag that matches nearly as well as the best one is taken, which tells a period from its multiples and a
     doubled period from half of it.
-
-    Parameters
-    ----------
-    longest : float
-        Longest period over the duration.
-    samples : int
-        Smallest number of samples of a period.
     """
-    largest = int(longest * (len(series.values) - 1))
-    if largest <= samples or np.ptp(series.values) == 0.0:
+    largest = int(0.5 * (len(series.values) - 1))
+    if largest <= 4 or np.ptp(series.values) == 0.0:
         return np.nan, np.nan
     error = mismatch(series.values, largest)
     valley = np.flatnonzero((error[1:-1] <= error[:-2]) & (error[1:-1] < error[2:])) + 1
     # what lies before the signal has moved away from itself is no return
     away = np.argmax(error > 0.5 * np.nanmax(error))
-    valley = valley[(valley > away) & (valley >= samples)]
+    valley = valley[(valley > away) & (valley >= 4)]
     if not len(valley):
         return np.nan, np.nan
     # a lag between two samples leaves a mismatch of half the slope of the valley's sides
@@ -446,12 +440,12 @@ def extremes(series: Series, period: float) -> tuple[float, float]:
     return float(found[0]), float(found[1])
 
 
-def harmonics(series: Series, period: float, cycles: int, count: int = 8) -> np.ndarray:
-    """(k, 2) amplitude and phase of the multiples of the frequency, over the last whole cycles."""
+def harmonics(series: Series, period: float, cycles: int) -> np.ndarray:
+    """(k, 2) amplitude and phase of the first eight multiples of the frequency, over the last whole cycles."""
     samples = cycles * 256
     t = series.end - period * cycles * (1.0 - np.arange(samples) / samples)
     values = series.spline()(t)
-    count = min(count, max(1, int(0.5 * period / series.step)))
+    count = min(8, max(1, int(0.5 * period / series.step)))
     angle = 2j * np.pi / period * np.arange(1, count + 1)[:, None] * (t - series.start)
     coefficients = 2.0 * np.mean(values * np.exp(-angle), axis=1)
     return np.stack([np.abs(coefficients), np.angle(coefficients)], axis=1)
