@@ -9,8 +9,8 @@ from typing import Any, overload
 
 from .case.axis import is_single, read_pressures, write_axis
 from .case.model import Changes, change_case
-from .drawing import views
 from .drawing.style import draw_figures, write_figures
+from .drawing.views import valve_figure
 from .errors import CaseError, SolveError, as_path
 from .explore import Explorer
 from .fit.cards import DampingReport, describe_damping
@@ -93,7 +93,8 @@ class Valve:
 
     def plot(self, folder: str | Path = ".", format: str = "png", only: Sequence[str] = ()) -> list[Path]:
         """Draw the valve as its case describes it, with measures, wall and layers; nothing is solved."""
-        figures = draw_figures(views.drawers_of(self.session.described), only, f"case {self.name!r}")
+        model = self.session.described
+        figures = draw_figures({"valve": lambda: valve_figure(model)}, only, f"case {self.name!r}")
         return write_figures(figures, folder, format)
 
     def replace(self, changes: Changes) -> Valve:
@@ -146,10 +147,7 @@ class Valve:
             return self.session.perform("steady", output, observer or bar())
         asked = self.case.steady_pressures() if pressure is None else [pressure] if single else pressure
         pressures = read_pressures(asked, "drive.pressure" if pressure is None else "pressure", self.case.fluid.density)
-        self.model  # shared by what is asked of this valve
-        result = self.session.replace({"steady.pressures": list(pressures)}).perform(
-            "steady", output, observer or bar()
-        )
+        result = self._ask("steady", {"steady.pressures": list(pressures)}, {}, output, observer)
         if not single:
             return result
         if result.failures:
@@ -163,7 +161,7 @@ class Valve:
         `dbvfiv.studies.levels.study.LevelsResult`.
         """
         given = None if pressure is None else [pressure] if is_single(pressure) else list(pressure)
-        return self._ask({"levels.pressures": given}, {}).perform("levels", output, observer or bar())
+        return self._ask("levels", {"levels.pressures": given}, {}, output, observer)
 
     def modes(
         self,
@@ -201,7 +199,7 @@ class Valve:
         >>> found.modes[0].growth_rate, found.stable                      # doctest: +SKIP
         """
         keys = {"drive.pressure": pressure, "modes.count": count}
-        return self._ask(keys, changes).perform("modes", output, observer or bar())
+        return self._ask("modes", keys, changes, output, observer)
 
     def sweep(
         self,
@@ -224,9 +222,7 @@ class Valve:
         output, observer, changes
             As for `modes`; also pressure, for sweeps over something else.
         """
-        return self._ask({"sweep.over": write_axis(over), "sweep.count": count}, changes).perform(
-            "sweep", output, observer or bar()
-        )
+        return self._ask("sweep", {"sweep.over": write_axis(over), "sweep.count": count}, changes, output, observer)
 
     def sensitivity(
         self,
@@ -248,7 +244,7 @@ class Valve:
         output, observer, changes
             As for `modes`; also pressure.
         """
-        return self._ask(sensitivity_keys(of, mode), changes).perform("sensitivity", output, observer or bar())
+        return self._ask("sensitivity", sensitivity_keys(of, mode), changes, output, observer)
 
     def response(
         self,
@@ -271,7 +267,7 @@ class Valve:
             As for `modes`; also pressure.
         """
         asked = {"response.over": write_axis(over), "response.noise": noise}
-        return self._ask(asked, changes).perform("response", output, observer or bar())
+        return self._ask("response", asked, changes, output, observer)
 
     def identify(
         self,
@@ -300,7 +296,7 @@ class Valve:
         asked = {"identify.records": given, "identify.over": write_axis(over)}
         own = {name: changes.pop(name) for name in [*changes] if name in ("samples", "round", "rounds", "seed")}
         asked |= {f"identify.{name}": value for name, value in own.items()}
-        return self._ask(asked, changes).perform("identify", output, observer or bar(), workers=workers)
+        return self._ask("identify", asked, changes, output, observer, workers=workers)
 
     def closure(
         self,
@@ -332,8 +328,7 @@ class Valve:
         """
         asked = self.case.closure.pressures if pressure is None else [pressure] if is_single(pressure) else pressure
         pressures = read_pressures(asked, "pressure", self.case.fluid.density)
-        session = self._ask({"closure.pressures": list(pressures)}, {})
-        return session.perform("closure", output, observer or bar())
+        return self._ask("closure", {"closure.pressures": list(pressures)}, {}, output, observer)
 
     def onset(
         self, over: Range | None = None, *, output: Output = None, observer: Observer | None = None, **changes: Any
@@ -353,7 +348,7 @@ class Valve:
         ------
         CaseError, SolveError
         """
-        return self._ask({"onset.over": write_axis(over)}, changes).perform("onset", output, observer or bar())
+        return self._ask("onset", {"onset.over": write_axis(over)}, changes, output, observer)
 
     def cycle(
         self, over: Range | None = None, *, output: Output = None, observer: Observer | None = None, **changes: Any
@@ -371,7 +366,7 @@ class Valve:
         --------
         >>> found = dbvfiv.load("cases/light-fluid.toml").cycle("density=25:60:8")     # doctest: +SKIP
         """
-        return self._ask({"cycle.over": write_axis(over)}, changes).perform("cycle", output, observer or bar())
+        return self._ask("cycle", {"cycle.over": write_axis(over)}, changes, output, observer)
 
     def map(
         self,
@@ -403,8 +398,8 @@ class Valve:
         """
         if workers is not None:
             self.case.replace({"map.workers": workers})  # refuses what is no number of processes
-        session = self._ask({"map.x": write_axis(x), "map.y": write_axis(y)}, changes)
-        return session.perform("map", output, observer or bar(), workers=workers)
+        asked = {"map.x": write_axis(x), "map.y": write_axis(y)}
+        return self._ask("map", asked, changes, output, observer, workers=workers)
 
     def uncertainty(
         self,
@@ -439,7 +434,7 @@ class Valve:
         asked = {"uncertainty.over": write_axis(over), "uncertainty.samples": samples, "uncertainty.inputs": inputs}
         if workers is not None:
             asked["uncertainty.workers"] = workers
-        return self._ask(asked, changes).perform("uncertainty", output, observer or bar())
+        return self._ask("uncertainty", asked, changes, output, observer)
 
     def design(
         self,
@@ -473,7 +468,7 @@ class Valve:
         """
         asked = {"design.variables": variables, "design.aim": aim, "design.constraints": constraints}
         folder = None if cases is None else Path(cases)
-        return self._ask(asked, changes).perform("design", output, observer or bar(), cases=folder)
+        return self._ask("design", asked, changes, output, observer, cases=folder)
 
     def transient(
         self,
@@ -503,7 +498,7 @@ class Valve:
         SolveError
             If there is no first state. A step that is not found ends the run, which keeps what it has.
         """
-        return self._ask({"transient.duration": duration}, changes).perform("transient", output, observer or bar())
+        return self._ask("transient", {"transient.duration": duration}, changes, output, observer)
 
     def explore(self) -> Explorer:
         """Answers at one parameter point after another in the time of a slider; see `dbvfiv.explore`.
@@ -515,11 +510,12 @@ class Valve:
         """
         return Explorer(self.session)
 
-    def _ask(self, keys: Mapping[str, Any], given: Mapping[str, Any]) -> Session:
-        """The session with keys and named arguments put into its case; None stands for nothing given."""
+    def _ask(self, kind: str, keys: dict, given: dict, output: Output, observer: Observer | None, **choices) -> Any:
+        """Result of a study with keys and named arguments put into its case; None stands for nothing given."""
         self.model  # shared by what is asked of this valve
         changes = keys | named_changes(given)
-        return self.session.replace({key: value for key, value in changes.items() if value is not None})
+        session = self.session.replace({key: value for key, value in changes.items() if value is not None})
+        return session.perform(kind, output, observer or bar(), **choices)
 
 
 def load(case: str | Path | Case | None = None, changes: Changes | None = None) -> Valve:
