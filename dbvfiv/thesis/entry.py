@@ -12,10 +12,8 @@ from typing import Any
 from ..observer import Observer
 from ..report.parts import Part, Picture, Table
 from ..studies.case import thesis_case
-from ..studies.closure.study import ClosureResult
 from ..studies.session import Session, kept_run
 from ..studies.steady.study import SteadyResult
-from ..studies.transient.study import TransientResult
 
 _HEAD = ("", "ours", "thesis", "difference")
 
@@ -180,21 +178,14 @@ class Workshop:
 
     def steady(self, pressures: Sequence[float], changes: Mapping[str, Any] | None = None) -> SteadyResult:
         """States at pressures, Pa, of the 12-inch valve with some keys changed."""
-        return self._run("steady", {"steady.pressures": list(pressures), **(changes or {})})
-
-    def transient(self, changes: Mapping[str, Any], name: str | None = None) -> TransientResult:
-        """A time history; `name` is what it is called in comparisons."""
-        return self._run("transient", changes, name)
-
-    def closure(self, changes: Mapping[str, Any]) -> ClosureResult:
-        """States under back pressure."""
-        return self._run("closure", changes)
+        return self.run("steady", {"steady.pressures": list(pressures), **(changes or {})})
 
     def duration(self, full: float, quick: float) -> float:
         """Duration of a history, s: the full or the quick one."""
         return quick if self.quick else full
 
-    def _run(self, kind: str, changes: Mapping[str, Any], name: str | None = None) -> Any:
+    def run(self, kind: str, changes: Mapping[str, Any], name: str | None = None) -> Any:
+        """Result of a study of the 12-inch valve with some keys changed; `name` is what it is called in comparisons."""
         case = self.base.replace(dict(changes))
         mark = hashlib.sha256(json.dumps([self.quick, changes], sort_keys=True, default=str).encode()).hexdigest()[:10]
         session = Session(case, name or "dbv12")

@@ -26,7 +26,7 @@ def _series(
     and a sentence for each that found no step.
     """
     length = {"transient.duration": workshop.duration(0.5, 0.4)}
-    runs = {word: workshop.transient(length | common | changes, word) for word, changes in members.items()}
+    runs = {word: workshop.run("transient", length | common | changes, word) for word, changes in members.items()}
     found: list[Found] = [_together(name, runs)]
     for word, run in runs.items():
         if run.failures:
@@ -126,7 +126,10 @@ def _steps(workshop: Workshop):
     common = _LIGHT | _CYCLE | {"drive.pressure": 6e3, "fluid.density": _density(workshop)}
     common |= {"transient.duration": workshop.duration(1.0, 0.8)}
     sizes = ("2", "1") if workshop.quick else ("2", "1", "0.5")
-    runs = {f"{size} ms": workshop.transient(common | {"transient.step": f"{size} ms"}, f"{size} ms") for size in sizes}
+    runs = {
+        f"{size} ms": workshop.run("transient", common | {"transient.step": f"{size} ms"}, f"{size} ms")
+        for size in sizes
+    }
     for name, run in runs.items():
         swing = run.verdict.get("mass_flow", {}).get("amplitude")
         if swing:
@@ -155,7 +158,7 @@ def _suddenly(workshop: Workshop, pressure: float, name: str) -> Iterator[Found]
     }
     if workshop.quick:
         readings = {word: readings[word] for word in ("25 kg/m3", "air", "no unsteady term")}
-    runs = {word: workshop.transient(common | changes, word) for word, changes in readings.items()}
+    runs = {word: workshop.run("transient", common | changes, word) for word, changes in readings.items()}
     for word, run in runs.items():
         reached = f", ended at {run.history['time'][-1]:.3g} s" if run.failures else ""
         yield f"{word}: {run.verdict['verdict']}{reached}."
@@ -178,7 +181,7 @@ def _cycle_at_6(workshop: Workshop):
 @entry("7-16", "travelling wave")
 def _wave(workshop: Workshop):
     common = _LIGHT | _CYCLE | {"drive.pressure": 6e3, "fluid.density": _density(workshop), "transient.step": "1 ms"}
-    run = workshop.transient(common | {"transient.duration": workshop.duration(1.5, 0.8)})
+    run = workshop.run("transient", common | {"transient.duration": workshop.duration(1.5, 0.8)})
     yield "Largest at the lip and running streamwise, as in the thesis."
     yield f"The run ends as: {run.verdict['verdict']}."
     captions = {"centre-line-cycle": "The line x = 0 over a cycle.", "lip-wave": "Its motion over place and time."}

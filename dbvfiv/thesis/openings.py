@@ -183,7 +183,7 @@ def _back_pressure(workshop: Workshop):
         "buckling, and sees the walls of the saddle touch at about 21 kPa; it prints no numbers."
     )
     for supports, words in (("held-lips", "held as in the thesis"), ("contact", "with contact of the inner faces")):
-        result = workshop.closure({"closure.pressures": [7e3, 14e3, 21e3, 28e3], "closure.supports": supports})
+        result = workshop.run("closure", {"closure.pressures": [7e3, 14e3, 21e3, 28e3], "closure.supports": supports})
         for s in result.states:
             what = f"largest displacement at {s.pressure / 1e3:g} kPa, {words}"
             yield Number(what, 1e3 * s.max_displacement, None, "mm")
