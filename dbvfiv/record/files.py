@@ -103,7 +103,7 @@ class WriterLock:
             try:
                 descriptor = os.open(self.path, os.O_RDWR | os.O_CREAT, 0o666)
             except OSError as error:
-                raise _unwritable(self.path, error) from None
+                raise unwritable(self.path, error) from None
             try:
                 _lock(descriptor, self.path)
                 if os.path.samestat(os.stat(self.path), os.fstat(descriptor)):
@@ -135,26 +135,6 @@ class WriterLock:
             self._descriptor = -1
 
 
-def check_free(path: Path) -> None:
-    """Make sure that a result may be written under a name, and leave everything as it is.
-
-    Raises
-    ------
-    CaseError
-        If another process writes it, or the file or its folder cannot be written.
-    """
-    try:
-        if path.exists():
-            descriptor = os.open(path, os.O_RDWR)
-            try:
-                _lock(descriptor, path)
-            finally:
-                os.close(descriptor)
-        _check_folder(path.absolute().parent)
-    except OSError as error:
-        raise _unwritable(path, error) from None
-
-
 def _check_folder(folder: Path) -> None:
     """Try a file without a name in a folder, or in the nearest that there is: nothing can stay behind of it."""
     while not folder.exists():
@@ -182,7 +162,8 @@ def _lock(descriptor: int, path: Path) -> None:
             sleep(_LOCK_PAUSE)
 
 
-def _unwritable(path: Path, error: OSError) -> CaseError:
+def unwritable(path: Path, error: OSError) -> CaseError:
+    """Error for a result file that cannot be written."""
     return CaseError(f"The result file {str(path)!r} cannot be written ({error.strerror}).")
 
 
@@ -321,16 +302,25 @@ def _marked_as_open(path: Path) -> bool:
 
 
 def check_writable(path: str | Path) -> None:
-    """Make sure that a result may take this name, before anything is computed.
+    """Make sure that a result may take this name, before anything is computed, and leave everything as it is.
 
     Raises
     ------
     CaseError
-        If it may not.
+        If another process writes it, or the file or its folder cannot be written, or it is no result.
     """
     path = as_path(path, "A result file")
-    if not path.is_dir():
-        check_free(path)  # first: a file that is being written is a result, however it reads at this instant
+    try:
+        if path.exists() and not path.is_dir():
+            descriptor = os.open(path, os.O_RDWR)
+            try:
+                _lock(descriptor, path)  # first: what is being written is a result, however it reads at this instant
+            finally:
+                os.close(descriptor)
+        if not path.is_dir():
+            _check_folder(path.absolute().parent)
+    except OSError as error:
+        raise unwritable(path, error) from None
     refuse_foreign(path)
 
 
@@ -466,9 +456,9 @@ class Header:
     layout: int = LAYOUT
 
     @classmethod
-    def of(cls, kind: str, case: Case, name: str = "case", complete: bool = False) -> Header:
+    def of(cls, kind: str, case: Case, name: str = "case") -> Header:
         """Header of a run that happens now."""
-        return cls(kind, case, name, attachments=attachments_of(case), complete=complete)
+        return cls(kind, case, name, attachments=attachments_of(case))
 
     def rebuildable_case(self) -> Case:
         """The case, with files that have gone or changed since put back from the attachments."""

@@ -39,6 +39,7 @@ from .files import (
     read_header,
     reading,
     refuse_foreign,
+    unwritable,
     write_header,
 )
 from .mesh import MeshData, read_mesh, write_mesh
@@ -58,9 +59,9 @@ class Journal:
     header : Header
     mesh : MeshData, optional
     tables : iterable of TableSpec
-    first : callable, optional
-        Given the journal, writes what an earlier attempt found; the file takes its name after that only, so that
-        nothing is lost whenever the process ends.
+    known : Record, optional
+        What an earlier attempt found, which is written first; the file takes its name after that only, so that nothing
+        is lost whenever the process ends.
 
     Raises
     ------
@@ -75,7 +76,7 @@ class Journal:
         header: Header,
         mesh: MeshData | None,
         tables: Iterable[TableSpec],
-        first: Callable[[Journal], None] | None = None,
+        known: Record | None = None,
     ):
         self.path = Path(path)
         self._tables = {table.name: table for table in tables}
@@ -83,7 +84,7 @@ class Journal:
         try:
             self.path.parent.mkdir(parents=True, exist_ok=True)
         except OSError as error:
-            raise CaseError(f"The result file {str(self.path)!r} cannot be written ({error.strerror}).") from None
+            raise unwritable(self.path, error) from None
         self._lock = WriterLock(self.path)
         self._file: h5py.File | None = None
         new = self.path.with_name(f".{self.path.name}.{os.getpid()}.new")
@@ -98,8 +99,8 @@ class Journal:
                 table.create(file.require_group("tables"))
             log = file.create_dataset("log", (0,), "u1", maxshape=(None,), chunks=(4096,))
             log.attrs["description"] = "JSON documents, each closed by a line feed"
-            if first is not None:
-                first(self)
+            if known is not None:
+                self._copy(known)
             file.swmr_mode = True  # before it has the name: whoever opens it then sees that it grows
             self._lock.move(new)
         except BaseException:
@@ -134,6 +135,12 @@ class Journal:
         marks.resize(before + added, axis=0)
         marks[before:] = 1
         self._file.flush()
+
+    def _copy(self, record: Record) -> None:
+        """Add all rows and notes of a record."""
+        for name, table in self._tables.items():
+            self.extend(name, {c.name: record.column(name, c.name) for c in table.columns})
+        self.write_log(pack_documents(record.log))
 
     def write_log(self, documents: bytes) -> None:
         """Add documents, packed as lines, to the log.
@@ -309,15 +316,8 @@ class GrowingRecord(Record, Observer):
                     self.extend(name, {c.name: known.column(name, c.name) for c in table.columns})
             self._log.extend(known.log)
         if self.path is not None:
-            self._journal = Journal(self.path, header, mesh, self.tables.values(), self._write_known)
+            self._journal = Journal(self.path, header, mesh, self.tables.values(), self)
         self.note("begin")
-
-    def _write_known(self, journal: Journal) -> None:
-        for name in self.tables:
-            if self.rows(name):
-                journal.extend(name, {c: self.column(name, c) for c in self._rows[name]})
-        if self._log:
-            journal.write_log(pack_documents(self._log))
 
     # -- reading ----
 
@@ -490,11 +490,7 @@ def copy_record(record: Record, tables: Iterable[TableSpec], path: str | Path) -
     CaseError
         If it cannot be written.
     """
-    tables = tuple(tables)
-    with Journal(path, record.header, record.mesh, tables) as journal:
-        for table in tables:
-            journal.extend(table.name, {c.name: record.column(table.name, c.name) for c in table.columns})
-        journal.write_log(pack_documents(record.log))
+    Journal(path, record.header, record.mesh, tables, record).close()
 
 
 def plain(value: Any) -> Any:

@@ -149,7 +149,8 @@ def export_result(result: Any, path: str | Path, quarter: bool = False, deformed
         raise CaseError(f"The {result.kind} result of {result.header.name!r} holds no state that could be exported.")
     path = Path(path)
     if path.suffix.lower() not in (".vtkhdf", ".hdf"):
-        path = path / f"{result.header.name}-{result.kind}{_suffix(choices)}.vtkhdf"
+        chosen = "".join(f"-{name}{value}" for name, value in choices.items())
+        path = path / f"{result.header.name}-{result.kind}{chosen}.vtkhdf"
     units = _UNITS | {name: "Pa" for name in steps[0].cell_data if name.startswith("von_mises")}
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
@@ -159,10 +160,6 @@ def export_result(result: Any, path: str | Path, quarter: bool = False, deformed
             f"{str(path)!r} cannot be written ({error.strerror or 'the folder may not be written'})."
         ) from error
     return path
-
-
-def _suffix(choices: dict[str, Any]) -> str:
-    return "".join(f"-{name}{value}" for name, value in choices.items())
 
 
 def _moved(steps: Sequence[Step], valve: WholeValve, deformed: bool) -> Iterator[Step]:
