@@ -21,6 +21,7 @@ from ..drawing.style import (
     headline,
     kilopascals,
     new_figure,
+    some_of,
 )
 from .foam import FlowCase, FlowFields
 
@@ -83,25 +84,17 @@ class FlowComparison:
         total = np.bincount(cells.station, weight * self._pressure, count)
         return total / np.bincount(cells.station, weight, count) - self.back
 
-    def _wall(self, block: str, ring: int, patch: str) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Pressures (k,), area vectors (k, 3) out of the fluid and places (k, 3) of the faces of a wall, section by
-        section.
+    def _by_row(self, block: str, ring: int, patch: str) -> tuple[np.ndarray, np.ndarray]:
+        """Mean pressures (rows - 1,), Pa, and forces in y (rows - 1,), N, of a wall between the rows of the shell; what
+        lies between two sections of the mesh is spread evenly.
         """
         domain, cells = self.case.domain, self.case.cells
         beside = cells.beside(block, ring)[domain.lip : domain.flange].ravel()
         corners = cells.points[cells.patches[patch]]
-        area = 0.5 * np.cross(corners[:, 2] - corners[:, 0], corners[:, 3] - corners[:, 1])
-        centre = corners.mean(axis=1)
-        inwards = np.einsum("ki,ki->k", area, centre - cells.centres[beside]) < 0
+        area = 0.5 * np.cross(corners[:, 2] - corners[:, 0], corners[:, 3] - corners[:, 1])  # (k, 3), out of the fluid
+        inwards = np.einsum("ki,ki->k", area, corners.mean(axis=1) - cells.centres[beside]) < 0
         area[inwards] *= -1.0
-        return self._pressure[beside] - self.back, area, centre
-
-    def _by_row(self, block: str, ring: int, patch: str) -> tuple[np.ndarray, np.ndarray]:
-        """Mean pressures (rows - 1,), Pa, and forces in y (rows - 1,), N, between the rows of the shell; what lies
-        between two sections of the mesh is spread evenly.
-        """
-        pressure, area, _ = self._wall(block, ring, patch)
-        domain = self.case.domain
+        pressure = self._pressure[beside] - self.back
         places = domain.stations[domain.lip : domain.flange + 1]
         row = np.repeat(np.arange(len(places) - 1), domain.pattern.around)
         size = np.linalg.norm(area, axis=1)
@@ -202,8 +195,7 @@ class FlowComparison:
             f"law {s['law_opening_force']:.1f} N.",
             f"{'z mm':>7}{'inside':>9}{'outside':>9}{'net':>9}{'law kPa':>9}{'force':>9}{'law N':>9}",
         ]
-        count = len(rows["z"])
-        for i in np.unique(np.linspace(0, count - 1, min(count, 13)).round().astype(int)):
+        for i in some_of(list(range(len(rows["z"]))), 13):
             kilo = "".join(f"{rows[name][i] / 1e3:>9.2f}" for name in ("inside", "outside", "net", "law"))
             lines.append(f"{1e3 * rows['z'][i]:>7.0f}{kilo}{rows['force'][i]:>9.2f}{rows['law_force'][i]:>9.2f}")
         return lines

@@ -257,7 +257,7 @@ class Domain:
         """Axial places of the sections from the outlet to the inlet, m, relative to lip and flange within the valve."""
         lip, flange = self.rows[0], self.rows[-1]
         length = flange - lip
-        inside = lip + length * _spread(AT_LIP / self.fineness, INSIDE / self.fineness)
+        inside = lip + length * _outward(AT_LIP / self.fineness, 1.12, INSIDE / self.fineness, 1.0)
         growth = 1.0 + (STRETCH - 1.0) / self.fineness
         down = 2.0 * self.radius if not self.free else 2.0 * self.bore
         behind = _outward(AT_LIP * length / self.fineness, growth, LONGEST * down / self.fineness, DOWNSTREAM * down)
@@ -308,16 +308,8 @@ class Domain:
         return section_nodes(*faces, self.radius, self.pattern)
 
 
-def _spread(first: float, usual: float) -> np.ndarray:
-    """Places 0..1 of steps that grow from `first` at 0 to `usual`."""
-    steps = [first]
-    while sum(steps) < 1.0:
-        steps.append(min(usual, 1.12 * steps[-1]))
-    return np.concatenate([[0.0], np.cumsum(steps)]) / sum(steps)
-
-
 def _outward(first: float, growth: float, longest: float, length: float) -> np.ndarray:
-    """Places from 0 to `length` of steps that grow from `first`."""
+    """Places from 0 to `length` of steps that grow from `first` to `longest`."""
     steps = [first]
     while sum(steps) < length:
         steps.append(min(longest, growth * steps[-1]))
