@@ -1,10 +1,13 @@
-"""Short texts: numbers in sentences, and what `repr` shows of objects that hold arrays and other objects."""
+"""Short texts: numbers and words in sentences, values for JSON, and what `repr` shows of objects that hold arrays and
+other objects.
+"""
 
 from __future__ import annotations
 
+import math
 import textwrap
-from collections.abc import Mapping, Sequence, Set
-from dataclasses import fields, is_dataclass
+from collections.abc import Iterable, Mapping, Sequence, Set
+from dataclasses import asdict, fields, is_dataclass
 from itertools import islice
 from typing import Any
 
@@ -22,6 +25,33 @@ def digits(value: float, count: int = 3, sign: str = "") -> str:
     """
     shown = float(f"{value:.{count}g}")
     return f"{shown:{sign}.0f}" if 10.0 ** (count - 1) <= abs(shown) < 1e9 else f"{shown:{sign}.{count}g}"
+
+
+def listed(words: Iterable[str]) -> str:
+    """Words of a sentence, "a, b and c"."""
+    found = list(words)
+    return f"{', '.join(found[:-1])} and {found[-1]}" if len(found) > 1 else "".join(found)
+
+
+def json_value(value: Any) -> Any:
+    """A value as JSON has it: arrays become lists, numbers that are not finite null."""
+    if hasattr(value, "tolist"):  # numpy and JAX arrays and scalars
+        value = value.tolist()
+    if isinstance(value, complex):
+        return {"re": json_value(value.real), "im": json_value(value.imag)}
+    if isinstance(value, float):
+        return value if math.isfinite(value) else None
+    if isinstance(value, dict):
+        return {str(k): json_value(v) for k, v in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [json_value(v) for v in value]
+    if value is None or isinstance(value, (bool, int, str)):
+        return value
+    if is_dataclass(value):
+        return json_value(asdict(value))
+    if hasattr(value, "to_dict"):
+        return json_value(value.to_dict())
+    return str(value)
 
 
 def short_repr(thing: Any) -> str:

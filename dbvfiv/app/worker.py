@@ -12,7 +12,6 @@ import ctypes
 import gc
 import io
 import json
-import math
 import os
 import queue
 import sys
@@ -25,8 +24,8 @@ import numpy as np
 
 from ..api import Valve, load
 from ..case.write import case_toml
-from ..drawing.style import draw_figures, style
-from ..drawing.views import ValveSkin, drawers_of
+from ..drawing.style import style
+from ..drawing.views import ValveSkin, valve_figure
 from ..errors import CaseError, SolveError
 from ..explore import Answer, Explorer
 from ..model.equilibria import model_warnings
@@ -35,6 +34,7 @@ from ..record.files import reading
 from ..record.mesh import MeshData
 from ..shell.recovery import layer_fields
 from ..studies.session import find_study, load_result
+from ..texts import json_value
 from .sheet import shown_as, stay_inside
 
 #: Time without a question after which the reduced operator is enriched, s.
@@ -59,9 +59,8 @@ class Desk:
     def describe(self, case: str) -> dict[str, Any]:
         """Drawing, sizes and warnings of a case file."""
         model = load(case).session.described
-        figure = draw_figures(drawers_of(model), (), "case")["valve"]
         with style():
-            figure.savefig(drawn := io.BytesIO(), format="png", dpi=90)
+            valve_figure(model).savefig(drawn := io.BytesIO(), format="png", dpi=90)
         picture = base64.b64encode(drawn.getvalue()).decode()
         return {"picture": picture, "sizes": ValveSizes.of(model).lines(), "notes": list(model_warnings(model))}
 
@@ -123,10 +122,9 @@ class Desk:
         for name, stretch in zip(mesh.layer_titles(), found.stretch[:, :, 1].T):
             summed = np.bincount(mesh.quads.ravel(), np.repeat(stretch, 4), len(mesh.nodes))
             colours[f"Largest strain of {name}, %"] = 100 * (summed / often - 1)
-        triangles = np.concatenate([skin.quads[:, [0, 1, 2]], skin.quads[:, [0, 2, 3]]])
         points = np.round(skin.points(state.nodal), 5)
-        whole = {name: np.round(np.tile(field[skin.valve.node], 2), 4) for name, field in colours.items()}
-        return {"points": points, "triangles": triangles, "colours": whole}
+        whole = {name: np.round(skin.spread(field), 4) for name, field in colours.items()}
+        return {"points": points, "triangles": skin.triangles, "colours": whole}
 
     def motion(self, values: dict[str, float], frames: int = 12) -> dict[str, Any]:
         """One cycle of the leading mode that oscillates, as corners of the skin, m, with a sentence on it."""
@@ -165,22 +163,11 @@ def write_table(result: Any, spec: Any, folder: Path) -> Path | None:
     return path
 
 
-def plain(value: Any) -> Any:
-    """A value for JSON; numbers that are not finite become None."""
-    if hasattr(value, "tolist"):
-        value = value.tolist()
-    if isinstance(value, dict):
-        return {str(k): plain(v) for k, v in value.items()}
-    if isinstance(value, (list, tuple)):
-        return [plain(v) for v in value]
-    return None if isinstance(value, float) and not math.isfinite(value) else value
-
-
 def answer(desk: Desk, question: dict[str, Any]) -> dict[str, Any]:
     """Answer to a question; what goes wrong as a sentence."""
     number, name = question.pop("id"), question.pop("do")
     try:
-        return {"id": number, "answer": plain(getattr(desk, name)(**question))}
+        return {"id": number, "answer": json_value(getattr(desk, name)(**question))}
     except (CaseError, SolveError) as error:
         return {"id": number, "error": str(error)}
     except Exception as error:  # told on the page; the next question may be a better one

@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 import json
-import math
 import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import asdict, is_dataclass
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -16,6 +14,7 @@ import typer
 from ..case.units import Units
 from ..errors import CaseError, SolveError
 from ..studies.request import is_sheet
+from ..texts import json_value
 
 #: Suffixes that promise another format than that of result files.
 OTHER_FORMATS = (".json", ".toml", ".html", ".pdf", ".png", ".svg")
@@ -70,7 +69,7 @@ def in_units(units: Units) -> Iterator[None]:
 
 def print_json(document: Any) -> None:
     """Print one JSON document; arrays become lists, numbers that are not finite become null."""
-    json.dump(_plain(document), sys.stdout, indent=1, allow_nan=False)
+    json.dump(json_value(document), sys.stdout, indent=1, allow_nan=False)
     sys.stdout.write("\n")
 
 
@@ -121,23 +120,3 @@ def save_figures(drawers: Mapping[str, Callable[[], Any]], folder: Path | None) 
     from ..drawing.style import draw_figures, write_figures
 
     return [] if folder is None else write_figures(draw_figures(drawers, (), "result"), folder)
-
-
-def _plain(value: Any) -> Any:
-    if hasattr(value, "tolist"):  # numpy and JAX arrays and scalars
-        value = value.tolist()
-    if isinstance(value, complex):
-        return {"re": _plain(value.real), "im": _plain(value.imag)}
-    if isinstance(value, float):
-        return value if math.isfinite(value) else None
-    if isinstance(value, dict):
-        return {str(k): _plain(v) for k, v in value.items()}
-    if isinstance(value, (list, tuple)):
-        return [_plain(v) for v in value]
-    if value is None or isinstance(value, (bool, int, str)):
-        return value
-    if is_dataclass(value):
-        return _plain(asdict(value))
-    if hasattr(value, "to_dict"):
-        return _plain(value.to_dict())
-    return str(value)

@@ -10,11 +10,10 @@ from pathlib import Path
 import numpy as np
 from matplotlib.figure import Figure
 
-from ..errors import CaseError
 from ..verdict import Series, Verdict, spectrum
 from ..verdict.lines import envelope
 from ..verdict.series import smoothed
-from .style import ACCENT, COMPUTED, new_figure, style
+from .style import ACCENT, COMPUTED, draw_figures, new_figure, write_figures
 
 #: Cycles in the zoom, peaks of the spectrum with labels, and points of the phase portrait at most.
 CYCLES, PEAKS, POINTS = 10, 6, 20_000
@@ -104,11 +103,6 @@ def save_signal(folder: Path, name: str, time: np.ndarray, values: np.ndarray, v
     CaseError
         If the folder cannot be written.
     """
-    path = Path(folder) / f"{re.sub(r'[^A-Za-z0-9]+', '-', name).strip('-') or 'signal'}.png"
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        with style():
-            signal(name, time, values, verdict).savefig(path)
-    except OSError as error:
-        raise CaseError(f"The folder {str(folder)!r} cannot be written ({error.strerror or error}).") from error
-    return path
+    stem = re.sub(r"[^A-Za-z0-9]+", "-", name).strip("-") or "signal"
+    figures = draw_figures({stem: lambda: signal(name, time, values, verdict)}, (), "record")
+    return write_figures(figures, folder)[0]

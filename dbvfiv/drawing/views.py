@@ -109,6 +109,11 @@ class ValveSkin:
         rim = edges[where[often == 1]]
         return np.concatenate([quads, quads + count, np.hstack([rim, rim[:, ::-1] + count])])
 
+    @property
+    def triangles(self) -> np.ndarray:
+        """(2 n, 3) points of the halves of the quadrilaterals."""
+        return np.concatenate([self.quads[:, [0, 1, 2]], self.quads[:, [0, 2, 3]]])
+
     def points(self, nodal: np.ndarray) -> np.ndarray:
         """(2 np, 3) m, the outer face first, from nodal unknowns (nn, c) of the part."""
         inner, outer = faces(self.mesh, nodal)
@@ -129,12 +134,15 @@ class ValveSkin:
 
     def means(self, field: np.ndarray) -> np.ndarray:
         """(n,) mean over each quadrilateral of a field (nn,) of the part's nodes."""
-        both = np.tile(field[self.valve.node], 2)
-        return both[self.quads].mean(axis=1)
+        return self.spread(field)[self.quads].mean(axis=1)
+
+    def spread(self, field: np.ndarray) -> np.ndarray:
+        """(2 np,) values at the points of a field (nn,) of the part's nodes."""
+        return np.tile(field[self.valve.node], 2)
 
 
-#: Of displacements.
-COLOURS = matplotlib.colormaps[MOTION]
+#: Of displacements, and of the thickness of the wall.
+COLOURS, _THICKNESS = matplotlib.colormaps[MOTION], matplotlib.colormaps[MAGNITUDE]
 _LIGHT = np.array([-0.35, -0.45, 0.82])
 
 
@@ -150,22 +158,23 @@ def draw_skin(axes, corners: np.ndarray, colours: np.ndarray, zoom: float) -> No
     """A small view without axes of quadrilaterals (n, 4, 3) and their colours (n, 4)."""
     colours = shaded(corners, colours)
     axes.add_collection3d(Poly3DCollection(corners, facecolors=colours, edgecolors=colours, linewidths=0.1))
-    low, high = corners.min(axis=(0, 1)), corners.max(axis=(0, 1))
+    _look_at(axes, corners.reshape(-1, 3), zoom)
+    axes.set_axis_off()
+
+
+def _look_at(axes, points: np.ndarray, zoom: float) -> None:
+    """Fit three-dimensional axes to points (k, 3), all directions to one scale, seen from above the lips."""
+    low, high = points.min(axis=0), points.max(axis=0)
     for set_limits, a, b in zip((axes.set_xlim, axes.set_ylim, axes.set_zlim), low, high):
         set_limits(a, b)
     axes.set_box_aspect(high - low, zoom=zoom)
     axes.view_init(elev=26, azim=-140)
-    axes.set_axis_off()
 
 
 def frame(axes, points: np.ndarray) -> None:
-    """Fit three-dimensional axes to points (k, 3), all directions to one scale."""
-    low, high = points.min(axis=0), points.max(axis=0)
-    for set_limits, a, b in zip((axes.set_xlim, axes.set_ylim, axes.set_zlim), low, high):
-        set_limits(a, b)
-    axes.set_box_aspect(high - low, zoom=1.12)
+    """Fit three-dimensional axes with their names to points (k, 3), mm, all directions to one scale."""
+    _look_at(axes, points, zoom=1.12)
     axes.set_proj_type("persp", focal_length=0.6)
-    axes.view_init(elev=26, azim=-140)
     axes.set_xlabel("z, mm", labelpad=12)
     axes.set_ylabel("x, mm", labelpad=8)
     axes.set_zlabel("y, mm", labelpad=2)
@@ -288,14 +297,8 @@ def layer_panels(mesh, values: np.ndarray, label: str, titles: Sequence[str] | N
     return figure, list(panels[: len(values)])
 
 
-_COLOURS = matplotlib.colormaps[MAGNITUDE]
 #: Of rubbers and of plies in the picture of the layers.
 _RUBBER, _PLY = "#c9ced6", "#e8b878"
-
-
-def drawers_of(model: ValveModel) -> dict[str, Callable[[], Figure]]:
-    """Pictures of a valve by name."""
-    return {"valve": lambda: valve_figure(model)}
 
 
 def valve_figure(model: ValveModel) -> Figure:
@@ -331,7 +334,7 @@ def _in_space(axes, mesh: MeshData, scale: Normalize) -> None:
     cells = len(skin.valve.quads)
     values = np.concatenate([1e3 * mesh.thickness[skin.valve.cell]] * 2)
     rim = len(skin.quads) - 2 * cells
-    colours = np.concatenate([_COLOURS(scale(values)), np.full((rim, 4), (0.75, 0.75, 0.75, 1.0))])
+    colours = np.concatenate([_THICKNESS(scale(values)), np.full((rim, 4), (0.75, 0.75, 0.75, 1.0))])
     draw_skin(axes, corners, colours, zoom=1.12)
 
 
@@ -406,12 +409,12 @@ def _wall(figure: Figure, axes: Axes, mesh: MeshData, scale: Normalize) -> None:
     """Thickness over the unrolled part."""
     arc, z = unrolled(mesh)
     values = 1e3 * mesh.thickness.reshape(mesh.shape[::-1])
-    axes.pcolormesh(1e3 * z, 1e3 * arc, values, cmap=_COLOURS, norm=scale, shading="flat", edgecolor="1", lw=0.1)
+    axes.pcolormesh(1e3 * z, 1e3 * arc, values, cmap=_THICKNESS, norm=scale, shading="flat", edgecolor="1", lw=0.1)
     axes.set_xlabel("z, mm")
     axes.set_ylabel(f"Arc from {mesh.part.middle}, mm")
     axes.grid(False)
     axes.set_title("Thickness and mesh", loc="left", fontweight="bold")
-    colour_bar(figure, ScalarMappable(scale, _COLOURS), axes, "Wall, mm", aspect=18)
+    colour_bar(figure, ScalarMappable(scale, _THICKNESS), axes, "Wall, mm", aspect=18)
 
 
 def _layers(axes: Axes, model: ValveModel, mesh: MeshData) -> None:
