@@ -28,7 +28,7 @@ from dbvfiv.materials.laws import (
 )
 from dbvfiv.materials.prony import Prony, PronyFit, fit_constant
 from dbvfiv.materials.shipped import published_rubber, rubber, shipped_loss, shipped_loss_names
-from dbvfiv.texts import shortly
+from dbvfiv.texts import listed, shortly
 
 if TYPE_CHECKING:
     from dbvfiv.case import Case
@@ -260,19 +260,6 @@ _STEPS = (1.0, 2.0, 5.0)
 _SHARE = 1e-9
 
 
-@dataclass(frozen=True)
-class RayleighMatch:
-    """Rayleigh's constants, 1/s and s, that damp as a material does at two frequencies, Hz; one is negative where no
-    Rayleigh damping meets both damping ratios.
-    """
-
-    name: str
-    frequencies: tuple[float, float]
-    ratios: tuple[float, float]
-    alpha: float
-    beta: float
-
-
 @shortly
 @dataclass(frozen=True)
 class DampingReport:
@@ -319,10 +306,16 @@ class DampingReport:
         """Damping ratio by alpha and beta of the case."""
         return rayleigh_ratio(frequency, self.case.damping.alpha, self.case.damping.beta)
 
-    def matches(self, at: tuple[float, float]) -> tuple[RayleighMatch, ...]:
-        """Rayleigh's constants for each material at two frequencies, Hz."""
-        ratios = {m.name: tuple(float(x) for x in self.material_ratio(m, np.array(at))) for m in self.materials}
-        return tuple(RayleighMatch(name, tuple(at), own, *rayleigh_constants(own, at)) for name, own in ratios.items())
+    def matches(self, at: tuple[float, float]) -> list[dict[str, Any]]:
+        """Rayleigh's constants, 1/s and s, that damp as each material does at two frequencies, Hz; one is negative
+        where no Rayleigh damping meets both damping ratios.
+        """
+        found = []
+        for m in self.materials:
+            ratios = tuple(float(x) for x in self.material_ratio(m, np.array(at)))
+            alpha, beta = rayleigh_constants(ratios, at)
+            found.append({"name": m.name, "frequencies": at, "ratios": ratios, "alpha": alpha, "beta": beta})
+        return found
 
     def summary(self, at: tuple[float, float] | None = None) -> dict[str, Any]:
         """Plain numbers for JSON."""
@@ -338,7 +331,7 @@ class DampingReport:
             "materials": [self._entry(material, frequency) for material in self.materials],
         }
         if at is not None:
-            found["matches"] = list(self.matches(at))
+            found["matches"] = self.matches(at)
             found["warning"] = outside_band(self.case, at)
         return found
 
@@ -387,13 +380,11 @@ class DampingReport:
         return lines
 
     def _match_lines(self, at: tuple[float, float]) -> list[str]:
-        rows = [
-            (m.name, f"{m.ratios[0]:.4g}", f"{m.ratios[1]:.4g}", f"{m.alpha:.4g}", f"{m.beta:.4g}")
-            for m in self.matches(at)
-        ]
+        found = self.matches(at)
+        rows = [(m["name"], *(f"{x:.4g}" for x in (*m["ratios"], m["alpha"], m["beta"]))) for m in found]
         titles = ("material", f"at {at[0]:g} Hz", f"at {at[1]:g} Hz", "alpha, 1/s", "beta, s")
         lines = ["", "Rayleigh damping of the same ratio at both frequencies (Eq. 5.5):", *_table(titles, rows)]
-        if any(min(m.alpha, m.beta) < 0 for m in self.matches(at)):
+        if any(min(m["alpha"], m["beta"]) < 0 for m in found):
             lines.append("A negative constant: no Rayleigh damping meets both ratios.")
         outside = outside_band(self.case, at)
         return [*lines, *([f"Note: {outside}"] if outside else [])]
@@ -429,7 +420,7 @@ def outside_band(case: Case, frequencies: Iterable[float]) -> str | None:
     if not beyond.size:
         return None
     if beyond.size <= 3:
-        which = f"{_listed([f'{f:.4g}' for f in beyond])} Hz"
+        which = f"{listed(f'{f:.4g}' for f in beyond)} Hz"
     else:
         which = f"{beyond.size} of {asked.size} frequencies, between {beyond[0]:.4g} and {beyond[-1]:.4g} Hz,"
     verb = "lies" if beyond.size == 1 else "lie"
@@ -473,7 +464,3 @@ def _table(titles: Sequence[str], rows: Sequence[Sequence[str]]) -> list[str]:
     """Lines of a table, its columns aligned."""
     widths = [max(len(row[i]) for row in (titles, *rows)) for i in range(len(titles))]
     return ["  ".join(cell.ljust(width) for cell, width in zip(row, widths)).rstrip() for row in (titles, *rows)]
-
-
-def _listed(words: list[str]) -> str:
-    return words[0] if len(words) == 1 else ", ".join(words[:-1]) + f" and {words[-1]}"

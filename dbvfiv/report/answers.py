@@ -14,7 +14,7 @@ import numpy as np
 
 from ..materials.shipped import shipped_loss, shipped_loss_names
 from ..studies.closure.safety import BUCKLING, CROSSING, END, SEAL, rated_verdict
-from ..texts import digits
+from ..texts import digits, listed
 from .gather import Gathered, second_mesh
 
 YES, NO, UNKNOWN = "yes", "no", "not examined"
@@ -333,12 +333,6 @@ def trade(found: Gathered) -> list[tuple[str, str]]:
         leak = "not examined" if told is None or told["leak"] is None else f"{digits(told['leak'] * 3.6e6)} L/h"
         rows += [("leak rate there", leak)]
     return rows
-
-
-def listed(words: Iterable[str]) -> str:
-    """Words of a sentence, "a, b and c"."""
-    found = list(words)
-    return f"{', '.join(found[:-1])} and {found[-1]}" if len(found) > 1 else "".join(found)
 
 
 def _verdict(verdict) -> str:

@@ -21,8 +21,8 @@ from ..fit.cards import describe_damping, law_from_case
 from ..materials.stability import StableRange, stable_range
 from ..model.symmetry import symmetry_named
 from ..record.mesh import MeshData
-from ..texts import digits
-from .answers import listed, loss_range
+from ..texts import digits, listed
+from .answers import loss_range
 from .figures import closure_figure, headloss_figure, live_valve, pipe_figure, vibration_figure
 from .gather import Gathered, is_on_own_mesh
 

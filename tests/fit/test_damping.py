@@ -313,7 +313,7 @@ def test_the_report_halves_the_loss_factor_and_counts_the_factor_on_all():
     assert report.material_ratio(report.materials[0], 20.0) == pytest.approx(0.05, rel=0.03)
     summary = report.summary((5.0, 40.0))
     match = summary["matches"][0]
-    np.testing.assert_allclose(rayleigh_ratio([5.0, 40.0], match.alpha, match.beta), match.ratios, rtol=1e-12)
+    np.testing.assert_allclose(rayleigh_ratio([5.0, 40.0], match["alpha"], match["beta"]), match["ratios"], rtol=1e-12)
     assert summary["frequencies"][0] == 1.0 and summary["frequencies"][-1] == 200.0 and 20.0 in summary["frequencies"]
 
 
