@@ -224,18 +224,18 @@ def _narrow_band(rng):
     return b.record("a mode driven by noise", motion / motion.std(), IRREGULAR, **truths)
 
 
-def _rossler(_, y):
+def rossler(_, y):
     return [-y[1] - y[2], y[0] + 0.2 * y[1], 0.2 + y[2] * (y[0] - 5.7)]
 
 
-def _lorenz(_, y):
+def lorenz(_, y):
     return [10 * (y[1] - y[0]), y[0] * (28 - y[2]) - y[1], y[0] * y[1] - 8 / 3 * y[2]]
 
 
 def _chaos(rng):
     b = _until(lambda: Bench(rng, (0.005, 0.1), 60), lambda b: 2000 < len(b.t) < 60_000)
     if rng.random() < 0.6:
-        system, span, names = (_lorenz, rng.uniform(40, 120), IRREGULAR)
+        system, span, names = (lorenz, rng.uniform(40, 120), IRREGULAR)
         start = [1, 1, 1]
         run = solve_ivp(system, (0, span + 21), start, t_eval=20 + span * b.t / b.t[-1], rtol=1e-8)
         motion = run.y[rng.choice([0, 2])]

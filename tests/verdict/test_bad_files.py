@@ -1,7 +1,11 @@
 """Bad files: every one is judged or answered by a sentence, none ends in a traceback."""
 
+import json
+
 import numpy as np
 import pytest
+
+from tests.verdict.test_record import text_of
 
 FILES = 2000
 HEADS = (
@@ -79,43 +83,89 @@ def spoiled(rng):
     return bytes(data)
 
 
-def answer(command_line, folder, seed):
-    rng = np.random.default_rng([11, seed])
-    file = folder / "spoiled.csv"
-    file.write_bytes(spoiled(rng))
-    options = [
-        [],
-        ["--skip-bad"],
-        ["--rate", "100"],
-        ["-c", "2"],
-        ["--time-unit", "ms"],
-        ["--since", "0.1"],
-        ["--json"],
+def injured(rng) -> bytes:
+    """A record with a few random injuries of its bytes."""
+    count = int(rng.integers(0, 120))
+    columns = int(rng.integers(1, 4))
+    t = np.cumsum(rng.uniform(0.5, 1.5, count) if rng.random() < 0.3 else np.full(count, 1.0)) * 10.0 ** rng.integers(
+        -6, 6
+    )
+    data = [t] + [rng.normal(size=count) * 10.0 ** rng.integers(-9, 9) + rng.normal() for _ in range(columns - 1)]
+    separator = rng.choice([",", ";", "\t", " ", ", ", "  "])
+    decimal = rng.choice([".", ","]) if separator.strip() != "," else "."
+    header = rng.choice(["", "time,p,q", "time [ms];p;q", "# a b", "t/s x\ns Pa", "Zeit\tDruck", "é,ü", '"a', "[s]"])
+    text = text_of(np.column_stack(data), str(header), str(separator), str(decimal))
+    encoding = rng.choice(["utf-8", "latin-1", "utf-8-sig", "utf-16"])
+    raw = bytearray(text.encode(str(encoding), "replace"))
+    words = [
+        b"nan",
+        b"inf",
+        b"-",
+        b",,",
+        b";;",
+        b"1e308",
+        b"1e99",
+        b"\n\n",
+        b"#",
+        b'"',
+        b"\xb5",
+        b"\0",
+        b"\r",
+        b"text",
+        b"1_0",
+        b" ",
     ]
-    return command_line("verdict", file, *options[int(rng.integers(len(options)))]), file
+    for _ in range(int(rng.integers(0, 6))):
+        at = int(rng.integers(0, len(raw) + 1))
+        kind = rng.random()
+        if kind < 0.6:
+            raw[at:at] = words[int(rng.integers(len(words)))]
+        elif kind < 0.8:
+            del raw[at : at + int(rng.integers(1, 20))]
+        else:
+            raw[at:at] = rng.integers(0, 256, 3, dtype=np.uint8).tobytes()
+    return bytes(raw)
 
 
-def check(command_line, folder, seeds):
-    refused = 0
+OPTIONS = (
+    [],
+    ["--skip-bad"],
+    ["--rate", "100"],
+    ["-c", "2"],
+    ["--time-unit", "ms"],
+    ["--since", "0.1"],
+    ["--json"],
+    ["--skip-bad", "--json"],
+    ["--rate", "10", "--skip-bad", "--json"],
+)
+
+
+def check(command_line, one_sentence, file, make, seeds):
+    """Judge or refuse every file in a sentence; a fair share of both."""
+    outcomes = {0: 0, 2: 0}
     for seed in seeds:
-        told, _ = answer(command_line, folder, seed)
-        assert told.status in (0, 2), (seed, told.status, told.err[-400:])
-        assert "Traceback" not in told.err and "Warning:" not in told.err, (seed, told.err[-400:])
+        rng = np.random.default_rng([11, seed])
+        file.write_bytes(make(rng))
+        options = OPTIONS[int(rng.integers(len(OPTIONS)))]
+        told = command_line("verdict", file, *options)
+        assert told.status in outcomes, (seed, told.status, told.err[-400:])
+        assert "Traceback" not in told.err and "Warning" not in told.err, (seed, told.err[-400:])
         if told.status:
-            refused += 1
-            assert told.err.strip().endswith((".", ")")) and "spoiled.csv" in told.err.replace("\n", ""), (
-                seed,
-                told.err,
-            )
+            assert one_sentence(told.err) and file.name in told.err.replace("\n", ""), (seed, told.err)
+        elif "--json" in options:
+            json.loads(told.out, parse_constant=lambda name: pytest.fail(f"{name} in the JSON of {seed}"))
         else:
             assert told.out.strip(), seed
-    return refused
+        outcomes[told.status] += 1
+    assert min(outcomes.values()) > 0.1 * len(seeds), outcomes
 
 
-def test_bad_files_are_answered_by_sentences(command_line, tmp_path):
-    assert 10 < check(command_line, tmp_path, range(60)) < 60
+@pytest.mark.parametrize("make", [spoiled, injured])
+def test_bad_files_are_answered_by_sentences(command_line, one_sentence, tmp_path, make):
+    check(command_line, one_sentence, tmp_path / "spoiled.csv", make, range(55))
 
 
 @pytest.mark.slow
-def test_no_bad_file_ends_in_a_traceback(command_line, tmp_path):
-    assert check(command_line, tmp_path, range(60, 60 + FILES)) > FILES / 4
+@pytest.mark.parametrize("make", [spoiled, injured])
+def test_no_bad_file_ends_in_a_traceback(command_line, one_sentence, tmp_path, make):
+    check(command_line, one_sentence, tmp_path / "spoiled.csv", make, range(55, FILES))

@@ -6,6 +6,7 @@ from scipy.integrate import solve_ivp
 from scipy.signal import butter, lfilter
 
 from dbvfiv.verdict import judge
+from tests.verdict.library import lorenz, rossler
 
 T = np.linspace(0.0, 10.0, 10001)
 W = 2 * np.pi * 3.0
@@ -147,22 +148,13 @@ def test_cycles_under_noise(name):
     assert verdict.periodicity_error > 0.02
 
 
-@pytest.mark.parametrize("name", GROWING)
-def test_growing(name):
-    verdict = judge(T, GROWING[name])
-    assert verdict.name == "growing", verdict.reason
+MOVING = {"growing": GROWING, "decaying": DECAYING, "irregular": IRREGULAR}
 
 
-@pytest.mark.parametrize("name", DECAYING)
-def test_decaying(name):
-    verdict = judge(T, DECAYING[name])
-    assert verdict.name == "decaying", verdict.reason
-
-
-@pytest.mark.parametrize("name", IRREGULAR)
-def test_irregular(name):
-    verdict = judge(T, IRREGULAR[name])
-    assert verdict.name == "irregular", verdict.reason
+@pytest.mark.parametrize("name, series", [(name, series) for name, known in MOVING.items() for series in known])
+def test_growing_decaying_and_irregular(name, series):
+    verdict = judge(T, MOVING[name][series])
+    assert verdict.name == name, verdict.reason
 
 
 @pytest.mark.parametrize("name", UNDECIDED)
@@ -282,14 +274,6 @@ def test_van_der_pol(mu, period, amplitude):
     assert verdict.amplitude == pytest.approx(amplitude, abs=6e-7)
     early = judge(t[:400], run.y[0][:400])
     assert early.name in ("growing", "undecided")
-
-
-def rossler(t, y):
-    return [-y[1] - y[2], y[0] + 0.2 * y[1], 0.2 + y[2] * (y[0] - 5.7)]
-
-
-def lorenz(t, y):
-    return [10 * (y[1] - y[0]), y[0] * (28 - y[2]) - y[1], y[0] * y[1] - 8 / 3 * y[2]]
 
 
 @pytest.mark.parametrize(
