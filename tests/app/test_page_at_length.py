@@ -24,6 +24,14 @@ pytestmark = pytest.mark.slow
 WIDE, NARROW = (1440, 1000), (390, 844)
 
 
+@pytest.fixture
+def driver(tmp_path):
+    """A browser that keeps what it loads down in a folder of the test."""
+    found = browser(*WIDE, downloads=tmp_path / "downloads")
+    yield found
+    found.quit()
+
+
 def children(pid: int) -> list[int]:
     """Numbers of the processes below one, and of those the commands of workers."""
     psutil = pytest.importorskip("psutil")
@@ -44,67 +52,60 @@ def shoot(driver, name: str) -> None:
         driver.save_screenshot(f"{folder}/{name}.png")
 
 
-def test_a_day_with_the_page(tmp_path):
+def test_a_day_with_the_page(driver, tmp_path):
     downloads = tmp_path / "downloads"
-    driver = browser(*WIDE, downloads=downloads)
-    try:
-        with served(tmp_path) as server:
-            tab = Tab(driver, server.address)
-            tab.fill("valve.lip_half_width", "64 mm")
-            tab.wait(lambda: "bill 140 mm wide" in tab.text)
-            shoot(driver, "describe")
-            tab.go("Ask")
-            tab.wait(tab.is_confirmed)
-            tab.fill("set pressure", "1\n")
-            for name, share in (("density", 0.2), ("beta", 0.05), ("pressure", 0.4)):
-                tab.slide(name, share)
-            tab.wait(lambda: not tab.is_confirmed(), 5)
-            tab.wait(tab.is_confirmed)
-            shoot(driver, "ask")
-            tab.go("See")
-            tab.click("Stability map")
-            tab.wait(lambda: "done in" in tab.text, 300)
-            tab.click("Open")
-            tab.wait(lambda: driver.find_elements("css selector", ".js-plotly-plot .heatmaplayer image"))
-            time.sleep(1.0)
-            shoot(driver, "map")
-            click_cell(driver)
-            tab.wait(lambda: "Ask" in driver.find_element("css selector", ".q-tab--active").text.title())
-            at = lambda name: float(tab.at(f"slide {name}").get_attribute("aria-valuenow"))  # noqa: E731
-            tab.wait(lambda: abs(at("pressure") - 0.1 * 1.5 * 18e3 / 9806.65) < 0.02)  # the cell at the lower left
-            assert at("beta") == pytest.approx(0.00075, abs=3e-5)
-            tab.go("Run")
-            tab.click("Add to the queue")
-            tab.wait(lambda: re.search(r"running: .*left", tab.text), 120)
-            shoot(driver, "run")
-            tab.click("Cancel")
-            tab.wait(lambda: "cancelled" in tab.text)
-            tab.wait(lambda: "RESUME" in tab.text.upper(), 30)
-            driver.refresh()
-            tab.wait(lambda: tab.at("fits").text == "It fits.")
-            assert tab.at("valve.lip_half_width").get_attribute("value") == "64 mm"
-            tab.go("Run")
-            tab.wait(lambda: "cancelled" in tab.text and "done in" in tab.text)
-            tab.go("Describe")
-            tab.click("Save")
-            saved = tab.wait(lambda: next(downloads.glob("*.toml"), None))
-            assert load_case(saved).valve.lip_half_width == pytest.approx(0.064)
-            assert not tab.errors()
-        # the same user finds all again when the server is started anew
-        again = Served(tmp_path / "kept")
-        try:
-            tab = Tab(driver, again.address)
-            assert tab.at("valve.lip_half_width").get_attribute("value") == "64 mm"
-            tab.go("Run")
-            tab.click("Resume")
-            tab.wait(lambda: re.search(r"report of dbv6\n(done in|running|waiting)", tab.text))
-            tab.wait(lambda: re.search(r"report of dbv6\ndone in", tab.text), 600)
-            tab.click("Open")
-            tab.wait(lambda: "Open the report" in tab.text)
-        finally:
-            again.end()
-    finally:
-        driver.quit()
+    with served(tmp_path) as server:
+        tab = Tab(driver, server.address)
+        tab.fill("valve.lip_half_width", "64 mm")
+        tab.wait(lambda: "bill 140 mm wide" in tab.text)
+        shoot(driver, "describe")
+        tab.go("Ask")
+        tab.wait(tab.is_confirmed)
+        tab.fill("set pressure", "1\n")
+        for name, share in (("density", 0.2), ("beta", 0.05), ("pressure", 0.4)):
+            tab.slide(name, share)
+        tab.wait(lambda: not tab.is_confirmed(), 5)
+        tab.wait(tab.is_confirmed)
+        shoot(driver, "ask")
+        tab.go("See")
+        tab.click("Stability map")
+        tab.wait(lambda: "done in" in tab.text, 300)
+        tab.click("Open")
+        tab.wait(lambda: driver.find_elements("css selector", ".js-plotly-plot .heatmaplayer image"))
+        time.sleep(1.0)
+        shoot(driver, "map")
+        click_cell(driver)
+        tab.wait(lambda: "Ask" in driver.find_element("css selector", ".q-tab--active").text.title())
+        at = lambda name: float(tab.at(f"slide {name}").get_attribute("aria-valuenow"))  # noqa: E731
+        tab.wait(lambda: abs(at("pressure") - 0.1 * 1.5 * 18e3 / 9806.65) < 0.02)  # the cell at the lower left
+        assert at("beta") == pytest.approx(0.00075, abs=3e-5)
+        tab.go("Run")
+        tab.click("Add to the queue")
+        tab.wait(lambda: re.search(r"running: .*left", tab.text), 120)
+        shoot(driver, "run")
+        tab.click("Cancel")
+        tab.wait(lambda: "cancelled" in tab.text)
+        tab.wait(lambda: "RESUME" in tab.text.upper(), 30)
+        driver.refresh()
+        tab.wait(lambda: tab.at("fits").text == "It fits.")
+        assert tab.at("valve.lip_half_width").get_attribute("value") == "64 mm"
+        tab.go("Run")
+        tab.wait(lambda: "cancelled" in tab.text and "done in" in tab.text)
+        tab.go("Describe")
+        tab.click("Save")
+        saved = tab.wait(lambda: next(downloads.glob("*.toml"), None))
+        assert load_case(saved).valve.lip_half_width == pytest.approx(0.064)
+        assert not tab.errors()
+    # the same user finds all again when the server is started anew
+    with served(tmp_path, None) as again:
+        tab = Tab(driver, again.address)
+        assert tab.at("valve.lip_half_width").get_attribute("value") == "64 mm"
+        tab.go("Run")
+        tab.click("Resume")
+        tab.wait(lambda: re.search(r"report of dbv6\n(done in|running|waiting)", tab.text))
+        tab.wait(lambda: re.search(r"report of dbv6\ndone in", tab.text), 600)
+        tab.click("Open")
+        tab.wait(lambda: "Open the report" in tab.text)
 
 
 def click_cell(driver) -> None:
@@ -128,48 +129,44 @@ def kept(driver, address: str) -> dict[str, bytes]:
     return {link.split("/")[-1].split("?")[0]: bytes(content) for link, content in zip(links, found)}
 
 
-def test_every_picture_is_drawn_and_saved(tmp_path):
-    driver = browser(*WIDE)
+def test_every_picture_is_drawn_and_saved(driver, tmp_path):
     driver.set_script_timeout(30)
-    try:
-        unstable = COARSE.replace("beta = 0.003", "beta = 0.001\nalpha = 0") + '[fluid]\ncontinuity = "quasi-steady"\n'
-        with served(tmp_path, unstable) as server:
-            tab = Tab(driver, server.address)
-            tab.go("See")
-            tab.wait(lambda: "CLOSURE" in tab.text.upper())
-            time.sleep(1.5)
-            assert "PROBABILITY" not in tab.text.upper()  # the case has no uncertainty
-            tab.go("Describe")
-            tab.drop("sure.toml", (unstable + "[uncertainty]\nsamples = 16\n").encode())
-            tab.wait(lambda: "samples = 16" in tab.at("text").get_attribute("value"))
-            tab.go("See")
-            tab.wait(lambda: "PROBABILITY" in tab.text.upper())
-            for title, kind in (
-                ("Head-loss curve", "steady"),
-                ("Root locus over head", "sweep"),
-                ("Stability map", "map"),
-                ("Cycle amplitude", "cycle"),
-                ("Closure", "closure"),
-                ("Probability of chatter", "uncertainty"),
-            ):
-                tab.click(title)
-                state = lambda kind=kind: tab.at(f"run {kind}").text  # noqa: E731
-                tab.wait(lambda state=state: "done in" in state() or "failed" in state(), 900)
-                assert "done in" in state(), state()
-                run = tab.wait(lambda kind=kind: tab.at(f"run {kind}").find_elements("tag name", "img"))
-                time.sleep(0.5)
-                shoot(driver, f"see-{kind}")
-                files = kept(driver, run[0].get_attribute("src").split("/")[-3])
-                figures = [n for n, content in files.items() if content.startswith(b"\x89PNG")]
-                tables = [n for n, content in files.items() if n.endswith(".csv") and b"\n" in content]
-                assert figures and tables and "result.h5" in files, (kind, files.keys())
-                assert len(figures) + len(tables) + 1 == len(files), files.keys()
-            assert not tab.errors()
-    finally:
-        driver.quit()
+    unstable = COARSE.replace("beta = 0.003", "beta = 0.001\nalpha = 0") + '[fluid]\ncontinuity = "quasi-steady"\n'
+    with served(tmp_path, unstable) as server:
+        tab = Tab(driver, server.address)
+        tab.go("See")
+        tab.wait(lambda: "CLOSURE" in tab.text.upper())
+        time.sleep(1.5)
+        assert "PROBABILITY" not in tab.text.upper()  # the case has no uncertainty
+        tab.go("Describe")
+        tab.drop("sure.toml", (unstable + "[uncertainty]\nsamples = 16\n").encode())
+        tab.wait(lambda: "samples = 16" in tab.at("text").get_attribute("value"))
+        tab.go("See")
+        tab.wait(lambda: "PROBABILITY" in tab.text.upper())
+        for title, kind in (
+            ("Head-loss curve", "steady"),
+            ("Root locus over head", "sweep"),
+            ("Stability map", "map"),
+            ("Cycle amplitude", "cycle"),
+            ("Closure", "closure"),
+            ("Probability of chatter", "uncertainty"),
+        ):
+            tab.click(title)
+            state = lambda kind=kind: tab.at(f"run {kind}").text  # noqa: E731
+            tab.wait(lambda state=state: "done in" in state() or "failed" in state(), 900)
+            assert "done in" in state(), state()
+            run = tab.wait(lambda kind=kind: tab.at(f"run {kind}").find_elements("tag name", "img"))
+            time.sleep(0.5)
+            shoot(driver, f"see-{kind}")
+            files = kept(driver, run[0].get_attribute("src").split("/")[-3])
+            figures = [n for n, content in files.items() if content.startswith(b"\x89PNG")]
+            tables = [n for n, content in files.items() if n.endswith(".csv") and b"\n" in content]
+            assert figures and tables and "result.h5" in files, (kind, files.keys())
+            assert len(figures) + len(tables) + 1 == len(files), files.keys()
+        assert not tab.errors()
 
 
-def test_rubbers_records_and_results_are_dropped(tmp_path):
+def test_rubbers_records_and_results_are_dropped(driver, tmp_path):
     case = tmp_path / "six.toml"
     ringing = COARSE.replace("beta = 0.003", "beta = 0.0005")
     case.write_text(ringing)
@@ -183,92 +180,81 @@ def test_rubbers_records_and_results_are_dropped(tmp_path):
     seconds = np.arange(0, 4 * abs(1 / mode.growth_rate) + 40 / mode.frequency, 0.05 / mode.frequency)
     ring = np.exp(mode.growth_rate * seconds) * np.cos(mode.angular_frequency * seconds)
     record = "time [s],lip [mm]\n" + "".join(f"{a:.9g},{b:.9g}\n" for a, b in zip(seconds, ring))
-    driver = browser(*WIDE)
-    try:
-        with served(tmp_path, ringing) as server:
-            tab = Tab(driver, server.address)
-            tab.drop("soft.csv", test.encode())
-            tab.wait(lambda: "soft.csv is kept" in tab.text)
-            tab.unfold("Rubbers")
-            tab.fill("rubber", "soft")
-            tab.at("test").click()
-            tab._press(".q-item__label", "soft.csv")
-            tab.click("Add")
-            tab.wait(lambda: "kind fit" in tab.text and tab.at("fits").text == "It fits.")
-            tab.unfold("Layers, inside to outside")
-            tab.fill("layers.0.material", "soft")
-            tab.wait(lambda: 'material = "soft"' in tab.at("text").get_attribute("value"))
-            assert tab.at("fits").text == "It fits."
-            tab.drop("dbv6.toml", ringing.encode())  # the rubbers of the case again
-            tab.wait(lambda: 'material = "soft"' not in tab.at("text").get_attribute("value"))
-            tab.go("Ask")
-            tab.wait(tab.is_confirmed)
-            tab.fill("set pressure", "1\n")
-            tab.wait(lambda: not tab.is_confirmed(), 10)
-            tab.wait(tab.is_confirmed)
-            tab.go("Run")
-            tab.drop("bench.csv", record.encode())
-            tab.wait(lambda: "done in" in tab.at("run compare").text, 120)
-            tab.click("Open")
-            tab.wait(lambda: re.search(rf"lip.*: decayed.*It is mode {mode.number}\.", tab.text, re.DOTALL))
-            tab.wait(lambda: tab.at("run compare").find_elements("tag name", "img"))
-            shoot(driver, "record")
-            tab.drop("nonsense.h5", b"nonsense")
-            tab.wait(lambda: "nonsense.h5" in tab.text)
-            tab.drop("six.h5", result.read_bytes())
-            opened = tab.wait(lambda: tab.at("run steady"))
-            next(b for b in opened.find_elements("tag name", "button") if b.text.upper() == "OPEN").click()
-            tab.wait(lambda: opened.find_elements("tag name", "img"))
-            assert "nonsense.h5" not in opened.text
-            next(b for b in opened.find_elements("tag name", "button") if "VALVE" in b.text.upper()).click()
-            tab.wait(lambda: "279 mm long" in tab.text)
-            assert not tab.errors()
-        again = Served(tmp_path / "kept")
-        try:
-            tab = Tab(driver, again.address)
-            tab.go("Run")
-            tab.wait(lambda: tab.at("run steady") and tab.at("run compare"))
-            tab.click("Open")
-            tab.wait(lambda: tab.at("run steady").find_elements("tag name", "img"))
-        finally:
-            again.end()
-    finally:
-        driver.quit()
+    with served(tmp_path, ringing) as server:
+        tab = Tab(driver, server.address)
+        tab.drop("soft.csv", test.encode())
+        tab.wait(lambda: "soft.csv is kept" in tab.text)
+        tab.unfold("Rubbers")
+        tab.fill("rubber", "soft")
+        tab.at("test").click()
+        tab._press(".q-item__label", "soft.csv")
+        tab.click("Add")
+        tab.wait(lambda: "kind fit" in tab.text and tab.at("fits").text == "It fits.")
+        tab.unfold("Layers, inside to outside")
+        tab.fill("layers.0.material", "soft")
+        tab.wait(lambda: 'material = "soft"' in tab.at("text").get_attribute("value"))
+        assert tab.at("fits").text == "It fits."
+        tab.drop("dbv6.toml", ringing.encode())  # the rubbers of the case again
+        tab.wait(lambda: 'material = "soft"' not in tab.at("text").get_attribute("value"))
+        tab.go("Ask")
+        tab.wait(tab.is_confirmed)
+        tab.fill("set pressure", "1\n")
+        tab.wait(lambda: not tab.is_confirmed(), 10)
+        tab.wait(tab.is_confirmed)
+        tab.go("Run")
+        tab.drop("bench.csv", record.encode())
+        tab.wait(lambda: "done in" in tab.at("run compare").text, 120)
+        tab.click("Open")
+        tab.wait(lambda: re.search(rf"lip.*: decayed.*It is mode {mode.number}\.", tab.text, re.DOTALL))
+        tab.wait(lambda: tab.at("run compare").find_elements("tag name", "img"))
+        shoot(driver, "record")
+        tab.drop("nonsense.h5", b"nonsense")
+        tab.wait(lambda: "nonsense.h5" in tab.text)
+        tab.drop("six.h5", result.read_bytes())
+        opened = tab.wait(lambda: tab.at("run steady"))
+        next(b for b in opened.find_elements("tag name", "button") if b.text.upper() == "OPEN").click()
+        tab.wait(lambda: opened.find_elements("tag name", "img"))
+        assert "nonsense.h5" not in opened.text
+        next(b for b in opened.find_elements("tag name", "button") if "VALVE" in b.text.upper()).click()
+        tab.wait(lambda: "279 mm long" in tab.text)
+        assert not tab.errors()
+    with served(tmp_path, None) as again:
+        tab = Tab(driver, again.address)
+        tab.go("Run")
+        tab.wait(lambda: tab.at("run steady") and tab.at("run compare"))
+        tab.click("Open")
+        tab.wait(lambda: tab.at("run steady").find_elements("tag name", "img"))
 
 
-def test_malformed_cases_are_told(tmp_path):
-    driver = browser(*WIDE)
-    try:
-        with served(tmp_path) as server:
-            tab = Tab(driver, server.address)
-            tab.unfold("Layers, inside to outside")
-            for text, said, third_row in (
-                ("valve = [", "TOML", False),
-                ("x = " + "[" * 5000, "recursion", False),
-                ("layers = [1, 2]", "layers.0 is given as 1", True),
-                ('layers = [{ material = "CR" }, 7]', "layers.0.thickness is missing", True),
-                ('layers = "many"', "layers is given as", False),
-                ('valve = "round"', "valve is given as", False),
-                ('[valve]\nkey_points = "../../../etc/passwd"', "without their folder", False),
-            ):
-                tab.drop("bad.toml", text.encode())
-                tab.wait(lambda said=said: said in tab.at("wrong").text, 20)
-                tab.click("Add a row")
-                if third_row:
-                    tab.wait(lambda: tab.at("layers.2.material").is_displayed(), 20)
-                    assert said in tab.at("wrong").text
-                elif "many" in text:  # the usual rows stand there, and one more
-                    tab.wait(lambda: tab.at("fits").text == "It fits.", 20)
-            tab.drop("dbv6.toml", COARSE.encode())
-            tab.wait(lambda: tab.at("fits").text == "It fits.", 20)
-            tab.drop("picture.exe", b"MZ")
-            tab.wait(lambda: "is not taken" in tab.text, 20)
-            tab.wait(lambda: not driver.find_elements("css selector", ".q-uploader__file"), 20)
-            tab.drop("huge.toml", b"#" * (6 << 20))
-            time.sleep(1.0)
-            assert tab.at("fits").text == "It fits." and server.process.poll() is None
-    finally:
-        driver.quit()
+def test_malformed_cases_are_told(driver, tmp_path):
+    with served(tmp_path) as server:
+        tab = Tab(driver, server.address)
+        tab.unfold("Layers, inside to outside")
+        for text, said, third_row in (
+            ("valve = [", "TOML", False),
+            ("x = " + "[" * 5000, "recursion", False),
+            ("layers = [1, 2]", "layers.0 is given as 1", True),
+            ('layers = [{ material = "CR" }, 7]', "layers.0.thickness is missing", True),
+            ('layers = "many"', "layers is given as", False),
+            ('valve = "round"', "valve is given as", False),
+            ('[valve]\nkey_points = "../../../etc/passwd"', "without their folder", False),
+        ):
+            tab.drop("bad.toml", text.encode())
+            tab.wait(lambda said=said: said in tab.at("wrong").text, 20)
+            tab.click("Add a row")
+            if third_row:
+                tab.wait(lambda: tab.at("layers.2.material").is_displayed(), 20)
+                assert said in tab.at("wrong").text
+            elif "many" in text:  # the usual rows stand there, and one more
+                tab.wait(lambda: tab.at("fits").text == "It fits.", 20)
+        tab.drop("dbv6.toml", COARSE.encode())
+        tab.wait(lambda: tab.at("fits").text == "It fits.", 20)
+        tab.drop("picture.exe", b"MZ")
+        tab.wait(lambda: "is not taken" in tab.text, 20)
+        tab.wait(lambda: not driver.find_elements("css selector", ".q-uploader__file"), 20)
+        tab.drop("huge.toml", b"#" * (6 << 20))
+        time.sleep(1.0)
+        assert tab.at("fits").text == "It fits." and server.process.poll() is None
 
 
 def test_others_come_in_by_a_password_and_see_their_own(tmp_path, monkeypatch):
@@ -345,35 +331,31 @@ def test_narrow_pages_scroll_one_way(tmp_path):
         driver.quit()
 
 
-def test_two_tabs_and_a_killed_worker(tmp_path):
-    driver = browser(*WIDE)
-    try:
-        with served(tmp_path) as server:
-            one = Tab(driver, server.address)
-            one.go("Ask")
-            one.wait(one.is_confirmed)
-            driver.switch_to.new_window("tab")
-            two = Tab(driver, server.root)
-            two.go("Ask")
-            two.wait(two.is_confirmed)
-            two.fill("set density", "700\n")
-            two.wait(lambda: not two.is_confirmed(), 5)
-            two.wait(two.is_confirmed)
-            flow = two.number("volume_flow")
-            for pid in children(server.process.pid):
-                os.kill(pid, signal.SIGKILL)
-            two.fill("set density", "900\n")
-            two.wait(lambda: two.number("volume_flow") < flow, 90)
-            two.wait(two.is_confirmed, 90)
-            driver.switch_to.window(driver.window_handles[0])
-            assert one.number("volume_flow") < two_third(flow)  # the first tab stands where it stood
-            one.go("Describe")
-            one.wait(lambda: one.at("valve.scale").is_displayed())
-            one.at("valve.scale").send_keys("nonsense")
-            one.wait(lambda: "valve.scale" in one.at("wrong").text)
-            assert server.process.poll() is None
-    finally:
-        driver.quit()
+def test_two_tabs_and_a_killed_worker(driver, tmp_path):
+    with served(tmp_path) as server:
+        one = Tab(driver, server.address)
+        one.go("Ask")
+        one.wait(one.is_confirmed)
+        driver.switch_to.new_window("tab")
+        two = Tab(driver, server.root)
+        two.go("Ask")
+        two.wait(two.is_confirmed)
+        two.fill("set density", "700\n")
+        two.wait(lambda: not two.is_confirmed(), 5)
+        two.wait(two.is_confirmed)
+        flow = two.number("volume_flow")
+        for pid in children(server.process.pid):
+            os.kill(pid, signal.SIGKILL)
+        two.fill("set density", "900\n")
+        two.wait(lambda: two.number("volume_flow") < flow, 90)
+        two.wait(two.is_confirmed, 90)
+        driver.switch_to.window(driver.window_handles[0])
+        assert one.number("volume_flow") < two_third(flow)  # the first tab stands where it stood
+        one.go("Describe")
+        one.wait(lambda: one.at("valve.scale").is_displayed())
+        one.at("valve.scale").send_keys("nonsense")
+        one.wait(lambda: "valve.scale" in one.at("wrong").text)
+        assert server.process.poll() is None
 
 
 def two_third(flow: float) -> float:
@@ -382,57 +364,50 @@ def two_third(flow: float) -> float:
 
 
 @pytest.mark.parametrize("moves", [200])
-def test_many_moves_are_all_answered_in_bounded_memory(tmp_path, moves):
+def test_many_moves_are_all_answered_in_bounded_memory(driver, tmp_path, moves):
     """Random moves on the 6-inch valve at its own mesh of 28 x 48."""
     text = COARSE.replace("around = 6", "around = 28").replace("along = 8", "along = 48")
     text = text.replace('model = "rayleigh"\nbeta = 0.003', 'model = "loss factor"')
-    driver, chance = browser(*WIDE), random.Random(8)
-    try:
-        with served(tmp_path, text) as server:
-            tab = Tab(driver, server.address)
-            tab.go("Ask")
-            tab.wait(tab.is_confirmed, 240)
-            tab.fill("set pressure", "1\n")
-            tab.wait(lambda: not tab.is_confirmed(), 10)
-            tab.wait(tab.is_confirmed, 120)
-            status = lambda name: float(tab.at("status").get_attribute(f"data-{name}"))  # noqa: E731
-            found = {"density loss_factor": [], "pressure": []}
-            sizes = []
-            for number in range(moves + 300):
-                kind = "pressure" if number % 10 == 9 else "density loss_factor"
-                before = status("answers")
-                tab.slide(chance.choice(kind.split()), chance.uniform(0.02, 0.98))
-                tab.wait(lambda: status("answers") > before or tab.errors(), 60)
-                if number < moves:
-                    found[kind].append(status("seconds"))
-                if number in (20, moves, moves + 299):
-                    sizes.append(memory(server.process.pid))
-            quick, slow = (np.percentile(found[name], (50, 95)) for name in found)
-            print(f"\nstate stays: median {quick[0]:.3f} s, 95 % {quick[1]:.3f} s")
-            print(f"state moves: median {slow[0]:.2f} s, 95 % {slow[1]:.2f} s; memory {sizes} MB")
-            assert sizes[-1] < 1.25 * sizes[0] + 200
-    finally:
-        driver.quit()
+    chance = random.Random(8)
+    with served(tmp_path, text) as server:
+        tab = Tab(driver, server.address)
+        tab.go("Ask")
+        tab.wait(tab.is_confirmed, 240)
+        tab.fill("set pressure", "1\n")
+        tab.wait(lambda: not tab.is_confirmed(), 10)
+        tab.wait(tab.is_confirmed, 120)
+        status = lambda name: float(tab.at("status").get_attribute(f"data-{name}"))  # noqa: E731
+        found = {"density loss_factor": [], "pressure": []}
+        sizes = []
+        for number in range(moves + 300):
+            kind = "pressure" if number % 10 == 9 else "density loss_factor"
+            before = status("answers")
+            tab.slide(chance.choice(kind.split()), chance.uniform(0.02, 0.98))
+            tab.wait(lambda: status("answers") > before or tab.errors(), 60)
+            if number < moves:
+                found[kind].append(status("seconds"))
+            if number in (20, moves, moves + 299):
+                sizes.append(memory(server.process.pid))
+        quick, slow = (np.percentile(found[name], (50, 95)) for name in found)
+        print(f"\nstate stays: median {quick[0]:.3f} s, 95 % {quick[1]:.3f} s")
+        print(f"state moves: median {slow[0]:.2f} s, 95 % {slow[1]:.2f} s; memory {sizes} MB")
+        assert sizes[-1] < 1.25 * sizes[0] + 200
 
 
-def test_a_result_is_opened_for_a_user_who_left_another_valve(tmp_path):
+def test_a_result_is_opened_for_a_user_who_left_another_valve(driver, tmp_path):
     """The server names its user by a cookie; the browser comes back with it, once it has left a valve behind."""
     case = tmp_path / "six.toml"
     case.write_text(COARSE)
     result = tmp_path / "six.h5"
     dbvfiv.load(case, {"valve.duckbill_length": "104 mm"}).steady(pressure=5e3, output=result)
-    driver = browser(*WIDE)
-    try:
-        for start, length in ((case, "280 mm long"), (result, "279 mm long")):
-            server = Served(tmp_path / "page", start)
-            try:
-                tab = Tab(driver, server.address)
-                tab.wait(lambda length=length: length in tab.text)
-                tab.fill("valve.duckbill_length", "100 mm")
-                tab.wait(lambda: "275 mm long" in tab.text)
-                driver.refresh()
-                tab.wait(lambda: "275 mm long" in tab.text)
-            finally:
-                server.end()
-    finally:
-        driver.quit()
+    for start, length in ((case, "280 mm long"), (result, "279 mm long")):
+        server = Served(tmp_path / "page", start)
+        try:
+            tab = Tab(driver, server.address)
+            tab.wait(lambda length=length: length in tab.text)
+            tab.fill("valve.duckbill_length", "100 mm")
+            tab.wait(lambda: "275 mm long" in tab.text)
+            driver.refresh()
+            tab.wait(lambda: "275 mm long" in tab.text)
+        finally:
+            server.end()
