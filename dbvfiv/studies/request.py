@@ -119,16 +119,14 @@ def over_option(words: str, metavar: str = "RANGE") -> Any:
     return typer.Option("--over", metavar=metavar, help=words)
 
 
+def pressure_option(words: str) -> Any:
+    """Option --pressure, of one pressure or several."""
+    return typer.Option("--pressure", "-p", metavar="P", callback=with_unit, help=words)
+
+
 #: What several studies take in place of keys of the case.
 PressureOption = Annotated[
-    str | None,
-    typer.Option(
-        "--pressure",
-        "-p",
-        metavar="P",
-        callback=with_unit,
-        help="Pressure in place of drive.pressure: '18 kPa', or a head of the fluid, '2 m'.",
-    ),
+    str | None, pressure_option("Pressure in place of drive.pressure: '18 kPa', or a head of the fluid, '2 m'.")
 ]
 DensityOption = Annotated[
     str | None, typer.Option("--density", metavar="RHO", help="Fluid density in place of fluid.density.")

@@ -5,7 +5,6 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-import typer
 from pydantic import StrictBool, StrictInt, ValidationInfo, field_validator, model_validator
 
 from ...case.measured import AREA, MEASURED_FILES, SHAPE, find_measured
@@ -13,7 +12,7 @@ from ...case.parameters import PARAMETERS
 from ...case.physics import LoadPressure
 from ...case.quantity import Number, Pressure, number_or_text
 from ...case.section import Section, key
-from ..request import ClassesOption, Request, with_unit
+from ..request import ClassesOption, Request, pressure_option
 
 ORDER = 35
 
@@ -81,16 +80,7 @@ class Keys(Section):
 
 
 def command(
-    pressures: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--pressure",
-            "-p",
-            metavar="P",
-            callback=with_unit,
-            help="Back pressure, '7 kPa' or '3 m'; may be repeated.",
-        ),
-    ] = None,
+    pressures: Annotated[list[str] | None, pressure_option("Back pressure, '7 kPa' or '3 m'; may be repeated.")] = None,
     symmetry: ClassesOption = None,
 ) -> Request:
     """Back pressure: does the valve shut, where and how firmly, what stays open, how far is the wall from buckling?

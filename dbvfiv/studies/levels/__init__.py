@@ -4,12 +4,10 @@ from __future__ import annotations
 
 from typing import Annotated
 
-import typer
-
 from ...case.model import Case
 from ...case.physics import LoadPressure
 from ...case.section import Section, key
-from ..request import Request, with_unit
+from ..request import Request, pressure_option
 
 ORDER = 25
 
@@ -24,12 +22,7 @@ class Keys(Section):
 
 def command(
     case: Case,
-    pressures: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--pressure", "-p", metavar="P", callback=with_unit, help="Static inlet pressure; may be repeated."
-        ),
-    ] = None,
+    pressures: Annotated[list[str] | None, pressure_option("Static inlet pressure; may be repeated.")] = None,
 ) -> Request:
     """Strain level of each rubber that agrees with what its layer strains (Eq. 7.1), and the flow with it.
 

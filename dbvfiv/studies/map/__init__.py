@@ -12,7 +12,7 @@ from ...case.model import Case
 from ...case.parameters import listed
 from ...case.quantity import number_or_text
 from ...case.section import BrokenRule, Section, key
-from ..request import ClassesOption, Request, WorkersOption, refuse_moved, with_unit
+from ..request import ClassesOption, Request, WorkersOption, pressure_option, refuse_moved
 from ..workers import WORKERS_HELP, WorkersKey
 
 ORDER = 30
@@ -102,12 +102,7 @@ def command(
     y: Annotated[
         str | None, typer.Option("--y", metavar="RANGE", help="Vertical axis, likewise; map.y without it.")
     ] = None,
-    pressure: Annotated[
-        str | None,
-        typer.Option(
-            "--pressure", "-p", metavar="P", callback=with_unit, help="Static inlet pressure where no axis moves it."
-        ),
-    ] = None,
+    pressure: Annotated[str | None, pressure_option("Static inlet pressure where no axis moves it.")] = None,
     density: Annotated[
         str | None, typer.Option("--density", metavar="RHO", help="Fluid density where no axis moves it.")
     ] = None,

@@ -12,7 +12,7 @@ from ...case.model import Case
 from ...case.quantity import Frequency, Number, Rate, number_or_text
 from ...case.section import Section, key
 from ...errors import CaseError
-from ..request import DensityOption, LawOption, Request, law_changes, with_unit
+from ..request import DensityOption, LawOption, Request, law_changes, pressure_option
 
 ORDER = 25
 
@@ -42,13 +42,7 @@ def command(
     case: Case,
     pressure: Annotated[
         str | None,
-        typer.Option(
-            "--pressure",
-            "-p",
-            metavar="P",
-            callback=with_unit,
-            help="Static inlet pressure in place of drive.pressure; 0 with --in-vacuo is the valve at rest.",
-        ),
+        pressure_option("Static inlet pressure in place of drive.pressure; 0 with --in-vacuo is the valve at rest."),
     ] = None,
     density: DensityOption = None,
     law: LawOption = None,

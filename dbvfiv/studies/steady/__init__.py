@@ -21,7 +21,7 @@ from ...case.quantity import Number, Quantity, number_or_text
 from ...case.section import Section, key
 from ...case.units import Units, factor_of
 from ...errors import CaseError
-from ..request import Request, is_sheet, with_unit
+from ..request import Request, is_sheet, pressure_option
 
 ORDER = 20
 
@@ -61,13 +61,9 @@ class Keys(Section):
 
 Pressures = Annotated[
     list[str] | None,
-    typer.Option(
-        "--pressure",
-        "-p",
-        metavar="P",
-        callback=with_unit,
-        help="Static inlet pressure, '36 kPa', '2 m' or '6 ft' (head of the fluid), '2 mH2O', or a range "
-        "'2 kPa:50 kPa:12'; may be repeated.",
+    pressure_option(
+        "Static inlet pressure, '36 kPa', '2 m' or '6 ft' (head of the fluid), '2 mH2O', or a range "
+        "'2 kPa:50 kPa:12'; may be repeated."
     ),
 ]
 
