@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
-from functools import cached_property
+from dataclasses import replace
+from functools import cached_property, partial
 from pathlib import Path
 from typing import Any
 
@@ -24,7 +24,7 @@ from ..session import Session, Study, describe_surroundings
 from ..stability.dimensions import Variant, compare_states, own_variant, variants
 from ..stability.verdict import Verdict
 from ..stability.walk import StabilityWalk
-from ..state import State, states_of
+from ..state import State, StateSteps, states_of
 from .search import CURVE, MODE, Certificate, FoundModes, ModeShape, ModesOptions, critical_damping_factor, run_modes
 
 STATE, MODES, COUNT = "state", "modes", "count"
@@ -109,59 +109,35 @@ def rows_to_keep(known: Record, case: Case) -> dict[str, int]:
     return {table: sum(len(_rows(known, table, variant)) for variant in found) for table in (MODES, COUNT)}
 
 
-@dataclass(frozen=True)
-class _ModeSteps(Sequence):
-    """Modes as steps, made one at a time; "time" is the number of the mode."""
-
-    result: StudyResult
-    valve: WholeValve
-
-    def __len__(self) -> int:
-        return len(self.result.modes)
-
-    def __getitem__(self, number):
-        mode, valve, mesh = self.result.modes[number], self.valve, self.result.mesh
-        shape, parity = mode.shape[:, :3], symmetry_named(mode.symmetry).parity(valve.sign)[:, None]
-        points = motion(mesh, valve, self.result.state.nodal) | {
-            "mode_real": valve.vectors(shape.real) * parity,
-            "mode_imag": valve.vectors(shape.imag) * parity,
-            "mode_amplitude": mode.amplitude[valve.node],
-        }
-        ones = np.ones(len(valve.quads))
-        cells = {
-            "thickness": valve.cells(mesh.thickness),
-            "growth_rate": mode.growth_rate * ones,
-            "frequency": mode.frequency * ones,
-        }
-        return Step(float(mode.number), points, cells)
+def _mode_step(result: ModesResult, valve: WholeValve, mode: ModeShape) -> Step:
+    """A mode as a step; "time" is its number."""
+    mesh, shape, parity = result.mesh, mode.shape[:, :3], symmetry_named(mode.symmetry).parity(valve.sign)[:, None]
+    points = motion(mesh, valve, result.state.nodal) | {
+        "mode_real": valve.vectors(shape.real) * parity,
+        "mode_imag": valve.vectors(shape.imag) * parity,
+        "mode_amplitude": mode.amplitude[valve.node],
+    }
+    ones = np.ones(len(valve.quads))
+    cells = {
+        "thickness": valve.cells(mesh.thickness),
+        "growth_rate": mode.growth_rate * ones,
+        "frequency": mode.frequency * ones,
+    }
+    return Step(float(mode.number), points, cells)
 
 
-@dataclass(frozen=True)
-class _CycleSteps(Sequence):
-    """Phases of one cycle as steps, the first repeated at the end; "time" is time in s, or the share of a cycle where
-    nothing oscillates.
-    """
-
-    result: StudyResult
-    valve: WholeValve
-    mode: ModeShape
-    phases: int
-
-    def __len__(self) -> int:
-        return self.phases + 1
-
-    def __getitem__(self, number):
-        share = range(self.phases + 1)[number] / self.phases
-        mode, state, mesh = self.mode, self.result.state, self.result.mesh
-        moved = mode.at_phase(2 * np.pi * share) * mode.drawn_amplitude(state)
-        parity = symmetry_named(mode.symmetry).parity(self.valve.sign)[:, None]
-        points = motion(mesh, self.valve, state.nodal + moved)
-        if np.any(parity < 0):
-            opposite = motion(mesh, self.valve, state.nodal - moved)
-            points = {name: np.where(parity < 0, opposite[name], field) for name, field in points.items()}
-        points |= {"oscillation": self.valve.vectors(moved[:, :3]) * parity}
-        value = share / mode.frequency if mode.frequency > 0 else share
-        return Step(value, points, {"thickness": self.valve.cells(mesh.thickness)})
+def _phase_step(result: ModesResult, valve: WholeValve, mode: ModeShape, share: float) -> Step:
+    """A phase of a cycle, given as a share of it; "time" is time in s, or the share where nothing oscillates."""
+    state, mesh = result.state, result.mesh
+    moved = mode.at_phase(2 * np.pi * share) * mode.drawn_amplitude(state)
+    parity = symmetry_named(mode.symmetry).parity(valve.sign)[:, None]
+    points = motion(mesh, valve, state.nodal + moved)
+    if np.any(parity < 0):
+        opposite = motion(mesh, valve, state.nodal - moved)
+        points = {name: np.where(parity < 0, opposite[name], field) for name, field in points.items()}
+    points |= {"oscillation": valve.vectors(moved[:, :3]) * parity}
+    value = share / mode.frequency if mode.frequency > 0 else share
+    return Step(value, points, {"thickness": valve.cells(mesh.thickness)})
 
 
 class ModesResult(StudyResult):
@@ -339,8 +315,11 @@ class ModesResult(StudyResult):
         return [*table, "", self.sentence, sentence, self.comparison, *notes]
 
     def steps(self, valve: WholeValve, mode: int | None = None, phases: int = 24) -> Sequence[Step]:
-        """The modes one after the other, or one cycle of one of them."""
-        return _ModeSteps(self, valve) if mode is None else _CycleSteps(self, valve, self.mode(mode), phases)
+        """The modes one after the other, or one cycle of one of them, its first phase repeated at the end."""
+        if mode is None:
+            return StateSteps(self.modes, partial(_mode_step, self, valve))
+        shares = [number / phases for number in range(phases + 1)]
+        return StateSteps(shares, partial(_phase_step, self, valve, self.mode(mode)))
 
     def animate(self, path: str | Path, mode: int = 1, frames: int = 24) -> Path:
         """Write a GIF of one cycle of a mode."""
