@@ -4,7 +4,7 @@ from dbvfiv.observer import Observer
 
 
 class Stop(Observer):
-    """Interrupt after some items.
+    """Interrupt after some items, or at the progress after them that begins with a text.
 
     Attributes
     ----------
@@ -14,13 +14,17 @@ class Stop(Observer):
         Word of the study's end: it was interrupted.
     """
 
-    def __init__(self, after: int = 10**9):
-        self.left, self.seen, self.ended = after, [], None
+    def __init__(self, after: int = 10**9, text: str = ""):
+        self.left, self.text, self.seen, self.ended = after, text, [], None
 
     def item(self, result):
         self.seen.append(getattr(result, "value", result))
         self.left -= 1
-        if not self.left:
+        if not (self.left or self.text):
+            raise KeyboardInterrupt
+
+    def progress(self, text):
+        if self.text and self.left <= 0 and text.startswith(self.text):
             raise KeyboardInterrupt
 
     def end(self, interrupted):

@@ -22,6 +22,7 @@ from dbvfiv.studies.modes.search import FoundModes
 from dbvfiv.studies.session import Session, load_result
 from dbvfiv.studies.stability.samples import Sample
 from tests.golden.compare import differences, steady
+from tests.observers import Stop
 from tests.small_valves import FORMER
 from tests.studies.map.axes import AXES
 
@@ -133,13 +134,8 @@ def test_workers_find_the_same_digits_also_when_they_go_on(coarse_case, wholes, 
 
 
 def test_a_located_point_is_in_the_file_before_its_normal_form(coarse_case, tmp_path):
-    class Stop(Observer):
-        def progress(self, text):
-            if "normal form" in text:
-                raise KeyboardInterrupt
-
     case = coarse_case.replace(ONSET | {"onset.normal_form": True, "onset.coarse_mesh": 0.0})
-    result = Session(case).perform("onset", tmp_path / "onset.h5", Stop())
+    result = Session(case).perform("onset", tmp_path / "onset.h5", Stop(0, "normal form"))
     assert not result.complete and len(result.points) == 1
     (point,) = load_result(tmp_path / "onset.h5").points
     assert point["confirmed"] and point["criticality"] is None and point["first_lyapunov_coefficient"] is None

@@ -14,9 +14,9 @@ import pytest
 
 from dbvfiv.api import load, resume
 from dbvfiv.errors import CaseError
-from dbvfiv.observer import Observer
 from dbvfiv.studies.case import THESIS, thesis_case
 from dbvfiv.studies.session import load_result
+from tests.observers import Stop
 from tests.small_valves import FORMER
 
 COARSE = {
@@ -26,20 +26,6 @@ COARSE = {
     "closure.eigenvalues": 2,
 }
 PRESSURES = [4e3, 1.2e4, 2e4]
-
-
-class StopAfter(Observer):
-    """Interrupts as a user does: during the way to the state after `count` others."""
-
-    def __init__(self, count: int):
-        self.count = count
-
-    def item(self, result):
-        self.count -= 1
-
-    def progress(self, text):
-        if self.count == 0 and text.startswith("equilibrium"):
-            raise KeyboardInterrupt
 
 
 @pytest.fixture(scope="module")
@@ -58,29 +44,13 @@ def agree(result, whole):
     assert result.warnings == whole.warnings and not result.failures
 
 
-class StopAt(Observer):
-    """Interrupts at the `count`-th piece of progress that begins with a text, once `after` states were found."""
-
-    def __init__(self, text: str, count: int, after: int = 0):
-        self.text, self.count, self.after = text, count, after
-
-    def item(self, result):
-        self.after -= not isinstance(result, str)
-
-    def progress(self, text):
-        if self.after <= 0 and text.startswith(self.text):
-            self.count -= 1
-            if self.count == 0:
-                raise KeyboardInterrupt
-
-
 def test_a_run_goes_on_wherever_it_was_interrupted(whole, tmp_path):
     """Before the first state, on the way from the second to the third, and at its end."""
     path = tmp_path / "run.h5"
-    stop = StopAt("equilibrium at 1050 Pa", 1)
+    stop = Stop(0, "equilibrium at 1050 Pa")
     first = load(thesis_case(), COARSE).closure(PRESSURES, output=path, observer=stop)
     assert not first.states and first.walk
-    second = resume(path, observer=StopAfter(2))
+    second = resume(path, observer=Stop(2, "equilibrium"))
     assert not second.complete and len(second.states) == 2
     assert len(load_result(path).walk) > len([p for p in whole.walk if p.pressure <= PRESSURES[1]])
     agree(resume(path), whole)
@@ -95,7 +65,7 @@ def test_a_walk_that_is_stopped_beyond_a_limit_meets_it_again(tmp_path):
         FORMER
     )
     complete = load(thesis_case(), thin).closure([3e3, 8e3])
-    first = load(thesis_case(), thin).closure([3e3, 8e3], output=path, observer=StopAt("arclength point", 4))
+    first = load(thesis_case(), thin).closure([3e3, 8e3], output=path, observer=Stop(0, "arclength point 5"))
     assert not first.complete and len(first.states) == 1
     last = resume(path)
     assert json.dumps(last.summary()) == json.dumps(complete.summary())

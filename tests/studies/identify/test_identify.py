@@ -8,11 +8,11 @@ import pytest
 
 import dbvfiv
 from dbvfiv.errors import CaseError
-from dbvfiv.observer import Observer
 from dbvfiv.studies.identify.valves import least_damping, onsets
 from dbvfiv.studies.inputs import Plan
 from dbvfiv.studies.response.study import Transfer
 from dbvfiv.studies.stability.walk import StabilityWalk
+from tests.observers import Stop
 from tests.small_valves import SMALL, load_small
 
 INPUTS = {"beta": "lognormal(1.3)", "materials.SBR.stiffness_factor": "lognormal(1.1)"}
@@ -127,13 +127,8 @@ def test_a_hidden_valve_is_found(found):
 
 @pytest.mark.slow
 def test_an_interrupted_run_has_the_digits_of_a_whole_one(found, tmp_path):
-    class Interrupt(Observer):
-        def item(self, result):
-            if result == 11:
-                raise KeyboardInterrupt
-
     path = tmp_path / "identify.h5"
-    partly = found.valve.identify(found.records, output=path, observer=Interrupt())
+    partly = found.valve.identify(found.records, output=path, observer=Stop(3))
     assert partly.interrupted and partly.lines() == ["Too few valves were computed to learn from."]
     whole = dbvfiv.resume(path)
     assert whole.complete and whole.summary() == found.result.summary() == dbvfiv.load_result(path).summary()

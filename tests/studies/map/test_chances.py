@@ -4,8 +4,8 @@ import pytest
 
 import dbvfiv
 from dbvfiv.errors import CaseError
-from dbvfiv.observer import Observer
 from dbvfiv.studies.map.figures import stability_map
+from tests.observers import Stop
 from tests.small_valves import load_small
 
 INPUTS = {"thickness": "normal(8 %)", "materials.CR.stiffness_factor": "lognormal(1.4)"}
@@ -15,13 +15,8 @@ AXES = {"map.x": "pressure=3 kPa:5 kPa:2", "map.y": "beta=0.004:0.012:4:log", "m
 
 @pytest.mark.slow
 def test_cells_have_the_probability_of_samples_found_one_by_one(tmp_path):
-    class Interrupt(Observer):
-        def progress(self, text):
-            if text.startswith("probability at 3 kPa"):
-                raise KeyboardInterrupt
-
     valve, path = load_small(KEYS, AXES, {"map.samples": 24}), tmp_path / "map.h5"
-    assert valve.map(output=path, observer=Interrupt()).interrupted
+    assert valve.map(output=path, observer=Stop(0, "probability at 3 kPa")).interrupted
     found = dbvfiv.resume(path, workers=2)
     value, low, high = found.probability
     assert value.shape == (4, 2) and (low <= value).all() and (value <= high).all()

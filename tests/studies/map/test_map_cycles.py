@@ -7,11 +7,11 @@ import json
 import numpy as np
 import pytest
 
-from dbvfiv.observer import Observer
 from dbvfiv.studies.case import thesis_case
 from dbvfiv.studies.map.cycles import CELLS
 from dbvfiv.studies.orbits import Follower
 from dbvfiv.studies.session import Session, load_result, resume_result
+from tests.observers import Stop
 
 CASE = {
     "mesh.around": 6,
@@ -98,17 +98,10 @@ def test_in_file_tables_and_figures(found, file):
     assert "cycle-amplitude" in again.figures()
 
 
-class _Stopper(Observer):
-    """Interrupts when the cycles of the second column begin."""
-
-    def progress(self, text):
-        if text == "cycles at pressure = 6000":
-            raise KeyboardInterrupt
-
-
 @pytest.mark.slow
 def test_interrupted_and_resumed(found, tmp_path):
-    part = session_of(cycle__exponents=0).perform("map", tmp_path / "part.h5", _Stopper())
+    second = Stop(0, "cycles at pressure = 6000")
+    part = session_of(cycle__exponents=0).perform("map", tmp_path / "part.h5", second)
     assert part.interrupted and np.isnan(part.cycle_grid("amplitude")[0, :, 1]).all()
     assert np.isfinite(part.cycle_grid("amplitude")[0, 0, 0])
     whole = resume_result(tmp_path / "part.h5")

@@ -6,12 +6,12 @@ import pytest
 from dbvfiv import resume
 from dbvfiv.api import Valve
 from dbvfiv.case.parameters import Mu
-from dbvfiv.observer import Observer
 from dbvfiv.studies.case import thesis_case
 from dbvfiv.studies.onset.search import run_onset
 from dbvfiv.studies.session import load_result
 from dbvfiv.studies.stability.walk import StabilityWalk
 from eigen import certified_spectrum
+from tests.observers import Stop
 from tests.small_valves import FORMER
 from tests.studies.map.axes import run_map
 
@@ -93,22 +93,12 @@ def test_maps_against_certified_spectra(lossy_case, lossy_walk, continuity, seco
         )
 
 
-class _StopAfter(Observer):
-    def __init__(self, number):
-        self.seen, self._number = [], number
-
-    def item(self, column):
-        self.seen.append(column.value)
-        if len(self.seen) == self._number:
-            raise KeyboardInterrupt
-
-
 @pytest.mark.slow
 def test_a_map_over_loss_factors_resumes_to_the_same_numbers(lossy_case, tmp_path):
     case = lossy_case.replace({"map.x": "pressure=2000:4000:3", "map.y": "loss_factor=0.3:3:4:log"})
     whole, path = Valve(case, "valve").map(), tmp_path / "map.h5"
     assert np.isfinite(whole.grid("growth_rate")).all()
-    first, second = _StopAfter(2), _StopAfter(1000)
+    first, second = Stop(2), Stop()
     assert not Valve(case, "valve").map(output=path, observer=first).complete
     result = resume(path, observer=second)
     assert result.complete and not set(first.seen) & set(second.seen)

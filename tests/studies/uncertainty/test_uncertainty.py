@@ -19,6 +19,7 @@ from dbvfiv.studies.inputs import inputs_of
 from dbvfiv.studies.session import load_result
 from dbvfiv.studies.stability.verdict import OUTCOMES
 from dbvfiv.studies.uncertainty.figures import tornado
+from tests.observers import Stop
 from tests.small_valves import SMALL, load_small
 
 LINE = "cases/dbv12-in-line.toml"
@@ -81,13 +82,8 @@ def test_the_document_has_probability_interval_and_what_decides(found):
 
 
 def test_workers_and_interruptions_change_no_digit(valve, found, tmp_path):
-    class Interrupt(Observer):
-        def item(self, result):
-            if result == 7:
-                raise KeyboardInterrupt
-
     path = tmp_path / "samples.h5"
-    partly = valve.uncertainty(inputs=OWN, output=path, observer=Interrupt())
+    partly = valve.uncertainty(inputs=OWN, output=path, observer=Stop(8))
     assert partly.interrupted and 0 < len(partly.at(partly.plan.values[0])["outcome"]) < 16
     whole = dbvfiv.resume(path, workers=2)
     assert whole.complete and whole.summary() == found.summary() == load_result(path).summary()
