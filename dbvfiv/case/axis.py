@@ -14,7 +14,7 @@ from pydantic import AfterValidator, StrictStr, ValidationInfo
 from ..errors import CaseError
 from .parameters import DESIGN, PARAMETERS, SWEPT, Parameter
 from .quantity import number_or_text
-from .section import Described
+from .section import Described, Section
 
 FORM = 'PARAMETER=START:STOP:COUNT, with ":log" behind it for logarithmic steps, or PARAMETER=VALUE,VALUE,...'
 _LARGEST = 100_000
@@ -177,6 +177,20 @@ def _readable_range(text: str, info: ValidationInfo) -> str:
 
 #: A key that holds the text of such a range.
 StabilityRange = Annotated[StrictStr, AfterValidator(_readable_range)]
+
+
+class RangeSection(Section):
+    """Section of a study over a range, its key ``over``, or at the state of the case where there is none."""
+
+    @property
+    def axis(self) -> Axis | None:
+        """The parsed range."""
+        return None if self.over is None else parse_stability_axis(self.over)
+
+    @property
+    def parameter(self) -> str:
+        """Parameter of the range; the pressure where there is none."""
+        return "pressure" if self.axis is None else self.axis.parameter
 
 
 def _readable_point(text: str, info: ValidationInfo) -> str:

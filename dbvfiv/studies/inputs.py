@@ -218,8 +218,7 @@ class Plan:
     @property
     def parameter(self) -> str:
         """Parameter of the range; the pressure where there is none."""
-        axis = self.case.uncertainty.axis
-        return "pressure" if axis is None else axis.parameter
+        return self.case.uncertainty.parameter
 
     @property
     def values(self) -> tuple[float, ...]:

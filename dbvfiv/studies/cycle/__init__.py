@@ -6,18 +6,18 @@ from typing import Annotated, Literal
 
 from pydantic import StrictInt, model_validator
 
-from ...case.axis import Axis, StabilityRange, parse_stability_axis
+from ...case.axis import RangeSection, StabilityRange
 from ...case.model import Case
 from ...case.parameters import listed
 from ...case.quantity import Length, Number
-from ...case.section import Section, key
+from ...case.section import key
 from ...case.tables import ExistingFile
 from ..request import DensityOption, PressureOption, Request, over_option, ranged_changes, require_start_file
 
 ORDER = 42
 
 
-class Keys(Section):
+class Keys(RangeSection):
     """Branches of limit cycles along one parameter."""
 
     over: StabilityRange = key(
@@ -59,11 +59,6 @@ class Keys(Section):
     def _starts_somewhere(self) -> Keys:
         require_start_file(self.start, "file", self.start_file)
         return self
-
-    @property
-    def axis(self) -> Axis:
-        """The parsed range."""
-        return parse_stability_axis(self.over)
 
 
 def command(

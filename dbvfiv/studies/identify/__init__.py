@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 from pydantic import Field, StrictInt, StrictStr
 
-from ...case.axis import Axis, Point, StabilityRange, parse_stability_axis
+from ...case.axis import Point, RangeSection, StabilityRange
 from ...case.model import Case
 from ...case.parameters import listed
 from ...case.quantity import Frequency, Number, number_or_text
@@ -34,7 +34,7 @@ class MeasuredRecord(Section):
     damping_ratio_interval: Annotated[Number, Field(gt=0, lt=1)] | None = key(None, "Half its 95 % interval.")
 
 
-class Keys(Section):
+class Keys(RangeSection):
     """Identification of the valve by measured records."""
 
     records: tuple[MeasuredRecord, ...] = key((), "Measured records and modes, each with where it was taken.")
@@ -57,11 +57,6 @@ class Keys(Section):
     )
     seed: StrictInt = key(1, "Number that the samples follow from.", ge=0, le=2**31)
     workers: WorkersKey = key(1, WORKERS_HELP)
-
-    @property
-    def axis(self) -> Axis | None:
-        """The parsed range."""
-        return None if self.over is None else parse_stability_axis(self.over)
 
 
 def command(

@@ -105,8 +105,7 @@ class Places:
     @cached_property
     def parameter(self) -> str:
         """Parameter of the range."""
-        axis = self.case.identify.axis
-        return "pressure" if axis is None else axis.parameter
+        return self.case.identify.parameter
 
     @cached_property
     def now(self) -> float:

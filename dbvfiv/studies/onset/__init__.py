@@ -6,11 +6,11 @@ from typing import Annotated, Literal
 
 from pydantic import StrictBool
 
-from ...case.axis import Axis, StabilityRange, parse_stability_axis
+from ...case.axis import RangeSection, StabilityRange
 from ...case.model import Case
 from ...case.parameters import listed
 from ...case.quantity import Number
-from ...case.section import Section, key
+from ...case.section import key
 from ..request import (
     ClassesOption,
     DensityOption,
@@ -25,7 +25,7 @@ from ..request import (
 ORDER = 28
 
 
-class Keys(Section):
+class Keys(RangeSection):
     """Onset of instability along one parameter."""
 
     over: StabilityRange = key(
@@ -54,11 +54,6 @@ class Keys(Section):
         "Symmetry classes looked at: SS is that of the model, all adds those in which the lips sway in y (SA), the "
         "valve sways sideways in x (AS) and twists (AA).",
     )
-
-    @property
-    def axis(self) -> Axis:
-        """The parsed range."""
-        return parse_stability_axis(self.over)
 
 
 def command(

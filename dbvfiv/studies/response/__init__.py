@@ -8,11 +8,11 @@ from typing import Annotated
 import typer
 from pydantic import Field, StrictInt
 
-from ...case.axis import Axis, StabilityRange, parse_stability_axis
+from ...case.axis import RangeSection, StabilityRange
 from ...case.model import Case
 from ...case.parameters import listed
 from ...case.quantity import Frequency, Pressure, Quantity, number_or_text
-from ...case.section import Section, key
+from ...case.section import key
 from ...case.tables import ExistingFile, read_pairs
 from ...errors import CaseError
 from ..request import DensityOption, LawOption, PressureOption, Request, over_option, ranged_changes, with_unit
@@ -20,7 +20,7 @@ from ..request import DensityOption, LawOption, PressureOption, Request, over_op
 ORDER = 33
 
 
-class Keys(Section):
+class Keys(RangeSection):
     """Response to the pressure at the inlet."""
 
     over: StabilityRange | None = key(
@@ -36,11 +36,6 @@ class Keys(Section):
         "CSV of frequency, Hz, and one-sided power density of the pressure, Pa2/Hz, used instead of noise; linear "
         "between rows, nothing beyond them.",
     )
-
-    @property
-    def axis(self) -> Axis | None:
-        """The parsed range."""
-        return None if self.over is None else parse_stability_axis(self.over)
 
     def density(self) -> list[tuple[float, float]]:
         """Frequencies and power densities of the pressure.

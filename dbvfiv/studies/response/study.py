@@ -296,7 +296,7 @@ def rows_to_keep(known: Record, _case: Case) -> dict[str, int]:
 
 def check(case: Case) -> None:
     """Refuse a range of what the case does not have, and a fluid without inertia."""
-    check_scan(case, "pressure" if case.response.axis is None else case.response.axis.parameter)
+    check_scan(case, case.response.parameter)
     require_inertia(case)
 
 
@@ -311,8 +311,7 @@ def run(session: Session, record: GrowingRecord) -> None:
         Without flow.
     """
     case, asked = session.case, session.case.response
-    axis = asked.axis
-    parameter, values = ("pressure", (case.drive.pressure,)) if axis is None else (axis.parameter, axis.values)
+    values = (case.drive.pressure,) if asked.axis is None else asked.axis.values
     rows = asked.density()
     walk = StabilityWalk(case, record, session.model)
     done = set(record.column(POINTS, "value"))
@@ -321,9 +320,9 @@ def run(session: Session, record: GrowingRecord) -> None:
         if value in done:
             continue
         try:
-            _respond(walk, Mu.of(case).at(**{parameter: value}), value, rows, record)
+            _respond(walk, Mu.of(case).at(**{asked.parameter: value}), value, rows, record)
         except (CaseError, SolveError, ArithmeticError) as error:
-            record.fail(f"At {PARAMETERS[parameter].text(value)}: {error}")
+            record.fail(f"At {PARAMETERS[asked.parameter].text(value)}: {error}")
         record.item(value)
 
 
@@ -379,8 +378,7 @@ class ResponseResult(StudyResult):
 
     @property
     def parameter(self) -> str:
-        axis = self.case.response.axis
-        return "pressure" if axis is None else axis.parameter
+        return self.case.response.parameter
 
     @cached_property
     def points(self) -> list[dict[str, Any]]:

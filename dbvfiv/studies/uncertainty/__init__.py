@@ -7,12 +7,12 @@ from typing import Annotated, Literal
 import typer
 from pydantic import BeforeValidator, Field, StrictInt, StrictStr, ValidationInfo, field_validator
 
-from ...case.axis import Axis, StabilityRange, parse_stability_axis
+from ...case.axis import RangeSection, StabilityRange
 from ...case.distribution import with_full_names
 from ...case.model import Case
 from ...case.parameters import listed
 from ...case.quantity import Number
-from ...case.section import Described, Section, flattened, key
+from ...case.section import Described, flattened, key
 from ..request import (
     DensityOption,
     LawOption,
@@ -35,7 +35,7 @@ Correlations = Annotated[
 ]
 
 
-class Keys(Section):
+class Keys(RangeSection):
     """Probability of flutter and what decides it."""
 
     over: StabilityRange | None = key(
@@ -69,11 +69,6 @@ class Keys(Section):
     @classmethod
     def _with_full_names(cls, given: dict[str, str], info: ValidationInfo) -> dict[str, str]:
         return {name: with_full_names(text, (info.context or {}).get("folder")) for name, text in given.items()}
-
-    @property
-    def axis(self) -> Axis | None:
-        """The parsed range."""
-        return None if self.over is None else parse_stability_axis(self.over)
 
 
 def command(
