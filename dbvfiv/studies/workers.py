@@ -95,15 +95,19 @@ class Workers:
         What it needs, pickled.
     warn : callable
         Told in a sentence when a worker was lost.
+    here : optional
+        Context of this process, with which it does the tasks itself where nobody shares them.
 
     Results do not depend on who does a task, as a task knows nothing of the others.
     """
 
-    def __init__(self, count: int | str, start: Callable[..., Any], data: tuple, warn: Callable[[str], None]):
+    def __init__(
+        self, count: int | str, start: Callable[..., Any], data: tuple, warn: Callable[[str], None], here: Any = None
+    ):
         self.count, self.warn = count, warn
         self._folder: TemporaryDirectory | None = None
         self._file: Path | None = None
-        self.give(start, *data)
+        self.give(start, *data, here=here)
         self._pool: Executor | None = None
         self._cluster: Any = None
 
@@ -117,9 +121,9 @@ class Workers:
         if self._folder is not None:
             self._folder.cleanup()
 
-    def give(self, start: Callable[..., Any], *data: Any) -> None:
+    def give(self, start: Callable[..., Any], *data: Any, here: Any = None) -> None:
         """Context of the tasks that are shared from now on."""
-        self._context, self._file = pickle.dumps((start, data)), None
+        self._context, self._file, self._here = pickle.dumps((start, data)), None, here
 
     @property
     def is_here(self) -> bool:
@@ -127,7 +131,7 @@ class Workers:
         return self.count == 1 and mpi_size() == 1
 
     def share(self, tasks: Iterable[Hashable], ask: Callable[[Any], Any]) -> Iterator[tuple[Any, Any]]:
-        """Tasks with their results as they are finished, in any order.
+        """Tasks with their results as they are finished: in any order, in their own where this process does them.
 
         Parameters
         ----------
@@ -146,6 +150,11 @@ class Workers:
         CaseError
             If a scheduler does not answer.
         """
+        if self.is_here and self._here is not None:
+            for task in tasks:
+                work = ask(task)
+                yield task, work.function(self._here, *work.arguments) if isinstance(work, Work) else work
+            return
         left = list(tasks)
         tries = dict.fromkeys(left, 0)
         while left:

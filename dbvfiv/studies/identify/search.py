@@ -61,9 +61,8 @@ def prepare_valves(case: dict, known: list) -> Valves:
 class Search:
     """Rounds of valves; what an earlier attempt kept is not computed again."""
 
-    def __init__(self, plan, places, lines, record: GrowingRecord, team: Workers, valves: Valves):
-        self.plan, self.places, self.lines = plan, places, lines
-        self.record, self.team, self.valves = record, team, valves
+    def __init__(self, plan, places, lines, record: GrowingRecord, team: Workers):
+        self.plan, self.places, self.lines, self.record, self.team = plan, places, lines, record, team
         self.scores, self.rounds = np.zeros((0, len(plan.inputs))), np.zeros(0, int)
         self.modes, self.begins = kept_modes(record), kept_onsets(record)
         self.left_out: tuple[int, ...] = ()
@@ -163,13 +162,10 @@ class Search:
             self.record.item(rows[-1].sample)
 
     def _results(self, tasks, first: int, numbers: np.ndarray, places) -> Iterator[list[Modes | Begins]]:
-        def given(start: int) -> tuple[int, np.ndarray, Sequence[int]]:
-            return first + start, numbers[start : start + OWN], places
+        def ask(start: int) -> Work:
+            return Work(Valves.found, (first + start, numbers[start : start + OWN], places))
 
-        if self.team.is_here:
-            yield from (self.valves.found(*given(start)) for start in tasks)
-            return
-        for start, rows in self.team.share(tasks, lambda start: Work(Valves.found, given(start))):
+        for start, rows in self.team.share(tasks, ask):
             if rows is Lost:
                 raise SolveError(f"Valves {first + start} and on could not be computed: {Lost.sentence}")
             yield rows

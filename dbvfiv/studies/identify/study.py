@@ -106,8 +106,9 @@ def run(
     known = _modes_of_case(plan, places, walk, record)
     count = asked.workers if workers is None else workers
     record.begin("identify", asked.samples + (asked.rounds + 1) * asked.round + 1)
-    with Workers(count, prepare_valves, (case.to_dict(), known), record.warn) as team:
-        search = Search(plan, places, lines, record, team, Valves(plan, places, known))
+    valves = Valves(plan, places, known)
+    with Workers(count, prepare_valves, (case.to_dict(), known), record.warn, valves) as team:
+        search = Search(plan, places, lines, record, team)
         learning, z, rounds = search.learn()
         check = search.check(learning, z, rounds + 1)
     table = {"sample": np.repeat(np.arange(len(z)), z.shape[1]), "input": np.tile(np.arange(z.shape[1]), len(z))}

@@ -132,11 +132,7 @@ def find_chances(case: Case, record: GrowingRecord, workers: int | str) -> None:
         if "failure" in found:
             record.warn(f"No probability at {row.amount(value, 4)}: {found['failure']}")
 
-    with Workers(workers, _start, (case.to_dict(),), record.warn) as team:
-        if team.is_here:
-            for value in wanted:
-                keep(value, _column(chances, value))
-            return
+    with Workers(workers, _start, (case.to_dict(),), record.warn, chances) as team:
         for value, found in team.share(wanted, lambda value: Work(_column, (value,))):
             keep(value, {"failure": Lost.sentence} if found is Lost else found)
 

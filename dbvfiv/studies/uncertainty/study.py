@@ -135,8 +135,8 @@ def _sample(plan: Plan, walk: StabilityWalk, record: GrowingRecord, count: int |
     case, states = plan.case, _states_of_case(plan, walk, record)
     with Workers(count, _start, (case.to_dict(), states), record.warn) as team:
         neighbours = _neighbours(plan, states, record, team)
-        team.give(_start, case.to_dict(), states, neighbours)
-        sampling = _Sampling(plan, record, team, Sampler(plan, states, neighbours, walk))
+        team.give(_start, case.to_dict(), states, neighbours, here=Sampler(plan, states, neighbours, walk))
+        sampling = _Sampling(plan, record, team)
         if case.uncertainty.method == "rare":
             sampling.rare()
         elif case.uncertainty.method == "subset":
@@ -174,9 +174,7 @@ def _neighbours(plan: Plan, states: list[Start | None], record: GrowingRecord, t
     near, sampler = plan.numbers(quasi_random(TAKEN + CHECKS, d, NEAR_SEED)), Sampler(plan, states)
 
     def shared(i: int, function: Callable[..., Any], beside: Neighbours, rows: Sequence[np.ndarray]) -> list:
-        if team.is_here:
-            return [function(sampler.walks(i), beside, row) for row in rows]
-        team.give(_start_beside, plan.case.to_dict(), states, i, beside)
+        team.give(_start_beside, plan.case.to_dict(), states, i, beside, here=(sampler, i, beside))
         found = dict(team.share(range(len(rows)), lambda k: Work(_beside, (function, rows[k]))))
         if any(value is Lost for value in found.values()):
             raise SolveError(Lost.sentence)
@@ -210,10 +208,6 @@ def _start(case: dict, states: list[Start | None], neighbours: Mapping[int, Neig
     return Sampler(Plan(Case.from_dict(case)), states, neighbours)
 
 
-def _found(sampler: Sampler, first: int, numbers: np.ndarray) -> list[Found]:
-    return sampler.found(first, numbers)
-
-
 def _performance(outcome: int, damping_ratio: float) -> float:
     """Distance of a sample beyond flutter; NaN where undecided, minus infinity where it cannot flutter."""
     name = OUTCOMES[outcome]
@@ -230,8 +224,8 @@ def _are(found: dict[str, np.ndarray], outcome: str) -> np.ndarray:
 class _Sampling:
     """Samples found so far, and those still wanted; what an earlier attempt kept is not computed again."""
 
-    def __init__(self, plan: Plan, record: GrowingRecord, team: Workers, sampler: Sampler):
-        self.plan, self.record, self.team, self.sampler = plan, record, team, sampler
+    def __init__(self, plan: Plan, record: GrowingRecord, team: Workers):
+        self.plan, self.record, self.team = plan, record, team
         self.asked = 0
         known = [row for row in record.table_rows(_TABLES[0]) if row["continuity"] == plan.law]
         counts = np.bincount([row["sample"] for row in known], minlength=1) if known else np.zeros(1, int)
@@ -258,13 +252,8 @@ class _Sampling:
         return np.array([self.known[first + k] for k in range(len(independent))])
 
     def _results(self, tasks, first: int, numbers: np.ndarray, size: int) -> Iterator[tuple[int, list[Found]]]:
-        if self.team.is_here:
-            for start in tasks:
-                yield start, self.sampler.found(first + start, numbers[start : start + size])
-            return
-
         def ask(start: int) -> Work:
-            return Work(_found, (first + start, numbers[start : start + size]))
+            return Work(Sampler.found, (first + start, numbers[start : start + size]))
 
         for start, rows in self.team.share(tasks, ask):
             if rows is Lost:
