@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from functools import cached_property, partial
 from types import SimpleNamespace
@@ -14,7 +14,7 @@ from ...case.measured import AREA, SHAPE
 from ...model.closed import ClosedValve, Passage
 from ...model.symmetry import equilibria_of
 from ...record.mesh import MeshData, WholeValve
-from ...record.record import GrowingRecord, plain
+from ...record.record import GrowingRecord
 from ...record.states import (
     CONVERGED,
     ENDED,
@@ -266,7 +266,7 @@ class ClosureResult(StudyResult):
     @cached_property
     def _all_states(self) -> tuple[PressedState, ...]:
         found = []
-        for index, row in self._rows(STATES, (*SUMMARY, *FIELDS)):
+        for index, row in enumerate(self._rows(STATES, (*SUMMARY, *FIELDS))):
             kept = row["stiffness_eigenvalues"]
             row["stiffness_eigenvalues"] = kept[~np.isnan(kept)]
             found.append(PressedState(**row, results=self, index=index))
@@ -282,22 +282,20 @@ class ClosureResult(StudyResult):
 
     @cached_property
     def walk(self) -> tuple[SimpleNamespace, ...]:
-        return tuple(SimpleNamespace(**row) for _, row in self._rows(PATH, POINT))
+        return tuple(SimpleNamespace(**row) for row in self._rows(PATH, POINT))
 
     @cached_property
     def buckling(self) -> tuple[SimpleNamespace, ...]:
-        return tuple(SimpleNamespace(**row) for _, row in self._rows(BUCKLING, BUCKLED))
+        return tuple(SimpleNamespace(**row) for row in self._rows(BUCKLING, BUCKLED))
 
     @cached_property
     def classes(self) -> tuple[ClassBuckling, ...]:
         """Classes of motion other than that of the path, where they were watched."""
         return read_classes(self.record)
 
-    def _rows(self, table: str, columns: Sequence[Column]) -> Iterator[tuple[int, dict[str, Any]]]:
-        """Rows of a table of the walk, with their numbers."""
-        data = {c.name: self.record.column(table, c.name) for c in columns}
-        for i in range(self.record.rows(table)):
-            yield i, {key: plain(values[i]) for key, values in data.items()}
+    def _rows(self, table: str, columns: tuple[Column, ...]) -> list[dict[str, Any]]:
+        """Rows of a table of the walk."""
+        return self.record.table_rows(TableSpec(table, columns))
 
     @property
     def walk_failure(self) -> str | None:
