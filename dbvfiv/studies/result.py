@@ -152,7 +152,11 @@ class StudyResult:
 
     def shortfall(self) -> str | None:
         """A clause on what was not reached, "2 of 3 pressures were reached"; None if nothing is missing."""
-        return "Not everything was reached" if self.failures else None
+        return self._missed(len(self.failures)) if self.failures else None
+
+    def _missed(self, lost: int) -> str:
+        """That clause, of a number of failures."""
+        return "Not everything was reached"
 
     # -- files and pictures ----
 

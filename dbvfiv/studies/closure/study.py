@@ -385,9 +385,7 @@ class ClosureResult(StudyResult):
     def remarks(self) -> list[str]:
         return sentences(self)
 
-    def shortfall(self) -> str | None:
-        if not self.failures:
-            return None
+    def _missed(self, lost: int) -> str:
         asked = len(self.case.closure.pressures)
         few = f"{len(self.states)} of {asked} back pressures were reached" if len(self.states) < asked else ""
         kept = f"; what was found is kept in {self.path}" if self.path else ""

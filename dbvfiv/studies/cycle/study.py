@@ -487,8 +487,8 @@ class CycleResult(StudyResult):
             **self.ending(),
         }
 
-    def shortfall(self) -> str | None:
-        return "The branch could not be followed to the end of the range" if self.failures else None
+    def _missed(self, lost: int) -> str:
+        return "The branch could not be followed to the end of the range"
 
     def lines(self) -> list[str]:
         rows = [printed_row(COLUMNS, point) for point in self.points]

@@ -427,9 +427,8 @@ class IdentifyResult(StudyResult):
             said.append(f"{name.capitalize()} the last record flutter begins at {middle} (95 %: {low} to {high}).")
         return said
 
-    def shortfall(self) -> str | None:
-        lost = len(self.failures)
-        return f"{lost} places have no steady state" if lost else None
+    def _missed(self, lost: int) -> str:
+        return f"{lost} places have no steady state"
 
 
 def _oscillation(match: dict[str, Any]) -> str:

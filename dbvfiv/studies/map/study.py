@@ -450,9 +450,8 @@ class MapResult(StudyResult):
         )
         return leading_class(names, rates, frequencies)
 
-    def shortfall(self) -> str | None:
-        gaps = len(self.failures)
-        return f"{gaps} of {len(self.columns)} columns were not reached" if gaps else None
+    def _missed(self, lost: int) -> str:
+        return f"{lost} of {len(self.columns)} columns were not reached"
 
     def lines(self) -> list[str]:
         lines = [f"At {describe_fixed(self.case, *self.moved)}:"]

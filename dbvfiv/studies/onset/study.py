@@ -240,9 +240,8 @@ class OnsetResult(StudyResult):
             **self.ending(),
         } | (compared if self.other_law else {})
 
-    def shortfall(self) -> str | None:
-        failed = len(self.failures)
-        return f"Parts of the range were not reached: {failed} states failed" if failed else None
+    def _missed(self, lost: int) -> str:
+        return f"Parts of the range were not reached: {lost} states failed"
 
     def lines(self) -> list[str]:
         fixed = f"At {describe_fixed(self.case, self.parameter)}:"

@@ -412,9 +412,8 @@ class ResponseResult(StudyResult):
         fixed = fixed_conditions(self.case, self.parameter)
         return {"parameter": self.parameter, "points": points, "fixed": fixed} | self.ending()
 
-    def shortfall(self) -> str | None:
-        lost = len(self.failures)
-        return f"There is no response at {lost} of the states" if lost else None
+    def _missed(self, lost: int) -> str:
+        return f"There is no response at {lost} of the states"
 
     def lines(self) -> list[str]:
         row = PARAMETERS[self.parameter]

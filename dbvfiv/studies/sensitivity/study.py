@@ -194,9 +194,8 @@ class SensitivityResult(StudyResult):
             **self.ending(),
         }
 
-    def shortfall(self) -> str | None:
-        lost = len(self.failures)
-        return f"The eigenvalue was not differentiated by {lost} of the parameters" if lost else None
+    def _missed(self, lost: int) -> str:
+        return f"The eigenvalue was not differentiated by {lost} of the parameters"
 
     def lines(self) -> list[str]:
         if not self.record.notes(MODE):

@@ -387,9 +387,7 @@ class SteadyResult(StudyResult):
             )
         return said
 
-    def shortfall(self) -> str | None:
-        if not self.failures:
-            return None
+    def _missed(self, lost: int) -> str:
         if not self.states:
             return "No pressure was reached"
         kept = f"; those states are kept in {self.path}" if self.path else ""

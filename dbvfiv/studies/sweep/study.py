@@ -499,9 +499,7 @@ class SweepResult(StudyResult):
             "interrupted": not (self.complete or bool(self.failures)),
         }
 
-    def shortfall(self) -> str | None:
-        if not self.failures:
-            return None
+    def _missed(self, lost: int) -> str:
         kept = f"; they are kept in {self.path}" if self.path else ""
         return f"{len(self.values)} of {len(self.axis.values)} values were reached{kept}"
 

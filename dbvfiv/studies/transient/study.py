@@ -216,9 +216,7 @@ class TransientResult(StudyResult):
             "complete": self.complete,
         }
 
-    def shortfall(self) -> str | None:
-        if not self.failures:
-            return None
+    def _missed(self, lost: int) -> str:
         kept = "nothing was kept, as no -o was given"
         if self.path:
             kept = f"what was found up to there is kept in {self.path}"

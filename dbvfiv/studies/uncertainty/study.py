@@ -550,9 +550,8 @@ class UncertaintyResult(StudyResult):
             )
         return lines
 
-    def shortfall(self) -> str | None:
-        missing = len(self.failures)
-        return f"{missing} of {len(self.plan.values)} values have no steady state" if missing else None
+    def _missed(self, lost: int) -> str:
+        return f"{lost} of {len(self.plan.values)} values have no steady state"
 
 
 #: Samples of equal weight that tell as much, below which nothing is said of percentiles.
