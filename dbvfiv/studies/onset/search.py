@@ -27,7 +27,7 @@ from ..stability.samples import Sample, SampleKey
 from ..stability.scan import Crossing
 from ..stability.verdict import not_valid_at
 from ..stability.walk import StabilityWalk
-from .line import FoundOnsets, OnsetPoint, Side
+from .line import FoundOnsets, OnsetPoint, Side, joined_stretches
 
 #: Meshes of a run: that of the case, and the coarser one for the uncertainty.
 FINE, COARSE = 0, 1
@@ -142,13 +142,8 @@ class OnsetSearch:
         """Sentences about what is not known: stretches of the scan without a certificate, and a band that was searched
         instead of all frequencies.
         """
-        name, said, joined = self.options.parameter, [], []
-        for low, high in self.scan.uncertain:
-            if joined and joined[-1][1] == low:
-                joined[-1][1] = high
-            else:
-                joined.append([low, high])
-        for low, high in joined:
+        name, said = self.options.parameter, []
+        for low, high in joined_stretches([self.scan.uncertain]):
             left = next((s.left_open for s in self.asked if low <= s.value <= high and s.left_open), "")
             why = left or "Spectrum and independent count do not agree everywhere."
             said.append(f"Between {name} = {low:.6g} and {high:.6g} nothing is claimed. {why}")
