@@ -184,8 +184,7 @@ def _doubts(plan: MapPlan, columns: Iterable[MapColumn], checks: Iterable[dict[s
                 f"differs by {check['error']:.1e}."
             )
     frequencies = [s.verdict.frequency for c in solved for row in c.samples.values() for s in row]
-    outside = outside_band(plan.case, frequencies)
-    return said if outside is None else [*said, outside]
+    return [*said, *filter(None, [outside_band(plan.case, frequencies)])]
 
 
 def _variants(plan: MapPlan) -> Iterator[tuple[str, list[int]]]:

@@ -388,8 +388,7 @@ def run_onset(
     for p in points:
         if not p.confirmed:
             warnings.append(f"The onset at {options.parameter} = {p.value:.6g} is not confirmed: {p.note}")
-    outside = outside_band(case, [p.frequency for p in points])
-    warnings += [] if outside is None else [outside]
+    warnings += filter(None, [outside_band(case, [p.frequency for p in points])])
     points = tuple(sorted(points, key=lambda p: p.value))
     variant = options.variant or own_variant(case)
     return FoundOnsets(variant, tuple(search.asked), points, tuple(failures), tuple(warnings))
