@@ -18,8 +18,7 @@ from ...drawing.style import headline, limits, log_axis, new_figure
 from ...errors import SolveError
 from ...model.closed import close_valve
 from ...model.leading import other_end
-from ...record.mesh import MeshData
-from ...record.record import GrowingRecord, Record
+from ...record.record import GrowingRecord
 from ...record.table import Column, TableSpec
 from ...texts import digits
 from ..case import Case
@@ -58,17 +57,10 @@ _VERIFIED = (
     Column("opening", "m^2", "Area between the lips"),
     Column("loss_coefficient", "", "Head loss over the velocity head at the flange"),
 )
+#: Designs, and verdicts on the best ones on a finer mesh; a run that goes on finds both again from the states, which
+#: are kept.
 _TABLES = TableSpec(DESIGNS, _DESIGNS), TableSpec(VERIFIED, _VERIFIED)
-
-
-def tables_of(_mesh: MeshData) -> tuple[TableSpec, ...]:
-    """Tables of a result: designs, and verdicts on the best ones on a finer mesh."""
-    return _TABLES
-
-
-def rows_to_keep(known: Record, _case: Case) -> dict[str, int]:
-    """Rows that a run goes on from: none, because designs follow from the states, which are kept."""
-    return {DESIGNS: 0, VERIFIED: 0}
+_NO_ROWS = {DESIGNS: 0, VERIFIED: 0}
 
 
 def check(case: Case) -> None:
@@ -423,7 +415,7 @@ def _shown(quantity: str, value: float) -> str:
     return text if isinstance(text, str) and row.shown else f"{value:.5g}"
 
 
-STUDY = Study("design", tables_of, run, DesignResult, check, rows_to_keep=rows_to_keep)
+STUDY = Study("design", lambda _mesh: _TABLES, run, DesignResult, check, rows_to_keep=lambda _known, _case: _NO_ROWS)
 
 
 #: Columns of verdicts that are drawn, their labels and factors.

@@ -41,6 +41,7 @@ _POSTERIOR = (
     Column("input", "", "Number of the input; then the common errors of frequencies and damping", "i8"),
     Column("score", "", "Independent standard normal score"),
 )
+#: Valves and their modes, and samples of the posterior.
 TABLES = (
     TableSpec(VALVES, _VALVES, chunk=512),
     TableSpec(SPECTRA, _SPECTRA, chunk=64),

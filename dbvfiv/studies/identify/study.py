@@ -17,9 +17,7 @@ from ...case.parameters import PARAMETERS
 from ...case.write import case_toml
 from ...drawing.style import ACCENT, COMPUTED, REST, headline, new_figure, parameter_label
 from ...errors import CaseError, SolveError
-from ...record.mesh import MeshData
 from ...record.record import GrowingRecord, Record
-from ...record.table import TableSpec
 from ...texts import digits
 from ..case import Case
 from ..inputs import Plan
@@ -51,11 +49,6 @@ INTERVAL, STEPS = (0.025, 0.5, 0.975), 41
 #: Distance of the distribution function of a posterior from that of its form up to which the form stands for it, and
 #: least correlation that is kept.
 FORM, KEPT = 0.06, 0.05
-
-
-def tables_of(_mesh: MeshData) -> tuple[TableSpec, ...]:
-    """Tables of a result: valves and their modes, and samples of the posterior."""
-    return TABLES
 
 
 def rows_to_keep(known: Record, _case: Case) -> dict[str, int]:
@@ -518,4 +511,4 @@ def onset(result: StudyResult) -> Figure:
     return figure
 
 
-STUDY = Study("identify", tables_of, run, IdentifyResult, check, rows_to_keep=rows_to_keep)
+STUDY = Study("identify", lambda _mesh: TABLES, run, IdentifyResult, check, rows_to_keep=rows_to_keep)

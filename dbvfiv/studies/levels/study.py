@@ -11,7 +11,6 @@ from ...case.materials import RUBBERS
 from ...errors import CaseError, SolveError
 from ...model.material_stability import LayerLevel
 from ...model.strain_level import agree_levels, beyond_tests
-from ...record.mesh import MeshData
 from ...record.record import GrowingRecord
 from ...record.table import TEXT, Column, Shown, TableSpec, printed_head, printed_row
 from ..result import StudyResult
@@ -32,11 +31,6 @@ _COLUMNS = (
     Column("mean", "", _MEAN, shown=Shown("mean", "%", 8, ".4g")),
 )
 _TABLE = TableSpec(LEVELS, _COLUMNS)
-
-
-def tables_of(mesh: MeshData) -> tuple[TableSpec, ...]:
-    """The table of a result."""
-    return (_TABLE,)
 
 
 def run(session: Session, record: GrowingRecord) -> None:
@@ -109,4 +103,4 @@ class LevelsResult(StudyResult):
         return [*printed_head(columns), *(printed_row(columns, row) for row in self.rows)]
 
 
-STUDY = Study("levels", tables_of, run, LevelsResult)
+STUDY = Study("levels", lambda _mesh: (_TABLE,), run, LevelsResult)

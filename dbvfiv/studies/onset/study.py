@@ -14,9 +14,7 @@ from ...case.parameters import PARAMETERS, Parameter
 from ...drawing.style import ACCENT, COMPUTED, HALO, PUBLISHED, REST, limits, log_axis, new_figure, parameter_label
 from ...model.symmetry import EQUILIBRIA
 from ...observer import Observer
-from ...record.mesh import MeshData
 from ...record.record import GrowingRecord, Record
-from ...record.table import TableSpec
 from ...texts import digits
 from ..case import Case
 from ..result import StudyResult
@@ -32,11 +30,6 @@ from .search import FINE, OnsetOptions, run_onset
 CRITICALITY = {"super": "supercritical", "sub": "subcritical"}
 #: Kinds of notes: on a point, and on a variant that was searched to its end.
 _POINT, _DONE = "point", "searched"
-
-
-def tables_of(_mesh: MeshData) -> tuple[TableSpec]:
-    """Tables of an onset result. Points are notes: what more is known about one is noted again."""
-    return (SAMPLE_TABLE,)
 
 
 class _Keeper(Observer):
@@ -486,4 +479,5 @@ def _title(result: StudyResult) -> str:
     return f"{result.header.name}, {describe_fixed(result.case, result.parameter)}"
 
 
-STUDY = Study("onset", tables_of, run, OnsetResult, check)
+# points are notes: what more is known about one is noted again
+STUDY = Study("onset", lambda _mesh: (SAMPLE_TABLE,), run, OnsetResult, check)

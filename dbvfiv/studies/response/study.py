@@ -30,7 +30,6 @@ from ...errors import CaseError, SolveError
 from ...flow.law import FlowMotion
 from ...model.dynamics import LinearisedState
 from ...model.state import LipCentre
-from ...record.mesh import MeshData
 from ...record.record import GrowingRecord, Record
 from ...record.table import Column, TableSpec
 from ...texts import digits
@@ -279,12 +278,8 @@ _POINTS = (
 )
 #: Frequencies below the curves at which the response is made too, over their step.
 SLOW = np.geomspace(0.01, 0.7, 8)
+#: Curves, peaks, and one row for each value of the range.
 _TABLES = TableSpec(CURVE, _CURVE, chunk=512), TableSpec(PEAKS, _PEAKS), TableSpec(POINTS, _POINTS)
-
-
-def tables_of(_mesh: MeshData) -> tuple[TableSpec, ...]:
-    """Tables of a result: curves, peaks, and one row for each value of the range."""
-    return _TABLES
 
 
 def rows_to_keep(known: Record, _case: Case) -> dict[str, int]:
@@ -506,4 +501,4 @@ def precursors(result: StudyResult) -> Figure:
     return figure
 
 
-STUDY = Study("response", tables_of, run, ResponseResult, check, rows_to_keep=rows_to_keep)
+STUDY = Study("response", lambda _mesh: _TABLES, run, ResponseResult, check, rows_to_keep=rows_to_keep)

@@ -11,7 +11,6 @@ import numpy as np
 
 from ...case.parameters import PARAMETERS, Mu
 from ...errors import CaseError, SolveError
-from ...record.mesh import MeshData
 from ...record.record import GrowingRecord, Record
 from ...record.table import Column, TableSpec
 from ...texts import digits
@@ -52,6 +51,7 @@ _NUMBERS = (
     Column("log_weight", "", "Logarithm of the weight of the sample"),
     Column("stage", "", "0 of samples of the inputs as they are, then the step towards a rare event", "i8"),
 )
+#: Verdicts on the samples, and their inputs.
 _TABLES = TableSpec(SAMPLES, _SAMPLES, chunk=512), TableSpec(NUMBERS, _NUMBERS, chunk=512)
 #: Samples that a worker takes at a time: of valves that share their states, and of valves with their own.
 SHARED, OWN = 64, 4
@@ -63,11 +63,6 @@ PAYS = 48
 FINAL = 0.4
 #: Quantities whose percentiles are told.
 _SPREADS = ("damping_ratio", "frequency", "opening", "flow")
-
-
-def tables_of(_mesh: MeshData) -> tuple[TableSpec, ...]:
-    """Tables of a result: verdicts on the samples, and their inputs."""
-    return _TABLES
 
 
 def rows_to_keep(known: Record, _case: Case) -> dict[str, int]:
@@ -582,4 +577,4 @@ def _plain(value: float) -> float | None:
     return float(value) if np.isfinite(value) else None
 
 
-STUDY = Study("uncertainty", tables_of, run, UncertaintyResult, check, rows_to_keep=rows_to_keep)
+STUDY = Study("uncertainty", lambda _mesh: _TABLES, run, UncertaintyResult, check, rows_to_keep=rows_to_keep)
