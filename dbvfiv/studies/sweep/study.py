@@ -26,10 +26,10 @@ from ...model.state import SteadyState
 from ...record.mesh import MeshData
 from ...record.record import GrowingRecord, Record
 from ...record.states import SUMMARY
-from ...record.table import Column, TableSpec
+from ...record.table import Column, Shown, TableSpec, printed_head, printed_row
 from ..case import Case
 from ..result import StudyResult
-from ..session import Session, Study, describe_surroundings
+from ..session import Session, Study, describe_surroundings, print_rows
 from ..stability.dimensions import variants
 from ..stability.line import ParameterLine
 from ..stability.place import is_surrounding, require_parameter
@@ -517,7 +517,7 @@ class SweepResult(StudyResult):
             else ["Not certified: no value was checked."]
         )
         return [
-            *head(self.parameter, unit),
+            *printed_head(_columns(self.case)),
             *rows_of_sweep(self),
             "",
             *crossings,
@@ -533,39 +533,38 @@ def _shown(case: Case, parameter: str) -> tuple[str, float]:
     return PARAMETERS[parameter].quantity.si, 1.0
 
 
-def head(parameter: str, unit: str) -> tuple[str, str]:
-    """Names and units above the table."""
-    return (
-        f"{parameter:>12} {'growth rate':>12} {'frequency':>11} {'unstable':>9}",
-        f"{unit:>12} {'1/s':>12} {'Hz':>11}",
-    )
+def _columns(case: Case) -> tuple[Column, ...]:
+    """Columns of the printed table: a value of the parameter, the leading mode, unstable eigenvalues."""
+    unit, scale = _shown(case, case.sweep.axis.parameter)
+    value = Shown(case.sweep.axis.parameter, unit, 12, lambda row: f"{row['value'] / scale:.6g}")
+    others = Shown("growth rate", "1/s", 12, ".4f"), Shown("frequency", "Hz", 11, ".4f"), Shown("unstable", "", 9, "d")
+    names = ("value", "growth_rate", "frequency", "unstable")
+    return tuple(Column(name, "", "", shown=shown) for name, shown in zip(names, (value, *others)))
 
 
 def print_live(case: Case) -> Callable[[Any], str]:
-    """Lines of the table as values are solved: the leading mode and the number of unstable eigenvalues."""
-    unit, scale = _shown(case, case.sweep.axis.parameter)
-    top = list(head(case.sweep.axis.parameter, unit))
+    """Lines of the table as values are solved."""
+    write = print_rows(_columns(case))
 
-    def write(item: Sample | SteadyState) -> str:
+    def tell(item: Sample | SteadyState) -> str:
         if isinstance(item, SteadyState):
             return f"Steady state at {item.pressure:.6g} Pa."
-        leading = item.eigenvalues[0] if len(item.eigenvalues) else complex(np.nan, np.nan)
-        lines = [*top, _row(item.value / scale, leading.real, abs(leading.imag) / (2 * np.pi), item.unstable)]
-        top.clear()
-        return "\n".join(lines)
+        found = {name: item.number(name) for name in ("value", "growth_rate", "frequency", "unstable")}
+        return write(found | {"frequency": abs(found["frequency"])})
 
-    return write
+    return tell
 
 
 def rows_of_sweep(result: SweepResult) -> list[str]:
     """One line for each value: the leading branch."""
-    rows, (_, scale) = [], _shown(result.case, result.parameter)
+    rows, columns = [], _columns(result.case)
     for i, value in enumerate(result.values):
         there = [b for b in result.branches if np.isfinite(b.growth_rate[i])]
         leading = max(there, key=lambda b: b.growth_rate[i], default=None)
         growth, frequency = (leading.growth_rate[i], leading.frequency[i]) if leading else (np.nan, np.nan)
         outcome = result.verdicts[i].outcome if result.verdicts else ""
-        rows.append(f"{_row(value / scale, growth, frequency, result.unstable_count[i])}  {outcome}".rstrip())
+        row = {"value": value, "growth_rate": growth, "frequency": frequency, "unstable": result.unstable_count[i]}
+        rows.append(f"{printed_row(columns, row)}  {outcome}".rstrip())
     return rows
 
 
@@ -577,10 +576,6 @@ def crossing_line(result: SweepResult, crossing: Crossing) -> str:
     place = shown.amount(crossing.value, 4)
     under = f" under {result.case.continuity}" if result.case.continuity else ""
     return f"Branch {crossing.branch} becomes {becomes} near {result.parameter} {place} {how}{under} (interpolated)."
-
-
-def _row(value: float, growth: float, frequency: float, unstable: int) -> str:
-    return f"{value:>12.6g} {growth:>12.4f} {frequency:>11.4f} {unstable:>9d}"
 
 
 STUDY = Study("sweep", tables_of, run, SweepResult, check, rows_to_keep=rows_to_keep, live=print_live)
