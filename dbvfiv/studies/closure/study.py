@@ -232,11 +232,6 @@ MEASURED = {AREA: PASSAGE, SHAPE: None}
 class ClosureResult(StudyResult):
     """States under back pressure in the order they were found, with the path that led to them.
 
-    Parameters
-    ----------
-    record : Record
-    session : Session, optional
-
     Attributes
     ----------
     states : tuple of PressedState

@@ -170,10 +170,6 @@ class EnergyLedger:
     through both ends with the tangents dq/dP where these are known, else as straight. A follower pressure on a surface
     with a free edge has no potential, so that its work is one along the path and not a function of its ends.
 
-    Parameters
-    ----------
-    model : ValveModel or alike
-
     Attributes
     ----------
     work, stored, defect : float, J
@@ -252,11 +248,6 @@ def rows_to_keep(known: Record, _case: Case) -> dict[str, int]:
 
 class ClosureWalk:
     """The walk of one model; rows of its record are appended as soon as they are found.
-
-    Parameters
-    ----------
-    model : ClosedValve
-    record : GrowingRecord
 
     Attributes
     ----------

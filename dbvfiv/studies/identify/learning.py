@@ -220,12 +220,6 @@ def _coordinate(distribution: Distribution, scores: np.ndarray) -> np.ndarray:
 class Learning:
     """Modes of sampled valves and measured oscillations.
 
-    Parameters
-    ----------
-    plan : Plan
-    places : Places
-    lines : sequence of Measured
-
     Attributes
     ----------
     scores : (n, d) array

@@ -88,12 +88,7 @@ def measured_of(case: Case, record: int) -> tuple[list[Measured], str]:
 
 @dataclass(frozen=True)
 class Places:
-    """Parameter points at which valves are asked: those of the records, then values of a range.
-
-    Attributes
-    ----------
-    case : Case
-    """
+    """Parameter points at which valves are asked: those of the records, then values of a range."""
 
     case: Case
 

@@ -32,12 +32,7 @@ _CHANCE = "probability"
 
 
 class Chances:
-    """Samples of valves over the cells of columns.
-
-    Parameters
-    ----------
-    case : Case
-    """
+    """Samples of valves over the cells of columns."""
 
     def __init__(self, case: Case):
         self.plan = MapPlan(case)

@@ -56,12 +56,7 @@ class ColumnTask(NamedTuple):
 @shortly
 @dataclass(frozen=True)
 class MapPlan:
-    """Plan of the map of a case: its cells, and the order in which they are computed.
-
-    Attributes
-    ----------
-    case : Case
-    """
+    """Plan of the map of a case: its cells, and the order in which they are computed."""
 
     case: Case
 
@@ -297,12 +292,7 @@ class ColumnPool(Workers):
         self.known = {(column.value, column.level): column for column in known}
 
     def columns(self, wanted: Iterable[ColumnTask]) -> Iterator[MapColumn]:
-        """Columns as they are finished, in any order.
-
-        Parameters
-        ----------
-        wanted : iterable of ColumnTask
-        """
+        """Columns as they are finished, in any order."""
         if self.is_here:
             for task in wanted:
                 yield self._recalled(task) or solve_column(self.plan, self.walk, task)

@@ -199,14 +199,7 @@ def mode_shapes(result: StudyResult, modes) -> Figure:
 
 
 class ModeSurface:
-    """The valve swinging in a mode, ready to be drawn at any phase.
-
-    Parameters
-    ----------
-    result : StudyResult
-    mode : ModeShape
-    skin : ValveSkin, optional
-    """
+    """The valve swinging in a mode, ready to be drawn at any phase."""
 
     def __init__(self, result: StudyResult, mode: ModeShape, skin: ValveSkin | None = None):
         self.skin = skin or ValveSkin.of(result.mesh)

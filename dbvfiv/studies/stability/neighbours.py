@@ -213,13 +213,7 @@ def _error(at: At, near: Neighbours, checks: np.ndarray) -> float:
 
 
 class Beside:
-    """Verdicts on the neighbours of a valve.
-
-    Parameters
-    ----------
-    at : callable
-    near : Neighbours
-    """
+    """Verdicts on the neighbours of a valve."""
 
     def __init__(self, at: At, near: Neighbours):
         self.near = near

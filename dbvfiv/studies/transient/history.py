@@ -411,11 +411,6 @@ class Keeper:
     """Keeps a run in a record, which holds the rows of an earlier part already where it goes on.
 
     The history can be read by the names of its columns at any time.
-
-    Parameters
-    ----------
-    record : GrowingRecord
-    model : ValveModel
     """
 
     def __init__(self, record: GrowingRecord, model: ValveModel):
