@@ -69,12 +69,6 @@ def test_a_valve_at_rest_against_it():
     )
 
 
-def test_equilibria_do_not_depend_on_density():
-    water, light = (load_small(PIPE, {"fluid.density": rho}).steady(pressure="18 kPa") for rho in (1000.0, 2.0))
-    assert light.lip_opening == pytest.approx(water.lip_opening, rel=1e-9)
-    assert light.outlet_pressure == pytest.approx(water.outlet_pressure, rel=1e-9)
-
-
 def test_a_valve_at_the_pressure_it_sees_is_that_of_a_free_discharge():
     state = load_small(PIPE).steady(pressure="18 kPa")
     free = load_small().steady(pressure=state.flange_pressure - state.outlet_pressure)
@@ -165,9 +159,6 @@ def test_walks_reach_states_against_a_pressure():
         assert walk.equilibrium(place.at(pressure=pressure)) == pytest.approx(state.q, rel=1e-6, abs=1e-9)
 
 
-# -- over the length of the pipe
-# ----
-
 KEYS = {"drive.pressure": 2e3, "fluid.density": 60.0, "damping.alpha": 0.0, "onset.coarse_mesh": 0}
 
 
@@ -180,37 +171,3 @@ def test_onset_over_the_length_of_the_pipe():
         assert point["confirmed"] and point["criticality"] in ("super", "sub")
         there = load_small(PIPE, KEYS, FORMER, {"downstream.length": point["value"]}).modes(count=4).modes
         assert min(abs(mode.growth_rate) for mode in there) < 1e-4
-
-
-@pytest.mark.slow
-def test_sensitivity_to_the_length_of_the_pipe():
-    (found,) = load_small(PIPE, KEYS).steady(pressure=2e3).sensitivity("tail_length").sensitivities
-    low, high = (
-        load_small(PIPE, KEYS, {"downstream.length": 5.0 + step}).modes(count=4).modes[0].growth_rate
-        for step in (-0.02, 0.02)
-    )
-    assert found.growth_rate == pytest.approx((high - low) / 0.04, rel=1e-3)
-
-
-@pytest.mark.slow
-def test_modes_over_the_length_of_the_pipe_are_those_of_each_length():
-    found = load_small(PIPE, KEYS).sweep("tail_length=1:50:5:log")
-    assert found.certified
-    for i, value in enumerate(found.values):
-        leading = load_small(PIPE, KEYS, {"downstream.length": float(value)}).modes(count=4).modes[0]
-        growth = max(b.growth_rate[i] for b in found.branches if np.isfinite(b.growth_rate[i]))
-        assert growth == pytest.approx(leading.growth_rate, rel=1e-6)
-
-
-@pytest.mark.slow
-def test_map_over_the_length_of_the_pipe():
-    found = load_small(PIPE, KEYS, {"map.x": "density=10:200:3:log", "map.y": "tail_length=1:20:3:log"}).map()
-    assert not found.failures and found.grid("certified").all()
-    (growth,) = found.grid("growth_rate")
-    leading = load_small(PIPE, KEYS, {"downstream.length": 20.0, "fluid.density": 200.0}).modes(count=4).modes[0]
-    assert growth[-1, -1] == pytest.approx(leading.growth_rate, rel=1e-6)
-
-
-def test_a_case_without_a_pipe_has_no_length_to_change():
-    with pytest.raises(CaseError, match="no tail_length to change.*downstream.pipe_diameter"):
-        load_small(LIGHT).onset("tail_length=1:50:5:log")

@@ -1,4 +1,6 @@
-"""Studies of a valve behind a pipe: steady heads, modes, and sweeps, onsets, maps and sensitivities over its length."""
+"""Studies of a valve behind a pipe: heads, modes, and sweeps, onsets, maps and sensitivities over its length, or that
+of a pipe behind the valve.
+"""
 
 from __future__ import annotations
 
@@ -16,6 +18,10 @@ from tests.small_valves import FORMER, SMALL, load_small
 LINE = {"upstream.length": 20.0, "upstream.diameter": "300 mm", "upstream.loss": 1.5}
 FRICTION = LINE | {"upstream.friction": 0.02}
 LIGHT = {"fluid.density": 10.0, "drive.pressure": "6 kPa", "damping.alpha": 0.0}
+TAIL = {"downstream.pipe_diameter": "305 mm", "downstream.length": 5.0, "downstream.loss": 1.5}
+#: Keys of the lengths, and cases that have them.
+KEYS = {"pipe_length": "upstream.length", "tail_length": "downstream.length"}
+CASES = {"pipe_length": LIGHT | LINE, "tail_length": LIGHT | TAIL | {"fluid.density": 60.0, "drive.pressure": 2e3}}
 
 
 @pytest.mark.parametrize("at", ["reservoir", "line"])
@@ -41,10 +47,11 @@ def test_without_losses_a_gauge_at_the_far_end_shows_the_pressure_at_the_flange(
     assert behind.mass_flow == pytest.approx(bare.mass_flow, rel=1e-9) and behind.line_loss == 0.0
 
 
-def test_equilibria_do_not_depend_on_density():
-    water, light = (load_small(FRICTION, {"fluid.density": rho}).steady(pressure="18 kPa") for rho in (1000.0, 2.0))
+@pytest.mark.parametrize("pipe, pressure", [(FRICTION, "flange_pressure"), (TAIL, "outlet_pressure")])
+def test_equilibria_do_not_depend_on_density(pipe, pressure):
+    water, light = (load_small(pipe, {"fluid.density": rho}).steady(pressure="18 kPa") for rho in (1000.0, 2.0))
     assert light.lip_opening == pytest.approx(water.lip_opening, rel=1e-9)
-    assert light.flange_pressure == pytest.approx(water.flange_pressure, rel=1e-9)
+    assert getattr(light, pressure) == pytest.approx(getattr(water, pressure), rel=1e-9)
 
 
 def test_printed_pressures_say_where_they_are(command_line):
@@ -68,11 +75,12 @@ def test_verdicts_name_the_continuity_law(command_line):
 
 
 @pytest.mark.slow
-def test_modes_over_the_length_are_those_of_each_length():
-    found = load_small(LIGHT, LINE).sweep("pipe_length=1:50:5:log")
+@pytest.mark.parametrize("name", KEYS)
+def test_modes_over_the_length_are_those_of_each_length(name):
+    found = load_small(CASES[name]).sweep(f"{name}=1:50:5:log")
     assert found.certified
     for i, value in enumerate(found.values):
-        leading = load_small(LIGHT, LINE, {"upstream.length": float(value)}).modes(count=4).modes[0]
+        leading = load_small(CASES[name], {KEYS[name]: float(value)}).modes(count=4).modes[0]
         growth = max(b.growth_rate[i] for b in found.branches if np.isfinite(b.growth_rate[i]))
         assert growth == pytest.approx(leading.growth_rate, rel=1e-6)
 
@@ -108,26 +116,36 @@ def test_onset_over_the_length_whether_or_not_the_steady_state_is_found_anew():
     assert min(abs(mode.growth_rate) for mode in modes) < 1e-5
 
 
-def test_map_over_the_length(tmp_path):
-    axes = {"map.x": "pressure=1 kPa:6 kPa:3:log", "map.y": "pipe_length=5:100:3:log"}
-    found = load_small(LIGHT, LINE, axes).map()
+@pytest.mark.parametrize(
+    "name, x, y, last",
+    [
+        ("pipe_length", "pressure=1 kPa:6 kPa:3:log", "5:100:3:log", {"upstream.length": 100.0, "drive.pressure": 6e3}),
+        pytest.param(
+            *("tail_length", "density=10:200:3:log", "1:20:3:log", {"downstream.length": 20.0, "fluid.density": 200.0}),
+            marks=pytest.mark.slow,
+        ),
+    ],
+)
+def test_map_over_the_length(name, x, y, last):
+    found = load_small(CASES[name], {"map.x": x, "map.y": f"{name}={y}"}).map()
     assert not found.failures and found.grid("certified").all()
     (growth,) = found.grid("growth_rate")
-    leading = load_small(LIGHT, LINE, {"upstream.length": 100.0, "drive.pressure": 6e3}).modes(count=4).modes[0]
+    leading = load_small(CASES[name], last).modes(count=4).modes[0]
     assert growth[-1, -1] == pytest.approx(leading.growth_rate, rel=1e-6)
 
 
 @pytest.mark.slow
-def test_sensitivity_to_the_length():
-    for line in (LINE, FRICTION):
-        (found,) = load_small(LIGHT, line).steady(pressure="6 kPa").sensitivity("pipe_length").sensitivities
-        low, high = (
-            load_small(LIGHT, line, {"upstream.length": 20.0 + step}).modes(count=4).modes[0].growth_rate
-            for step in (-0.02, 0.02)
-        )
-        assert found.growth_rate == pytest.approx((high - low) / 0.04, rel=1e-3)
+@pytest.mark.parametrize("name, more", [("pipe_length", {}), ("pipe_length", FRICTION), ("tail_length", {})])
+def test_sensitivity_to_the_length(name, more):
+    keys, key = CASES[name] | more, KEYS[name]
+    (found,) = load_small(keys).steady(pressure=keys["drive.pressure"]).sensitivity(name).sensitivities
+    low, high = (
+        load_small(keys, {key: keys[key] + step}).modes(count=4).modes[0].growth_rate for step in (-0.02, 0.02)
+    )
+    assert found.growth_rate == pytest.approx((high - low) / 0.04, rel=1e-3)
 
 
-def test_a_case_without_a_line_has_no_length_to_change():
-    with pytest.raises(CaseError, match="no pipe_length to change.*upstream.length"):
-        load_small(LIGHT).onset("pipe_length=1:50:5:log")
+@pytest.mark.parametrize("name, key", [("pipe_length", "upstream.length"), ("tail_length", "downstream.pipe_diameter")])
+def test_a_case_without_a_pipe_has_no_length_to_change(name, key):
+    with pytest.raises(CaseError, match=f"no {name} to change.*{key}"):
+        load_small(LIGHT).onset(f"{name}=1:50:5:log")
