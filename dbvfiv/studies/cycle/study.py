@@ -363,11 +363,7 @@ class Point:
     def __init__(self, result: CycleResult, number: int):
         self.result, self.number = result, number
         self.numbers = {c.name: result.record.value(CYCLES, c.name, number) for c in COLUMNS}
-
-    def __getattr__(self, name: str):
-        if name.startswith("__") or name not in self.__dict__.get("numbers", {}):
-            raise AttributeError(name)
-        return self.numbers[name]
+        vars(self).update(self.numbers)
 
     @property
     def stable(self) -> bool | None:
