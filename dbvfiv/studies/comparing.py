@@ -15,6 +15,7 @@ from matplotlib.figure import Figure
 from ..drawing.style import COMPUTED, kilopascals, new_figure, pressure_colours, some_of, style
 from ..drawing.views import closed_section
 from ..errors import CaseError
+from ..texts import json_value
 from .measured import MeasuredCurve, MeasuredSection, MeasuredShapes
 from .result import StudyResult
 
@@ -145,7 +146,7 @@ class Comparison:
         """One entry for each pressure, SI; None where a run has nothing."""
         table = dict(self.values) | {q.key: self.difference(q) for q in self.quantities if q.key}
         return [
-            {"pressure": float(p)} | {name: _plain(values[:, k]) for name, values in table.items()}
+            {"pressure": float(p)} | {name: json_value(values[:, k]) for name, values in table.items()}
             for k, p in enumerate(self.pressure)
         ]
 
@@ -177,10 +178,6 @@ class Comparison:
     def draw(self) -> Figure:
         """Figure of the runs."""
         return self.picture(self.results)
-
-
-def _plain(values: np.ndarray) -> list[float | None]:
-    return [float(value) if np.isfinite(value) else None for value in values]
 
 
 def cell(value: float, width: int, form: str) -> str:

@@ -18,6 +18,7 @@ from ..drawing.views import closed_section, faces
 from ..errors import CaseError
 from ..record.mesh import MeshData
 from ..record.record import GrowingRecord, Record
+from ..texts import json_value
 
 #: Kind of the note of a record that holds a table.
 NOTE = "measured"
@@ -72,13 +73,7 @@ def _joined(tables: Iterable[MeasuredTable], kind: str, *names: str) -> list[tup
 
 def plain_rows(names: tuple[str, ...], rows: Iterable[Iterable[Any]]) -> list[dict[str, Any]]:
     """Rows for JSON: words as they are, None for what is not finite."""
-
-    def plain(value: Any) -> Any:
-        if value is None or isinstance(value, str):
-            return value
-        return float(value) if np.isfinite(value) else None
-
-    return [{name: plain(value) for name, value in zip(names, row)} for row in rows]
+    return [{name: json_value(value) for name, value in zip(names, row)} for row in rows]
 
 
 def _spread(values: np.ndarray) -> str:

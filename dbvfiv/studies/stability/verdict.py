@@ -17,7 +17,7 @@ import numpy as np
 from eigen.certificate import Certificate
 
 from ...case.parameters import PARAMETERS
-from ...texts import digits, shortly
+from ...texts import digits, json_value, shortly
 
 STABLE, FLUTTERS, DIVERGES, NOT_VALID, UNDECIDED = "stable", "flutters", "diverges", "not valid", "undecided"
 #: Outcomes, the one that decides about several motions of a state first.
@@ -189,7 +189,7 @@ class Verdict:
 
     def summary(self) -> dict[str, Any]:
         """Plain numbers for JSON; None for what is not known."""
-        return {field.name: _plain(getattr(self, field.name)) for field in fields(self)}
+        return {field.name: json_value(getattr(self, field.name)) for field in fields(self)}
 
     @classmethod
     def read(cls, summary: Mapping[str, Any]) -> Verdict:
@@ -233,7 +233,3 @@ def lowered(sentence: str) -> str:
 
 def _or_least(value: float) -> float:
     return value if np.isfinite(value) else -np.inf
-
-
-def _plain(value: Any) -> Any:
-    return None if isinstance(value, float) and not np.isfinite(value) else value

@@ -13,7 +13,7 @@ from ...case.parameters import PARAMETERS, Mu
 from ...errors import CaseError, SolveError
 from ...record.record import GrowingRecord, Record
 from ...record.table import Column, TableSpec
-from ...texts import digits
+from ...texts import digits, json_value
 from ..case import Case
 from ..inputs import CONFIDENCE, Plan, Probability, counted, parameter_of, quasi_random
 from ..result import StudyResult
@@ -407,12 +407,14 @@ class UncertaintyResult(StudyResult):
         spreads = {name: _percentiles(found[name][plain]) for name in _SPREADS}
         return {
             "value": float(value),
-            "probability": _plain(flutter.value),
+            "probability": json_value(flutter.value),
             "interval": [flutter.low, flutter.high],
             "samples": len(found["outcome"]),
             "undecided": int(_are(found, UNDECIDED).sum()),
             "shared": self._shared(value, found["sample"]),
-            "outcomes": {n: {"probability": _plain(p.value), "interval": [p.low, p.high]} for n, p in others.items()},
+            "outcomes": {
+                name: {"probability": json_value(p.value), "interval": [p.low, p.high]} for name, p in others.items()
+            },
             "percentiles": spreads,
             "decides": self.decides(value),
         }
@@ -434,7 +436,7 @@ class UncertaintyResult(StudyResult):
         margin = shares(scores, found["damping_ratio"][plain])
         outcome = shares(scores, _are(found, FLUTTERS)[plain].astype(float))
         rows = [
-            {"parameter": one.name, "share": _plain(m), "share_of_outcome": _plain(o)}
+            {"parameter": one.name, "share": json_value(m), "share_of_outcome": json_value(o)}
             for one, m, o in zip(self.plan.inputs, margin, outcome)
         ]
         return sorted(rows, key=lambda row: -(row["share"] or 0.0))
@@ -571,10 +573,6 @@ def _percentiles(values: np.ndarray, weights: np.ndarray | None = None) -> list[
     order = np.argsort(values)
     share = np.cumsum(weights[known][order]) / weights[known].sum()
     return [float(values[order][np.searchsorted(share, q)]) for q in (0.025, 0.5, 0.975)]
-
-
-def _plain(value: float) -> float | None:
-    return float(value) if np.isfinite(value) else None
 
 
 STUDY = Study("uncertainty", lambda _mesh: _TABLES, run, UncertaintyResult, check, rows_to_keep=rows_to_keep)
