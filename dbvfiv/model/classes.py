@@ -16,7 +16,6 @@ import numpy as np
 import scipy.sparse as sp
 
 from ..flow.plug import centroid_matrix, centroid_slope, plug_parts
-from ..shell.pressure import pressure_stiffness
 from ..shell.shell import Shell
 from .dynamics import LinearisedState, linearise, without_circulation
 from .symmetry import ClassDofs, Symmetry
@@ -80,10 +79,7 @@ def linearise_class(model: ValveModel, q: np.ndarray, inlet: float, symmetry: Sy
         model.weight.add_tangent(shell, still, structure)
     if symmetry.moves_lips_apart:
         add_stops(structure, model, q, dofs)
-    stiffness = structure.copy()
-    pressure = model.flow.steady_pressure(area, inlet)[model.station_of_node]
-    surface = shell.mesh
-    pressure_stiffness(surface.quads, surface.nodes, nodal, pressure, model.loaded, dofs.slots, -1.0, stiffness)
+    stiffness = model.follower_stiffness(nodal, model.flow.steady_pressure(area, inlet), structure, dofs)
     slope = sway_of_sections(model, nodal, symmetry, dofs)
     matrices = [dofs.matrix(values) for values in (shell.mass(still), structure, stiffness)]
     if model.contact is not None:

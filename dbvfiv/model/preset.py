@@ -24,7 +24,7 @@ from scipy.optimize import root_scalar
 from eigen.factor import DirectFactor
 
 from ..errors import SolveError
-from ..shell.mesh import ShellMesh
+from ..shell.mesh import DofMap, ShellMesh
 from ..shell.pressure import pressure_force, pressure_stiffness
 from ..shell.shell import Shell
 from .load_steps import LoadStepOptions, LoadSteps
@@ -56,7 +56,7 @@ class PressedShell:
         r(q; P) = f_shell(q) - sign * P * f(q) = 0
 
     with f the force of unit pressure along the outward normal. It answers what `dbvfiv.model.newton.EquilibriumSolver`
-    and load steps ask of a model.
+    and load steps ask of a model. `dbvfiv.model.valve.ValveModel` is one whose pressures vary from station to station.
 
     Parameters
     ----------
@@ -104,32 +104,32 @@ class PressedShell:
         nodal = self.nodal(q)
         force, structure = self.structure(q)
         force -= self.pressure_force(nodal, pressure)
-        stiffness = structure.copy()
-        surface = self.mesh
-        pressure_stiffness(
-            surface.quads,
-            surface.nodes,
-            nodal,
-            self._uniform(pressure),
-            self.loaded,
-            self.shell.dofs.slots,
-            -1.0,
-            stiffness,
-        )
-        return PressedTangent(force, structure, stiffness)
+        return PressedTangent(force, structure, self.follower_stiffness(nodal, pressure, structure))
+
+    def nodal_pressure(self, pressure: float) -> np.ndarray:
+        """Pressures (nn,) at the nodes, Pa, along the outward normal."""
+        return np.full(self.shell.mesh.node_count, self.sign * pressure)
 
     def pressure_force(self, nodal: np.ndarray, pressure: float) -> np.ndarray:
-        """Force (n,) of the pressure on the deformed surface."""
+        """Force (n,) of the pressure, as `nodal_pressure` takes it, on the deformed surface."""
         return self.shell.dofs.restrict(self.nodal_pressure_force(nodal, pressure))
 
     def nodal_pressure_force(self, nodal: np.ndarray, pressure: float) -> np.ndarray:
         """Force (nn, c) of the pressure on all nodes, held or not."""
-        out = np.zeros_like(nodal)
-        pressure_force(self.mesh.quads, self.mesh.nodes, nodal, self._uniform(pressure), self.loaded, out)
+        out, surface = np.zeros_like(nodal), self.shell.mesh
+        pressure_force(surface.quads, surface.nodes, nodal, self.nodal_pressure(pressure), self.loaded, out)
         return out
 
-    def _uniform(self, pressure: float) -> np.ndarray:
-        return np.full(self.mesh.node_count, self.sign * pressure)
+    def follower_stiffness(
+        self, nodal: np.ndarray, pressure: float, structure: np.ndarray, dofs: DofMap | None = None
+    ) -> np.ndarray:
+        """Values (nnz,) of the structure's tangent less the derivative of the force of constant pressures, by the
+        unknowns of the shell, or by others.
+        """
+        data, surface, slots = structure.copy(), self.shell.mesh, (dofs or self.shell.dofs).slots
+        at_nodes = self.nodal_pressure(pressure)
+        pressure_stiffness(surface.quads, surface.nodes, nodal, at_nodes, self.loaded, slots, -1.0, data)
+        return data
 
     # -- what solvers ask
     # ----
@@ -147,7 +147,7 @@ class PressedShell:
         return self.shell.dofs.matrix(tangent.stiffness) @ direction
 
     def rounding(self, q: np.ndarray, tangent: PressedTangent) -> float:
-        """Norm of the residual that rounding of the positions alone can leave, N."""
+        """Norm of the residual that rounding of the positions alone can leave, N: machine epsilon times |K| |x|."""
         position = np.abs(self.nodal(q))
         position[:, :3] += np.abs(self.mesh.nodes)
         stiffness = self.shell.dofs.matrix(np.abs(tangent.structure))

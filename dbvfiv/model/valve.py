@@ -26,7 +26,7 @@ from ..flow.rows import RowAreas
 from ..flow.terms.line import Line, PiecedLine
 from ..flow.terms.pump import Pump
 from ..flow.terms.tail import Tail
-from ..shell.pressure import Weight, pressure_force, pressure_stiffness, station_forces
+from ..shell.pressure import Weight, station_forces
 from ..shell.section import Section
 from ..shell.shell import StepWall
 from .build import build_flow, build_shell, build_weight, loaded_share
@@ -34,6 +34,7 @@ from .linear import CoupledFactor
 from .load_steps import Loading
 from .newton import EquilibriumSolver, NewtonOptions
 from .outside import OutsideFluid
+from .preset import PressedShell
 from .relaxing import WallRelaxation
 from .supports import HELD_LIPS, face_contact, free_unknowns, held_rows, lip_stops
 
@@ -70,7 +71,7 @@ class Tangent:
 GRAZING = 0.1
 
 
-class ValveModel:
+class ValveModel(PressedShell):
     """The coupled valve of a case.
 
     Parameters
@@ -126,11 +127,6 @@ class ValveModel:
         return f"<ValveModel: {self.size} unknowns, {self.case.fluid.continuity}>"
 
     @property
-    def size(self) -> int:
-        """Number of unknowns n."""
-        return self.shell.size
-
-    @property
     def line(self) -> Line | PiecedLine | None:
         """The pipe in front of the valve, or the pipes, if there is one."""
         return self._term(Line, PiecedLine)
@@ -178,10 +174,6 @@ class ValveModel:
     def _preset_force(self) -> float:
         """Norm of the force, N, that a bill that is moulded shut needs in the shape it is drawn in."""
         return 0.0 if self.shell.stress_free is None else float(np.linalg.norm(self.shell.force(np.zeros(self.size))))
-
-    def nodal(self, q: np.ndarray) -> np.ndarray:
-        """Nodal displacements and rotations (nn, c)."""
-        return self.shell.dofs.expand(q)
 
     # -- statics
     # ----
@@ -293,25 +285,9 @@ class ValveModel:
         """K_g (n, n): material part of the tangent of each group of `relaxation`."""
         return tuple(self.shell.dofs.matrix(values) for values in self.shell.relaxing_tangents(q))
 
-    def pressure_force(self, nodal: np.ndarray, p: np.ndarray) -> np.ndarray:
-        """Force (n,) of station pressures p (m,), Pa, on the deformed wall."""
-        return self.shell.dofs.restrict(self.nodal_pressure_force(nodal, p))
-
-    def nodal_pressure_force(self, nodal: np.ndarray, p: np.ndarray) -> np.ndarray:
-        """Force (nn, c) of station pressures p (m,), Pa, on all nodes, held or not."""
-        out = np.zeros_like(nodal)
-        surface = self.shell.mesh
-        pressure_force(surface.quads, surface.nodes, nodal, p[self.station_of_node], self.loaded, out)
-        return out
-
-    def follower_stiffness(self, nodal: np.ndarray, p: np.ndarray, structure: np.ndarray) -> np.ndarray:
-        """Values (nnz,) of the structure's tangent less the derivative of the pressure force at constant pressures."""
-        data = structure.copy()
-        surface = self.shell.mesh
-        pressure_stiffness(
-            surface.quads, surface.nodes, nodal, p[self.station_of_node], self.loaded, self.shell.dofs.slots, -1.0, data
-        )
-        return data
+    def nodal_pressure(self, p: np.ndarray) -> np.ndarray:
+        """Pressures (nn,) at the nodes, Pa, from those at the stations (m,), Pa."""
+        return p[self.station_of_node]
 
     def stiffness(self, q: np.ndarray, p: np.ndarray, structure: np.ndarray) -> np.ndarray:
         """Values (nnz,) of K: structure and contact of faces less the follower stiffness of pressures (m,), Pa."""
@@ -403,13 +379,6 @@ class ValveModel:
         """Displacement, m, in which curves of equilibria are measured: the gap of the lips, by which faces part."""
         return 2.0 * self.case.valve.initial_gap
 
-    def rounding(self, q: np.ndarray, tangent: Tangent) -> float:
-        """Norm of the residual that rounding of the positions alone can leave, N: machine epsilon times |K| |x|."""
-        position = np.abs(self.nodal(q))
-        position[:, :3] += np.abs(self.mesh.nodes)
-        stiffness = self.shell.dofs.matrix(np.abs(tangent.structure))
-        return float(np.finfo(float).eps * np.linalg.norm(stiffness @ self.shell.dofs.restrict(position)))
-
     def pressure_derivative(self, q: np.ndarray, pressure: float) -> np.ndarray:
         """Derivative (n,) of the residual by the inlet pressure."""
         nodal = self.nodal(q)
@@ -422,12 +391,8 @@ class ValveModel:
         own = 0.0 if self.weight is None else np.linalg.norm(self.weight.force(self.shell, q))
         return float(np.linalg.norm(self.pressure_force(nodal, p)) + own + self._preset_force)
 
-    # -- dynamics
+    # -- what faces that are moulded shut leave open
     # ----
-
-    def mass(self, q: np.ndarray) -> np.ndarray:
-        """Values (nnz,) of the mass matrix at a state."""
-        return self.shell.mass(q)
 
     @cached_property
     def _film(self) -> np.ndarray | float:

@@ -9,7 +9,6 @@ import numpy as np
 from dbvfiv.contact import PlaneContact
 from dbvfiv.model.classes import shell_of_class
 from dbvfiv.model.preset import PressedShell
-from dbvfiv.shell.pressure import pressure_stiffness
 
 
 class ShellOnPlane(PressedShell):
@@ -44,11 +43,9 @@ def class_matrices(model: ShellOnPlane, free, apart: bool, q, pressure: float):
     """Stiffness and mass (k, k) in a class of motion with free unknowns (nn, 5)."""
     nodal = model.nodal(q)
     shell = shell_of_class(model.shell, free, nodal)
-    surface, dofs, still = shell.mesh, shell.dofs, np.zeros(shell.size)
-    values = shell.force_and_tangent(still)[1]
-    uniform = np.full(surface.node_count, model.sign * pressure)
-    pressure_stiffness(surface.quads, surface.nodes, nodal, uniform, model.loaded, dofs.slots, -1.0, values)
-    stiffness = dofs.matrix(values)
+    dofs, still = shell.dofs, np.zeros(shell.size)
+    structure = shell.force_and_tangent(still)[1]
+    stiffness = dofs.matrix(model.follower_stiffness(nodal, pressure, structure, dofs))
     if model.contact is not None:
         stiffness = stiffness + model.contact.stiffness_of_class(q, shell, apart)
     return stiffness.tocsr(), dofs.matrix(shell.mass(still))
