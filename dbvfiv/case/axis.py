@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import Annotated, Any
@@ -135,29 +135,6 @@ def parse_point(text: str, density: float | None = None) -> dict[str, float]:
     return found
 
 
-def _readable(text: str, info: ValidationInfo) -> str:
-    """The text of a range that can be read, heads of the fluid as pressures."""
-    return _in_pascal(text, parse_axis(text, density=_density(info)))
-
-
-def _density(info: ValidationInfo) -> float | None:
-    return (info.context or {}).get("density")
-
-
-def _in_pascal(text: str, axis: Axis) -> str:
-    span = text.partition("=")[2]
-    if axis.parameter != "pressure" or not _HEAD.search(span):
-        return text
-    log = ":log" if axis.log else ""
-    if "," in span:
-        return f"pressure={','.join(f'{value!r} Pa' for value in axis.values)}{log}"
-    return f"pressure={axis.values[0]!r} Pa:{axis.values[-1]!r} Pa:{len(axis.values)}{log}"
-
-
-#: A key that holds the text of a range.
-Range = Annotated[StrictStr, AfterValidator(_readable)]
-
-
 def parse_stability_axis(text: str, density: float | None = None) -> Axis:
     """Read a range as `parse_axis` does, or a parameter alone with its usual range.
 
@@ -169,14 +146,6 @@ def parse_stability_axis(text: str, density: float | None = None) -> Axis:
     if isinstance(text, str) and text.strip() in PARAMETERS:
         text = PARAMETERS[text.strip()].usual_range
     return parse_axis(text, tuple(PARAMETERS), density)
-
-
-def _readable_range(text: str, info: ValidationInfo) -> str:
-    return _in_pascal(text, parse_stability_axis(text, _density(info)))
-
-
-#: A key that holds the text of such a range.
-StabilityRange = Annotated[StrictStr, AfterValidator(_readable_range)]
 
 
 class RangeSection(Section):
@@ -193,14 +162,28 @@ class RangeSection(Section):
         return "pressure" if self.axis is None else self.axis.parameter
 
 
-def _readable_point(text: str, info: ValidationInfo) -> str:
-    parse_point(text, _density(info))
-    return text
+def _readable(parse: Callable[..., Any]) -> AfterValidator:
+    """Validator of a text that a function can read, heads of the fluid in a range as pressures."""
+
+    def check(text: str, info: ValidationInfo) -> str:
+        axis = parse(text, density=(info.context or {}).get("density"))
+        span = text.partition("=")[2]
+        if not isinstance(axis, Axis) or axis.parameter != "pressure" or not _HEAD.search(span):
+            return text
+        log = ":log" if axis.log else ""
+        if "," in span:
+            return f"pressure={','.join(f'{value!r} Pa' for value in axis.values)}{log}"
+        return f"pressure={axis.values[0]!r} Pa:{axis.values[-1]!r} Pa:{len(axis.values)}{log}"
+
+    return AfterValidator(check)
 
 
+#: Keys that hold the text of a range along which modes are tracked, and of any range.
+Range = Annotated[StrictStr, _readable(parse_axis)]
+StabilityRange = Annotated[StrictStr, _readable(parse_stability_axis)]
 #: A key that holds the text of values of parameters.
 Point = Annotated[
-    StrictStr, AfterValidator(_readable_point), Described("text", f"such as 'pressure=1 m', of {', '.join(PLACES)}")
+    StrictStr, _readable(parse_point), Described("text", f"such as 'pressure=1 m', of {', '.join(PLACES)}")
 ]
 
 

@@ -6,17 +6,11 @@ import math
 from collections.abc import Sequence
 from typing import Annotated, Any, Literal
 
-from pydantic import (
-    BeforeValidator,
-    PrivateAttr,
-    StrictInt,
-    model_serializer,
-    model_validator,
-)
+from pydantic import BeforeValidator, StrictInt, model_validator
 
 from .parameters import PARAMETERS
 from .quantity import Number, Quantity, Rate, Time, word_or_number
-from .section import BrokenRule, Described, Section, key
+from .section import BrokenRule, Described, FollowingSection, Section, key
 from .tables import ExistingFile
 
 #: Materials whose loss factors come with the program.
@@ -235,7 +229,7 @@ Band = Annotated[
 ]
 
 
-class Damping(Section):
+class Damping(FollowingSection):
     """Damping alpha M and materials that relax, or Rayleigh damping C = alpha M + beta K.
 
     `alpha`, `beta`, `loss_factor` and `branches` hold numbers also where they were not given.
@@ -270,12 +264,6 @@ class Damping(Section):
         ge=1,
         le=20,
     )
-    _following: frozenset[str] = PrivateAttr(frozenset())
-
-    @property
-    def following(self) -> frozenset[str]:
-        """Keys that were not given and follow from the model."""
-        return self._following
 
     @property
     def relaxes(self) -> bool:
@@ -293,20 +281,12 @@ class Damping(Section):
             return None
         return f"{self.meaningless} means nothing with damping.model = {self.model!r}; {_INSTEAD[self.model]}"
 
-    @model_serializer(mode="wrap")
-    def _leave_what_follows(self, handler: Any) -> dict[str, Any]:
-        """Without the numbers that follow, so that they follow anew after a change."""
-        return {name: None if name in self._following else value for name, value in handler(self).items()}
-
     @model_validator(mode="after")
-    def _fill(self) -> Damping:
+    def _follow_the_model(self) -> Damping:
         """Numbers for the keys that were not given."""
-        before = self._following  # damping is checked again when it becomes part of a case
         decades = math.log10(self.band[1] / self.band[0])
         branches = math.ceil(_PER_DECADE * decades - 1e-9) + 1
-        numbers = _DEFAULTS[self.model] | {"branches": branches}
-        self._following = frozenset(name for name in numbers if getattr(self, name) is None or name in before)
-        self.__dict__.update({name: numbers[name] for name in self._following})
+        self._fill(_DEFAULTS[self.model] | {"branches": branches})
         foreign = self.meaningless
         if getattr(self, foreign):
             given = f"{getattr(self, foreign):g} {PARAMETERS[foreign].quantity.si}".strip()

@@ -18,7 +18,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from .quantity import Quantity
+from .quantity import Quantity, number_or_text
 from .tables import numbered_lines
 
 if TYPE_CHECKING:
@@ -68,21 +68,21 @@ class Distribution:
         if form == "samples":
             if len(parts) < 2:
                 raise ValueError("which names no file and fewer than two values")
-            return cls(form, tuple(sorted(quantity.parse(_number(part)) for part in parts)))
+            return cls(form, tuple(sorted(quantity.parse(number_or_text(part)) for part in parts)))
         if not 1 <= len(parts) <= 2 or (form == "uniform" and len(parts) == 1):
             raise ValueError(f"which has {len(parts)} arguments")
         if own is None and (len(parts) == 1 or any(map(_PERCENT.fullmatch, parts)) and quantity.shown != "%"):
             raise ValueError("which is relative to the value of the case, and that is no one number")
         if form == "lognormal":
-            factor = Quantity("").parse(_number(parts[-1]))
-            median = own if len(parts) == 1 else quantity.parse(_number(parts[0]))
+            factor = Quantity("").parse(number_or_text(parts[-1]))
+            median = own if len(parts) == 1 else quantity.parse(number_or_text(parts[0]))
             if factor <= 1:
                 raise ValueError(f"whose factor {factor:g} is not greater than 1")
             if median <= 0:
                 raise ValueError(f"whose median {median:g} is not greater than 0")
             return cls(form, (median, factor))
         if form == "normal":
-            mean = own if len(parts) == 1 else quantity.parse(_number(parts[0]))
+            mean = own if len(parts) == 1 else quantity.parse(number_or_text(parts[0]))
             spread = _of(parts[-1], quantity, own, 0.0)
             if spread <= 0:
                 raise ValueError("whose standard deviation is not greater than 0")
@@ -178,16 +178,9 @@ def with_full_names(text: str, folder: Path | None) -> str:
         return text
 
 
-def _number(text: str) -> Any:
-    try:
-        return float(text)
-    except ValueError:
-        return text
-
-
 def _of(text: str, quantity: Quantity, own: float | None, base: float | None) -> float:
     """A value, or `base` with a per cent of the case's own value on it."""
     percent = _PERCENT.fullmatch(text)
     if percent is None or (quantity.shown == "%" and own is None):
-        return quantity.parse(_number(text))
+        return quantity.parse(number_or_text(text))
     return base + 0.01 * float(percent[1]) * abs(own)

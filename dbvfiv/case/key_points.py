@@ -43,6 +43,16 @@ class KeyProfile:
         """Axial position, m: the mean of its points."""
         return math.fsum(point[2] for point in self.points) / len(self.points)
 
+    @property
+    def radius(self) -> float:
+        """Mean distance of its points from the axis, m."""
+        return math.fsum(math.hypot(x, y) for x, y, _ in self.points) / len(self.points)
+
+    @property
+    def reach(self) -> float:
+        """Largest distance of its points from the axis along x, m."""
+        return max(abs(x) for x, _, _ in self.points)
+
 
 def read_key_points(path: Path) -> tuple[KeyProfile, ...]:
     """Read a file of key points.
@@ -76,30 +86,12 @@ def read_key_points(path: Path) -> tuple[KeyProfile, ...]:
     return tuple(profiles)
 
 
-def key_point_inlet(path: Path) -> float | None:
-    """Mean radius, m, of the last profile of a file of key points; None where it cannot be read."""
+def readable_key_points(path: Path | None) -> tuple[KeyProfile, ...]:
+    """Profiles of a file of key points; none without a file, and where it cannot be read."""
     try:
-        last = read_key_points(path)[-1].points
+        return () if path is None else read_key_points(path)
     except ValueError:
-        return None
-    return math.fsum(math.hypot(x, y) for x, y, _ in last) / len(last)
-
-
-def key_point_lip(path: Path) -> float | None:
-    """Largest distance from the axis, m, along the lip of a file of key points; None where it cannot be read."""
-    try:
-        first = read_key_points(path)[0].points
-    except ValueError:
-        return None
-    return max(abs(x) for x, _, _ in first)
-
-
-def has_whole_sections(path: Path) -> bool:
-    """True where the profiles of a file of key points run from side edge to side edge; False for an unreadable file."""
-    try:
-        return is_whole(read_key_points(path)[0])
-    except ValueError:
-        return False
+        return ()
 
 
 def is_whole(profile: KeyProfile) -> bool:

@@ -161,7 +161,7 @@ def _resolve(loc: tuple[Any, ...], case: type[Section]) -> tuple[KeyPath, type[S
 
 def _dotted(path: KeyPath) -> str:
     """The key as TOML would write it; what is no bare key is quoted."""
-    return ".".join(p if _BARE_KEY.fullmatch(p) else f'"{_clean(p, quoted=True)}"' for p in path)
+    return ".".join(p if _BARE_KEY.fullmatch(p) else f'"{_clean(p)}"' for p in path)
 
 
 def _unknown(path: KeyPath, owner: type[Section] | None, model: type[Section]) -> str:
@@ -209,14 +209,13 @@ def _show(value: Any) -> str:
         return f"a list of {len(value)}" if value else "an empty list"
     if isinstance(value, int) and abs(value) >= 10**15:
         return "a very large integer"
-    text = f'"{_clean(value, quoted=True)}"' if isinstance(value, str) else _clean(str(value), quoted=True)
-    return text
+    return f'"{_clean(value)}"' if isinstance(value, str) else _clean(str(value))
 
 
-def _clean(text: str, quoted: bool = False) -> str:
+def _clean(text: str) -> str:
     """Printable, short, and without a full stop that would look like the end of the sentence."""
-    text = "".join(c if c.isprintable() else " " for c in str(text))
-    text = " ".join(text.split()).replace(". ", "., ") if quoted else " ".join(text.split())
+    text = "".join(c if c.isprintable() else " " for c in text)
+    text = " ".join(text.split()).replace(". ", "., ")
     return text if len(text) <= 60 else text[:57] + "..."
 
 

@@ -305,10 +305,13 @@ class Case(Section):
     @property
     def seeks_levels(self) -> bool:
         """True where strain levels of built-in rubbers are to be iterated until they agree with the layers' strains."""
+        return self.materials.strain_level == AUTO and bool(self.built_in_rubbers)
+
+    @property
+    def built_in_rubbers(self) -> list[str]:
+        """Built-in rubbers among the layers."""
         used = {layer.material for layer in self.layers}
-        return self.materials.strain_level == AUTO and any(
-            name in used and self.materials.is_built_in(name) for name in RUBBERS
-        )
+        return [name for name in RUBBERS if self.materials.is_built_in(name) and name in used]
 
     @property
     def pressure_at(self) -> str:

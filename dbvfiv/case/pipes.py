@@ -221,18 +221,16 @@ class Downstream(Section):
         ------
         BrokenRule
         """
-        if self.pipe_diameter is not None and self.pipe_diameter < inlet:
-            raise BrokenRule(
-                "downstream.pipe_diameter",
-                f"{1e3 * self.pipe_diameter:g} mm around a valve with a flow section of {1e3 * inlet:.4g} mm",
-                f"it must be at least {1e3 * inlet:.4g} mm, for the valve stands in it",
-            )
-        if self.pipe_diameter is not None and self.pipe_diameter < bill:
-            raise BrokenRule(
-                "downstream.pipe_diameter",
-                f"{1e3 * self.pipe_diameter:g} mm around a bill that is {1e3 * bill:.4g} mm wide",
-                f"it must be at least {1e3 * bill:.4g} mm, or the bill does not go into the pipe",
-            )
+        for least, around, why in (
+            (inlet, f"a valve with a flow section of {1e3 * inlet:.4g} mm", "for the valve stands in it"),
+            (bill, f"a bill that is {1e3 * bill:.4g} mm wide", "or the bill does not go into the pipe"),
+        ):
+            if self.pipe_diameter is not None and self.pipe_diameter < least:
+                raise BrokenRule(
+                    "downstream.pipe_diameter",
+                    f"{1e3 * self.pipe_diameter:g} mm around {around}",
+                    f"it must be at least {1e3 * least:.4g} mm, {why}",
+                )
 
     @model_validator(mode="after")
     def _pipe_has_a_diameter(self) -> Downstream:

@@ -7,7 +7,7 @@ from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any, TypeVar
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, ConfigDict, Field, PrivateAttr, model_serializer
 from pydantic.fields import FieldInfo
 
 from ..texts import short_repr
@@ -74,6 +74,32 @@ class Section(BaseModel):
     @classmethod
     def make_way(cls, data: dict[str, Any], changed: Collection[tuple[str, ...]]) -> None:
         """Take out of plain data what a changed key stands in the place of."""
+
+
+class FollowingSection(Section):
+    """A table of which some keys hold numbers that follow from others where they are not given."""
+
+    _following: frozenset[str] = PrivateAttr(frozenset())
+
+    @property
+    def following(self) -> frozenset[str]:
+        """Keys that were not given and follow from others."""
+        return self._following
+
+    def _follows(self, name: str) -> bool:
+        """True for a key that was not given; a table is checked again when it becomes part of a case."""
+        return getattr(self, name) is None or name in self._following
+
+    def _fill(self, numbers: Mapping[str, Any]) -> None:
+        """Take numbers for the keys among these that were not given."""
+        self._following = frozenset(filter(self._follows, numbers))
+        self.__dict__.update({name: numbers[name] for name in self._following})
+
+    @model_serializer(mode="wrap")
+    def _leave_what_follows(self, handler: Any) -> dict[str, Any]:
+        """Numbers as given, without those that follow, so that they follow anew after a change."""
+        given = handler(getattr(self, "as_given", self))
+        return {name: None if name in self._following else value for name, value in given.items()}
 
 
 def key(default: Any, description: str, **limits: Any) -> Any:

@@ -7,13 +7,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import PrivateAttr, ValidationInfo, field_validator, model_serializer, model_validator
+from pydantic import PrivateAttr, ValidationInfo, field_validator, model_validator
 
-from .key_points import has_whole_sections, key_point_inlet, key_point_lip, read_key_points
+from .key_points import is_whole, read_key_points, readable_key_points
 from .parameters import PARAMETERS
 from .quantity import Length, LineForce, Number, Pressure, Quantity
-from .section import BrokenRule, Section, key
-from .wall import WallPatch, WallStep, edges_of
+from .section import BrokenRule, FollowingSection, key
+from .wall import WallPatch, WallStep, edges_of, multiplied
 
 #: Turns of a bow, rad, below which it is straight, and below which its area is taken from the series.
 _STRAIGHT, _SMALL = 1e-9, 1e-2
@@ -129,7 +129,7 @@ def check_key_points(valve: Valve) -> None:
 
 def check_sections(valve: Valve) -> None:
     """Refuse sections that leave no passage, and shapes that cannot be meshed."""
-    half_wall = 0.5 * valve._wall_at(0.0)
+    half_wall = 0.5 * valve.wall_at(0.0)
     if 2 * valve.lip.height < half_wall:
         raise BrokenRule(
             "lip_radius",
@@ -284,11 +284,6 @@ _TWELVE_INCH = {
 }
 _TWELVE_INCH_WALLS = {"measured": (0.012, 0.016), "uniform": (0.01438, 0.01438)}
 _R1, _TH1, _TH2 = 0.00619, 0.00619, 0.00819
-#: What follows from wall and shape where it is not given.
-_FOLLOWING = (
-    *("lip_radius", "cuff_radius", "duckbill_wall_deduction", "flange_wall_deduction", "initial_gap"),
-    "moulded_length",
-)
 #: Half gap between lips at rest, m: of lips that stand apart (the thesis), and of lips that are moulded shut, between
 #: whose faces the roughness of rubber leaves it.
 _APART, _ROUGH = 1e-4, 3e-5
@@ -302,7 +297,7 @@ _SIZES = (
 )
 
 
-class Valve(Section):
+class Valve(FollowingSection):
     """Shape and wall of the valve; z runs from the lip (0) to the clamped flange.
 
     Behind the saddle come a round cuff and a flared transition to the flange, both of no length unless given.
@@ -448,13 +443,7 @@ class Valve(Section):
         ge=1e-3,
         le=1000,
     )
-    _following: frozenset[str] = PrivateAttr(frozenset())
     _given: Any = PrivateAttr(None)
-
-    @property
-    def following(self) -> frozenset[str]:
-        """Keys that were not given and follow from wall and shape."""
-        return self._following
 
     @property
     def as_given(self) -> Valve:
@@ -469,7 +458,7 @@ class Valve(Section):
     @property
     def is_double_symmetric(self) -> bool:
         """True for symmetry about x = 0, the middle of the lips, besides that about y = 0, the plane of their slit."""
-        return self.bill_offset == 0.0 and not (self.key_points is not None and has_whole_sections(self.key_points))
+        return self.bill_offset == 0.0 and not any(map(is_whole, readable_key_points(self.key_points)))
 
     @property
     def bill_shift(self) -> float:
@@ -482,20 +471,15 @@ class Valve(Section):
         return self.duckbill_length + self.saddle_length + self.cuff_length + self.flare_length + self.flange_length
 
     def thickness_at(self, z: float, s: float | None = None) -> float:
-        """Wall thickness in m at the axial position ``z`` in m (``thickness_factor`` included); with patches on it
-        where ``s`` says at which share of the section.
-        """
-        return (self._wall_at(z) if s is None else self.wall_at(z, s)) * self.thickness_factor
+        """Wall thickness in m as `wall_at` has it, times `thickness_factor`."""
+        return self.wall_at(z, s) * self.thickness_factor
 
-    def _wall_at(self, z: float) -> float:
-        if self.wall == "uniform":
-            return self.wall_thickness
-        return next((step for step in self.wall_map if z < step.to), self.wall_map[-1]).thickness
-
-    def wall_at(self, z: float, s: float) -> float:
-        """Wall thickness in m with its patches at the axial position z, m, and the share s of the section."""
-        thickness = self._wall_at(z)
-        for patch in self.patches:
+    def wall_at(self, z: float, s: float | None = None) -> float:
+        """Wall thickness in m at the axial position z, m, with patches where the share s of the section is given."""
+        thickness = self.wall_thickness
+        if self.wall == "measured":
+            thickness = next((step for step in self.wall_map if z < step.to), self.wall_map[-1]).thickness
+        for patch in self.patches if s is not None else ():
             if patch.covers(z, s):
                 thickness = patch.on(thickness)
         return thickness
@@ -519,16 +503,14 @@ class Valve(Section):
     @property
     def inlet_radius(self) -> float:
         """Mid-surface radius in m at the inlet end: that of the flange, or the mean one of key points."""
-        found = None if self.key_points is None else key_point_inlet(self.key_points)
-        factor = 1.0 if self._given is None else self.scale
-        return self.flange_radius if found is None else factor * found
+        profiles, factor = readable_key_points(self.key_points), 1.0 if self._given is None else self.scale
+        return factor * profiles[-1].radius if profiles else self.flange_radius
 
     @property
     def bill_width(self) -> float:
         """Twice the distance in m from the axis that the outer face of the lip reaches at rest."""
-        aside = None if self.key_points is None else key_point_lip(self.key_points)
-        factor = 1.0 if self._given is None else self.scale
-        aside = self.lip.widest + abs(self.bill_shift) if aside is None else factor * aside
+        profiles, factor = readable_key_points(self.key_points), 1.0 if self._given is None else self.scale
+        aside = factor * profiles[0].reach if profiles else self.lip.widest + abs(self.bill_shift)
         return 2 * aside + self.thickness_at(0.0)
 
     @property
@@ -549,37 +531,32 @@ class Valve(Section):
         read_key_points(path)
         return path.resolve()
 
-    @model_serializer(mode="wrap")
-    def _leave_what_follows(self, handler: Any) -> dict[str, Any]:
-        """Sizes before the scale, without the numbers that follow, so that they follow anew after a change."""
-        given = handler(self.as_given)
-        return {name: None if name in self._following else value for name, value in given.items()}
-
-    def _fill(self) -> None:
+    def _follow_wall_and_shape(self) -> None:
         """Numbers for the keys that were not given."""
-        before = self._following
-        self._following = frozenset(name for name in _FOLLOWING if getattr(self, name) is None or name in before)
-        lip, flange = self._wall_at(0.0), self._wall_at(self.length)
+        lip, flange = self.wall_at(0.0), self.wall_at(self.length)
         twelve_inch = (
             self.key_points is None
             and all(getattr(self, name) == size for name, size in _TWELVE_INCH.items())
             and (lip, flange) == _TWELVE_INCH_WALLS[self.wall]
         )
-        numbers = {"lip_radius": _R1 if twelve_inch else 0.5 * lip} if "lip_radius" in self._following else {}
-        radius = numbers.get("lip_radius", self.lip_radius)
-        numbers["cuff_radius"] = self.flange_radius
+        own = _R1 if twelve_inch else 0.5 * lip
+        radius = own if self._follows("lip_radius") else self.lip_radius
         touching = 0.5 * lip if self.key_points is not None else min(0.5 * lip, radius)
-        numbers["duckbill_wall_deduction"] = _TH1 if twelve_inch and radius == _R1 else touching
-        numbers["flange_wall_deduction"] = _TH2 if twelve_inch else 0.5 * flange
-        numbers["initial_gap"] = _ROUGH if self.is_preset else _APART
-        numbers["moulded_length"] = self.duckbill_length
-        self.__dict__.update({name: numbers[name] for name in self._following})
+        numbers = {
+            "lip_radius": radius,
+            "cuff_radius": self.flange_radius,
+            "duckbill_wall_deduction": _TH1 if twelve_inch and radius == _R1 else touching,
+            "flange_wall_deduction": _TH2 if twelve_inch else 0.5 * flange,
+            "initial_gap": _ROUGH if self.is_preset else _APART,
+            "moulded_length": self.duckbill_length,
+        }
+        self._fill(numbers)
 
     @model_validator(mode="after")
     def _fits_together(self) -> Valve:
         if self._given is not None:  # a valve is checked again when it becomes part of a case
             return self
-        self._fill()
+        self._follow_wall_and_shape()
         check_preset(self)
         check_wall(self)
         if self.key_points is None:
@@ -594,7 +571,6 @@ class Valve(Section):
         if self.scale == 1.0:
             return
         self._given = self.model_copy()
-        sizes = {name: getattr(self, name) for name in _SIZES}
-        self.__dict__.update({name: self.scale * size for name, size in sizes.items() if size is not None})
+        self.__dict__.update(multiplied(self, _SIZES, self.scale))
         for name in ("wall_map", "patches"):
             self.__dict__[name] = tuple(piece.enlarged(self.scale) for piece in getattr(self, name))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Self
+from typing import ClassVar, Self
 
 from pydantic import model_validator
 
@@ -11,9 +11,26 @@ from .quantity import Length, Number
 from .section import BrokenRule, Section, key
 
 
-class Extent(Section):
+def multiplied(section: Section, names: Sequence[str], factor: float) -> dict[str, float]:
+    """Sizes of a table, as far as they are given, times a factor."""
+    sizes = {name: getattr(section, name) for name in names}
+    return {name: factor * size for name, size in sizes.items() if size is not None}
+
+
+class _Piece(Section):
+    """A piece of the wall with lengths."""
+
+    _lengths: ClassVar[tuple[str, ...]]
+
+    def enlarged(self, factor: float) -> Self:
+        """Copy with all lengths multiplied by a factor."""
+        return self.model_copy(update=multiplied(self, self._lengths, factor))
+
+
+class Extent(_Piece):
     """A part of the wall; all of it where nothing is given."""
 
+    _lengths = ("begin", "end")
     begin: Length | None = key(
         None, "Axial position at which it begins, from the lip; the lip where not given.", ge=0, le=100
     )
@@ -63,12 +80,6 @@ class Extent(Section):
         around = (self.around_from or 0.0) <= s < end
         return along and around
 
-    def enlarged(self, factor: float) -> Self:
-        """Copy with all lengths multiplied by a factor."""
-        return self.model_copy(
-            update={name: factor * getattr(self, name) for name in ("begin", "end") if getattr(self, name) is not None}
-        )
-
 
 def edges_of(parts: Sequence[Extent], name: str, length: float) -> tuple[set[float], set[float]]:
     """Axial positions, m, and shares of the section at which parts of a wall of this length begin or end, 0 among them.
@@ -89,20 +100,18 @@ def edges_of(parts: Sequence[Extent], name: str, length: float) -> tuple[set[flo
     return along, around
 
 
-class WallStep(Section):
+class WallStep(_Piece):
     """One piece of the measured wall."""
 
+    _lengths = ("to", "thickness")
     to: Length = key(..., "End of the piece, measured along the axis from the lip.", gt=0, le=100)
     thickness: Length = key(..., "Wall thickness of the piece.", gt=0, le=10)
-
-    def enlarged(self, factor: float) -> WallStep:
-        """Copy with all lengths multiplied by a factor."""
-        return self.model_copy(update={"to": factor * self.to, "thickness": factor * self.thickness})
 
 
 class WallPatch(Extent):
     """A part of the wall that is thicker or thinner than its surroundings: a side edge, an overlap, a pad."""
 
+    _lengths = ("begin", "end", "thickness", "extra")
     thickness: Length | None = key(None, "Wall thickness there, in place of what the wall has.", gt=0, le=10)
     extra: Length | None = key(None, "Thickness added to what the wall has there; negative takes off.", ge=-10, le=10)
 
@@ -116,9 +125,3 @@ class WallPatch(Extent):
     def on(self, thickness: float) -> float:
         """Thickness of the wall there, m, where it would have another one."""
         return self.thickness if self.thickness is not None else thickness + self.extra
-
-    def enlarged(self, factor: float) -> Self:
-        """Copy with all lengths multiplied by a factor."""
-        sizes = {name: getattr(self, name) for name in ("thickness", "extra")}
-        larger = {name: factor * size for name, size in sizes.items() if size is not None}
-        return super().enlarged(factor).model_copy(update=larger)

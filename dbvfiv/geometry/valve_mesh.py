@@ -160,8 +160,6 @@ def _shares(columns: np.ndarray, ratio: float) -> np.ndarray:
 def _element_thickness(valve: Valve, element_z: np.ndarray, across: np.ndarray) -> np.ndarray:
     """(ne,) thickness at the element centres, m; `across` (k,) are their shares of the section from
     the centre."""
-    if not valve.patches:
-        return np.array([valve.thickness_at(level) for level in element_z])
     shares = np.tile(across, len(element_z) // len(across))
     return np.array([valve.thickness_at(level, share) for level, share in zip(element_z, shares)])
 

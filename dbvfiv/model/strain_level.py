@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from ..case.materials import HIGHEST_LEVEL, LOWEST_LEVEL, RUBBERS
+from ..case.materials import HIGHEST_LEVEL, LOWEST_LEVEL
 from ..case.model import Case
 from ..errors import SolveError
 from ..observer import Observer
@@ -92,7 +92,7 @@ def agree_levels(
     """
     observer = Observer() if observer is None else observer
     load = _Load(pressure, observer)
-    first = {name: (first or {}).get(name, LOWEST_LEVEL) for name in sought_rubbers(case)}
+    first = {name: (first or {}).get(name, LOWEST_LEVEL) for name in case.built_in_rubbers}
     for last in _rounds(case, [load], first, observer):
         if load.missed is not None:
             raise load.missed
@@ -156,7 +156,7 @@ def settle_levels(
             "steady.min_step": max(SMALLEST_STEP, case.steady.min_step),
         }
     )
-    first = dict.fromkeys(sought_rubbers(case), FIRST_LEVEL)
+    first = dict.fromkeys(case.built_in_rubbers, FIRST_LEVEL)
     *_, found = _rounds(coarse, loads, first, observer)
     levels = {name: float(round(level, DIGITS)) for name, level in found.levels.items()}
     where = " and ".join(load.told() for load in loads)
@@ -167,12 +167,6 @@ def settle_levels(
         if level == HIGHEST_LEVEL:
             said.append(_bounded(name, level, _peak(found.layers, name), where))
     return SettledLevels(levels, where, tuple(said))
-
-
-def sought_rubbers(case: Case) -> list[str]:
-    """Built-in rubbers among the layers of a case."""
-    used = {layer.material for layer in case.layers}
-    return [name for name in RUBBERS if case.materials.is_built_in(name) and name in used]
 
 
 @dataclass
@@ -273,8 +267,10 @@ def _rounds(case: Case, loads: Sequence[_Load], levels: dict[str, float], observ
     before: dict[str, tuple[float, float]] = {}
     for count in range(1, ROUNDS + 1):
         found = case.replace(case.materials.at_levels(levels))
-        layers = tuple(_most_strained(load.strain(found, levels) for load in loads))
-        own = _next_levels(layers, list(levels))
+        strained = [load.strain(found, levels) for load in loads]
+        layers = tuple(max(layer, key=lambda state: state.peak) for layer in zip(*strained))
+        # the next level of a rubber is the largest peak of its layers, as far as the tests go
+        own = {name: float(np.clip(_peak(layers, name), LOWEST_LEVEL, HIGHEST_LEVEL)) for name in levels}
         told = ", ".join(f"{name} {100 * level:.4g} %" for name, level in own.items())
         observer.progress(f"strain levels, round {count}: {told}")
         change = max((abs(own[name] - levels[name]) for name in levels), default=0.0)
@@ -298,12 +294,6 @@ def _secant(before: tuple[float, float] | None, pair: tuple[float, float]) -> fl
     if abs(slope) > 0.5:
         return strain
     return float(np.clip(level + (strain - level) / (1.0 - slope), LOWEST_LEVEL, HIGHEST_LEVEL))
-
-
-def _most_strained(states: Iterable[list[LayerLevel]]) -> Iterator[LayerLevel]:
-    """Most strained of several states, layer by layer."""
-    for layers in zip(*states):
-        yield max(layers, key=lambda layer: layer.peak)
 
 
 def _peak(layers: Iterable[LayerLevel], name: str) -> float:
@@ -330,11 +320,3 @@ def _bounded(name: str, level: float, peak: float, where: str) -> str:
         f"{name} strains by up to {100 * peak:.3g} % at {where}, and its tests go from {100 * LOWEST_LEVEL:g} to "
         f"{100 * HIGHEST_LEVEL:g} %: it has the constants of {100 * level:g} %."
     )
-
-
-def _next_levels(layers: tuple[LayerLevel, ...], names: list[str]) -> dict[str, float]:
-    """Next level of each rubber: the largest peak of its layers, as far as the tests go."""
-    return {
-        name: float(np.clip(max(x.peak for x in layers if x.material == name), LOWEST_LEVEL, HIGHEST_LEVEL))
-        for name in names
-    }
