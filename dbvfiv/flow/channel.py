@@ -350,55 +350,23 @@ def reversible_head(speed, velocity):
     return 0.5 * (out * out - out[-1] ** 2 - lost - outside)
 
 
+def _of_channel(name: str) -> property:
+    """What a law around a channel has of it."""
+    return property(lambda law: getattr(law.channel, name))
+
+
 class AroundChannel(FlowLaw):
     """Flow law that extends a channel, as by an elastic line or a compressible fluid.
 
     Attributes
     ----------
     channel : Channel
-        Gives the law its stations, levels and blend of the continuity laws.
+        Gives the law its stations, levels, terms and blend of the continuity laws.
     """
 
     channel: Channel
-
-    @property
-    def count(self) -> int:
-        return self.channel.count
-
-    @property
-    def step(self):
-        """Distances (m - 1,) of the stations, m."""
-        return self.channel.step
-
-    @property
-    def terms(self):
-        """Loss and inertance terms of the channel."""
-        return self.channel.terms
-
-    @property
-    def back(self) -> float:
-        """Driving pressure at which nothing flows, Pa; that of the channel."""
-        return self.channel.back
-
-    @property
-    def level(self) -> float:
-        """Hydrostatic pressure between the ends of the passage, Pa; that of the channel."""
-        return self.channel.level
-
-    @property
-    def static(self):
-        """Hydrostatic pressures (m,) across the wall at the stations, Pa; those of the channel."""
-        return self.channel.static
-
-    @property
-    def storage(self) -> float:
-        """Blend of the continuity laws."""
-        return self.channel.storage
-
-    @property
-    def sealed(self) -> bool:
-        """State of the channel: True where it is shut."""
-        return self.channel.sealed
+    count, step, terms, storage, unsteady = map(_of_channel, ("count", "step", "terms", "storage", "unsteady"))
+    back, level, static, sealed = map(_of_channel, ("back", "level", "static", "sealed"))
 
     def shut(self, seal: int | None) -> AroundChannel:
         return self.changed(channel=self.channel.shut(seal))

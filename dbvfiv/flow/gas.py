@@ -92,11 +92,6 @@ class GasChannel(AroundChannel):
         return 2 * self.count - 1
 
     @property
-    def unsteady(self) -> bool:
-        """True for the unsteady flow law, with the fluid's inertia; as in the channel."""
-        return self.channel.unsteady
-
-    @property
     def parameters(self) -> tuple[FlowParameter, ...]:
         return (
             *self.channel.parameters,

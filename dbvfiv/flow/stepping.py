@@ -362,11 +362,6 @@ class SteadyFluid(MovingFluid):
 
     moves = False
 
-    def __init__(self, law: FlowLaw, density: float):
-        self.law, self.density, self._seal, self._behind = law, float(density), lambda area: None, {None: self}
-
-    compressed = False
-
     def step(self, old, passage, h, theta, rate, inlet) -> SteadyFlow:
         return SteadyFlow(self, theta, inlet)
 
