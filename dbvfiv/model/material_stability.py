@@ -145,9 +145,7 @@ def layer_levels(model: ValveModel, q: np.ndarray, levels: Mapping[str, float]) 
     """Strains of the layers of rubber at displacements."""
     shell, section = model.shell, model.shell.section
     strains, each = shell.strains(q), section.points_per_layer
-    weights = shell.at_rest.points[..., 1]
-    weights = weights if weights.ndim == 1 else weights[:, None]
-    volume = (shell.geometry.thickness[:, None] * shell.geometry.area)[:, :, None] * weights
+    volume = shell.point_volumes
     for i, layer in enumerate(section.layers):
         if layer.law.kind != MOONEY_RIVLIN:
             continue

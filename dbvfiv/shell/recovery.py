@@ -10,6 +10,7 @@ import numpy as np
 
 from ..materials.energy import ENERGIES, MOONEY_RIVLIN
 from ..texts import shortly
+from .section import Section
 from .shell import Shell
 
 
@@ -42,10 +43,7 @@ def layer_fields(shell: Shell, q: np.ndarray) -> LayerFields:
     """Strains and stresses of a state (n,) of a shell."""
     section = shell.section
     strain = shell.strains(q)  # (ne, 4, np, 5)
-    stress = np.empty_like(strain)
-    for kind in np.unique(section.kinds):
-        chosen = np.flatnonzero(section.kinds == kind)
-        stress[:, :, chosen] = stress_at(int(kind), section.parameters[chosen], strain[:, :, chosen])
+    stress = point_stresses(section, strain)
     von_mises = von_mises_stress(strain, stress, section.kinds == MOONEY_RIVLIN)
     count, layers, points = len(strain), len(section.layers), section.points_per_layer
 
@@ -62,6 +60,15 @@ def layer_fields(shell: Shell, q: np.ndarray) -> LayerFields:
         von_mises=by_layer(von_mises).max(axis=(1, 3)),
         stretch=np.stack([low.min(axis=(1, 3)), high.max(axis=(1, 3))], axis=-1),
     )
+
+
+def point_stresses(section: Section, strain: np.ndarray) -> np.ndarray:
+    """Second Piola-Kirchhoff stresses (..., np, 5), Pa, of strains at the points of all layers."""
+    stress = np.empty_like(strain)
+    for kind in np.unique(section.kinds):
+        chosen = np.flatnonzero(section.kinds == kind)
+        stress[..., chosen, :] = stress_at(int(kind), section.parameters[chosen], strain[..., chosen, :])
+    return stress
 
 
 def stress_at(kind: int, parameters: np.ndarray, strain: np.ndarray) -> np.ndarray:
@@ -95,10 +102,7 @@ def interlaminar_shear(shell: Shell, q: np.ndarray) -> np.ndarray:
     (cosine, sine), scale = section.directions.T, section.shear_scale
     strain = shell.strains(q).mean(axis=1)
     strain[..., 3:] *= scale[:, None]
-    shear = np.empty((len(strain), len(section.kinds), 2))
-    for kind in np.unique(section.kinds):
-        chosen = np.flatnonzero(section.kinds == kind)
-        shear[:, chosen] = stress_at(int(kind), section.parameters[chosen], strain[:, chosen])[..., 3:]
+    shear = point_stresses(section, strain)[..., 3:]
     axes = np.stack([cosine * shear[..., 0] - sine * shear[..., 1], sine * shear[..., 0] + cosine * shear[..., 1]])
     mean = np.hypot(*(points[..., 1] * scale * axes).sum(axis=-1))
     shares = points[..., 1].reshape(*points.shape[:-2], -1, section.points_per_layer).sum(axis=-1)

@@ -9,6 +9,7 @@ import numpy as np
 
 from ..materials.energy import KNEE, OGDEN_FROM
 from ..materials.prony import Prony
+from .reference import strain_map
 
 LINEAR, RUBBER = 0, 1
 
@@ -202,9 +203,9 @@ class Section:
             if kind != LINEAR:
                 continue
             q11, q22, q12, q66, q55, q44 = par[:6]
-            plane = strain_rotation(c, s)
-            q = plane.T @ np.array([[q11, q12, 0], [q12, q22, 0], [0, 0, q66]]) @ plane
             turn = np.array([[c, s], [-s, c]])
+            plane = strain_map(turn)
+            q = plane.T @ np.array([[q11, q12, 0], [q12, q22, 0], [0, 0, q66]]) @ plane
             qs = shear**2 * turn.T @ np.diag([q55, q44]) @ turn
             total[:3, :3] += weight * q
             total[:3, 3:6] += weight * zeta * q
@@ -234,11 +235,6 @@ class Section:
             self.parameters[chosen],
             self.shear_scale[chosen],
         )
-
-
-def strain_rotation(c: float, s: float) -> np.ndarray:
-    """(3, 3) matrix that takes [E11, E22, 2E12] to axes turned by the angle with cosine c and sine s."""
-    return np.array([[c * c, s * s, c * s], [s * s, c * c, -c * s], [-2 * c * s, 2 * c * s, c * c - s * s]])
 
 
 @dataclass(frozen=True)

@@ -188,16 +188,11 @@ class Shell:
         fixed = (part.quads, self.mesh.nodes, nodal, *self.directors(nodal), part.reference)
         shell_tangent(*fixed, wall, held, geometric, self.dofs.slots[part.elements], out, data)
 
-    def force_and_tangent(
-        self, q: np.ndarray, data: np.ndarray | None = None, step: StepWall | None = None
-    ) -> tuple[np.ndarray, np.ndarray]:
+    def force_and_tangent(self, q: np.ndarray, step: StepWall | None = None) -> tuple[np.ndarray, np.ndarray]:
         """Internal force (n,) and values (nnz,) of the symmetric tangent on the pattern of `dofs`, or those of another
         wall.
-
-        `data`, if given, is added to.
         """
-        if data is None:
-            data = np.zeros(len(self.dofs.pattern[1]))
+        data = np.zeros(len(self.dofs.pattern[1]))
         if self.metric != FIRST_ORDER:
             unknowns = self._element_unknowns(q)
             self._scatter_matrix(np.asarray(self.energies.tangent(unknowns)), data)

@@ -9,19 +9,23 @@ from scipy.sparse.linalg import spsolve
 from dbvfiv.materials import IsotropicElastic, MooneyRivlin, OrthotropicPly
 from dbvfiv.shell import Layer, Section, Shell, ShellMesh
 from dbvfiv.shell.recovery import layer_fields
-from tests.shell.structures import dead_load, grid, isotropic_section, mixed_section, rectangle, solve_path
+from tests.shell.structures import (
+    dead_load,
+    distorted_plate,
+    grid,
+    isotropic_section,
+    mixed_section,
+    rectangle,
+    solve_path,
+)
 
 RUBBER = MooneyRivlin(4e5, 1e5, 2e5, 1300.0)
 PLY = OrthotropicPly(25e6, 1e6, 0.25, 0.5e6, 0.4e6, 0.2e6, 1270.0)
 
 
-def sheet(section, h=0.01, distorted=True) -> Shell:
+def sheet(section) -> Shell:
     """Plate of 1 m by 0.6 m in the x-y plane whose inner nodes stand off the regular places."""
-    patch = rectangle(4, 3, 1.0, 0.6)
-    if distorted:
-        inner = patch.index[1:-1, 1:-1].ravel()
-        patch.nodes[inner, :2] += np.random.default_rng(3).uniform(-0.06, 0.06, (len(inner), 2))
-    return Shell(ShellMesh.build(patch.nodes, patch.quads, h, material_axis=(1.0, 0, 0)), section)
+    return Shell(distorted_plate()[0], section)
 
 
 def homogeneous(shell: Shell, gradient) -> np.ndarray:
