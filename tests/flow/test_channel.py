@@ -8,6 +8,7 @@ from scipy.integrate import trapezoid
 
 from dbvfiv.flow import Channel, FlowMotion, UniformLoad
 from dbvfiv.flow.term import wall_share
+from tests.differences import difference
 
 FLOOR = 1e-5
 
@@ -26,11 +27,6 @@ def pressures(channel, *motion, inlet, density):
     assert pressure[0] == 0.0
     pressure[0] = outlet[0]
     return pressure
-
-
-def difference(function, x, direction, step):
-    f = [np.asarray(function(x + k * step * direction)) for k in (-2, -1, 1, 2)]
-    return (f[0] - 8 * f[1] + 8 * f[2] - f[3]) / (12 * step)
 
 
 def test_steady_pressure_is_bernoullis():

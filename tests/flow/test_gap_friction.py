@@ -15,7 +15,8 @@ from dbvfiv.studies.case import thesis_case
 from dbvfiv.studies.stability.place import is_surrounding
 from dbvfiv.studies.stability.walk import StabilityWalk
 from eigen import leading_modes
-from tests.flow.test_channel import FLOOR, difference, passage
+from tests.differences import difference
+from tests.flow.test_channel import FLOOR, passage
 from tests.verification.test_transient_modes import check_three_routes, three_routes
 
 #: Parallel faces: width, height, length, m; 21 stations.

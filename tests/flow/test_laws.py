@@ -9,7 +9,8 @@ import pytest
 from dbvfiv.flow import Channel, FlowMotion, FlowParameter, FlowTerm, UniformLoad
 from dbvfiv.flow import law as laws
 from dbvfiv.flow.law import along, solve_steady
-from tests.flow.test_channel import FLOOR, difference, passage
+from tests.differences import difference
+from tests.flow.test_channel import FLOOR, passage
 from tests.flow.vessel import Vessel
 
 GIVEN = {"inlet": 18e3, "density": 850.0}

@@ -98,14 +98,20 @@ LIP, INLET, WIDTH, LENGTH = 1e-3, 6e-3, 0.2, 4.0
 MASS, DAMPING, STIFFNESS = 1.3, 2.0, 900.0
 
 
-def plug(face: float, loss: float = 0.0) -> tuple[CoupledPencil, float, float, float]:
-    """A plug that the pressure at the flange pushes into the lips, which it narrows, m2 of face; with B, r and d."""
-    channel = Channel(np.array([0.0, 1e-13]), 1e-9, terms=[Line(LENGTH, loss=loss, reservoir=False)])
-    area = np.array([LIP, INLET])
+def one_degree(face: float, *terms) -> tuple[CoupledPencil, float]:
+    """A plug that the pressure at the flange pushes into the lips, which it narrows, m2 of face, and the inlet velocity
+    of a flow with some terms.
+    """
+    channel, area = Channel(np.array([0.0, 1e-13]), 1e-9, terms=terms), np.array([LIP, INLET])
     given = {"inlet": SUPPLY, "density": DENSITY}
-    velocity = channel.inlet_velocity(area, **given)
     parts = channel.linearise_still(area, given).parts()
     pencil = CoupledPencil(M=[[MASS]], C=[[DAMPING]], K=[[STIFFNESS]], G=[[0.0, face]], J=[[-WIDTH], [0.0]], **parts)
+    return pencil, channel.inlet_velocity(area, **given)
+
+
+def plug(face: float, loss: float = 0.0) -> tuple[CoupledPencil, float, float, float]:
+    """The plug behind a pipe; with B, r and d."""
+    pencil, velocity = one_degree(face, Line(LENGTH, loss=loss, reservoir=False))
     ratio = INLET / LIP
     rate = velocity * (ratio**2 - 1.0 + loss) / LENGTH
     return pencil, face * WIDTH * DENSITY * (ratio * velocity) ** 2 / LIP, rate, loss * velocity / LENGTH

@@ -8,11 +8,11 @@ import pytest
 from scipy.optimize import brentq
 
 from dbvfiv.flow import Channel, FlowMotion
-from dbvfiv.flow.elastic_line import DEGREE, ElasticLine, LineChannel
+from dbvfiv.flow.elastic_line import DEGREE, ElasticLine
 from dbvfiv.flow.stepping import MovingFluid
 from dbvfiv.flow.terms.line import Line, PiecedLine
 from tests.flow.test_channel import FLOOR, passage
-from tests.flow.test_elastic_line import DENSITY, QUARTER, SUPPLY, check_step, shut_frequencies
+from tests.flow.test_elastic_line import DENSITY, QUARTER, SUPPLY, behind, check_step, shut_frequencies
 from tests.flow.waves import Waves, march
 
 jax.config.update("jax_enable_x64", True)
@@ -24,11 +24,6 @@ def area_of(diameter):
 
 def in_series(*parts: Line, speeds, elements=None) -> ElasticLine:
     return ElasticLine(PiecedLine(parts), speeds, elements)
-
-
-def behind(line: ElasticLine, storage=0.0) -> LineChannel:
-    z, _ = passage()
-    return LineChannel(Channel(z, FLOOR, storage), Channel(z, FLOOR, storage, terms=[line.line]), line)
 
 
 @pytest.mark.parametrize("reservoir", [pytest.param(True, marks=pytest.mark.slow), False])

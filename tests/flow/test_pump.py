@@ -14,7 +14,7 @@ from dbvfiv.flow.terms.line import Line
 from dbvfiv.flow.terms.pump import Pump
 from eigen import CoupledPencil, certified_spectrum, leading_modes
 from tests.flow.test_channel import FLOOR, passage
-from tests.flow.test_line import DAMPING, INLET, LENGTH, LIP, MASS, STIFFNESS, WIDTH
+from tests.flow.test_line import DAMPING, INLET, LENGTH, LIP, MASS, STIFFNESS, WIDTH, one_degree
 from tests.verification.critical import hopf
 
 DENSITY, SUPPLY = 998.0, 18e3
@@ -71,17 +71,12 @@ def test_other_densities_see_the_pressures_of_the_pump():
 
 def plug(face: float, steep: float) -> tuple[CoupledPencil, float, float]:
     """The plug of `tests.flow.test_line` behind a pump of a straight curve, Pa s/m in the velocity; with B and r."""
-    area = np.array([LIP, INLET])
-    bare = Channel(np.array([0.0, 1e-13]), 1e-9, terms=[Line(LENGTH, reservoir=False)])
-    given = {"inlet": SUPPLY, "density": DENSITY}
-    velocity = bare.inlet_velocity(area, **given)
+    line = Line(LENGTH, reservoir=False)
+    _, velocity = one_degree(face, line)
     flow, unit = 4 * INLET * velocity, DENSITY * GRAVITY
     flows = np.array([0.5, 1.5]) * flow
     heads = SUPPLY / unit - steep * (flows / (4 * INLET) - velocity) / unit
-    pump = Pump(flows, heads, DENSITY, SUPPLY)
-    channel = Channel(np.array([0.0, 1e-13]), 1e-9, terms=[Line(LENGTH, reservoir=False), pump])
-    parts = channel.linearise_still(area, given).parts()
-    pencil = CoupledPencil(M=[[MASS]], C=[[DAMPING]], K=[[STIFFNESS]], G=[[0.0, face]], J=[[-WIDTH], [0.0]], **parts)
+    pencil, _ = one_degree(face, line, Pump(flows, heads, DENSITY, SUPPLY))
     ratio = INLET / LIP
     rate = (velocity * (ratio**2 - 1.0) + steep / DENSITY) / LENGTH
     return pencil, face * WIDTH * DENSITY * (ratio * velocity) ** 2 / LIP, rate

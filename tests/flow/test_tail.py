@@ -9,11 +9,11 @@ from dbvfiv.flow import Channel, FlowMotion, Stream
 from dbvfiv.flow.stepping import MovingFluid
 from dbvfiv.flow.terms.line import Line
 from dbvfiv.flow.terms.tail import Tail
-from eigen import CoupledPencil, leading_modes
+from eigen import leading_modes
 from tests.flow.test_channel import FLOOR, passage
-from tests.flow.test_line import diameter_of
+from tests.flow.test_line import DAMPING, DENSITY, INLET, LENGTH, LIP, MASS, STIFFNESS, WIDTH, diameter_of, one_degree
 
-DENSITY, DRIVE = 998.0, 18e3
+DRIVE = 18e3
 
 
 @pytest.mark.parametrize("wide", [1.0, 1.2, 3.0])
@@ -113,17 +113,13 @@ def test_flow_that_runs_back_gets_nothing_from_a_jet():
 # -- a valve of one degree with a pipe behind
 # ----
 
-LIP, INLET, WIDTH, LENGTH, PIPE = 1e-3, 6e-3, 0.2, 4.0, 9e-3
-MASS, DAMPING, STIFFNESS, FACE = 1.3, 2.0, 900.0, 2e-6
+PIPE, FACE = 9e-3, 2e-6
 
 
 def test_a_valve_of_one_degree_has_the_roots_of_its_cubic():
     """(m s^2 + c s + k) x = S p(x, Q) with the jet's and the pipe's momentum linearised by hand."""
-    channel = Channel(np.array([0.0, 1e-13]), 1e-9, terms=[Tail(math.sqrt(16 * PIPE / math.pi), LENGTH)])
-    area, given = np.array([LIP, INLET]), {"inlet": DRIVE, "density": DENSITY}
-    flow = channel.inlet_velocity(area, **given) * INLET
-    parts = channel.linearise_still(area, given).parts()
-    pencil = CoupledPencil(M=[[MASS]], C=[[DAMPING]], K=[[STIFFNESS]], G=[[0.0, FACE]], J=[[-WIDTH], [0.0]], **parts)
+    pencil, velocity = one_degree(FACE, Tail(math.sqrt(16 * PIPE / math.pi), LENGTH))
+    flow = velocity * INLET
     s = np.polynomial.Polynomial([0.0, 1.0])
     inertia = LENGTH / PIPE * s
     pipe = 2 * flow * (1 / PIPE**2 - 1 / (LIP * PIPE))  # of the head by the flow, beside the jet's own

@@ -8,6 +8,7 @@ import pytest
 from dbvfiv.model.newton import EquilibriumSolver
 from eigen import SingularShiftError
 from eigen.factor import DirectFactor
+from tests.differences import difference
 
 STATES = {  # lift of the lip, m, and noise: wide open, ajar, lips crossed and held by the stops
     "open": (0.02, 2e-4),
@@ -21,11 +22,6 @@ def direction_of(model, seed):
     generator = np.random.default_rng(seed)
     nodal = generator.standard_normal((len(model.mesh.nodes), 5)) * np.array([1, 1, 1, 30, 30]) * 1e-3
     return model.shell.dofs.restrict(nodal)
-
-
-def difference(function, q, direction, step):
-    f = [function(q + k * step * direction) for k in (-2, -1, 1, 2)]
-    return (f[0] - 8 * f[1] + 8 * f[2] - f[3]) / (12 * step)
 
 
 @pytest.mark.parametrize("name", sorted(STATES))

@@ -10,6 +10,7 @@ from dbvfiv.model.classes import linearise_class
 from dbvfiv.model.equilibria import LoadPath, SteadyOptions
 from dbvfiv.model.newton import NewtonOptions
 from dbvfiv.model.symmetry import SYMMETRIES
+from tests.differences import difference
 from tests.model.conftest import opened
 from tests.systems.pressed import ShellOnPlane
 
@@ -103,11 +104,6 @@ def test_open_states_do_not_know_of_it(make_model, model):
     assert len(model.stops.unknowns) == 0
 
 
-def _difference(function, q, direction, step):
-    f = [function(q + k * step * direction) for k in (-2, -1, 1, 2)]
-    return (f[0] - 8 * f[1] + 8 * f[2] - f[3]) / (12 * step)
-
-
 def _direction(model, seed):
     generator = np.random.default_rng(seed)
     return model.shell.dofs.restrict(generator.standard_normal((len(model.mesh.nodes), 5)) * [1, 1, 1, 30, 30])
@@ -129,7 +125,7 @@ def test_tangent_against_differences(model, pressed_state):
     tangent = model.tangent(q, 18e3)
     assert np.allclose(tangent.residual, model.residual(q, 18e3), rtol=0, atol=1e-12 * np.abs(tangent.residual).max())
     direction = _direction(model, 2)
-    slope = _difference(lambda x: model.residual(x, 18e3), q, direction, _safe_step(model, q, direction))
+    slope = difference(lambda x: model.residual(x, 18e3), q, direction, _safe_step(model, q, direction))
     assert np.linalg.norm(model.apply(tangent, direction) - slope) < 1e-7 * np.linalg.norm(slope)
 
 
@@ -143,7 +139,7 @@ def test_it_is_no_part_of_what_is_damped(model, pressed_state):
 
 def test_force_is_the_derivative_of_the_energy(model, pressed_state):
     q, direction = pressed_state, _direction(model, 3)
-    slope = _difference(model.support_energy, q, direction, _safe_step(model, q, direction))
+    slope = difference(model.support_energy, q, direction, _safe_step(model, q, direction))
     assert model.contact_force(q) @ direction == pytest.approx(slope, rel=1e-7)
 
 
@@ -157,10 +153,10 @@ def test_higher_derivatives_against_differences(model, pressed_state):
         return model.shell.dofs.matrix(data) @ a
 
     found = model.contact.form(q, a, b)
-    expected = _difference(slope, q, b, _safe_step(model, q, b))
+    expected = difference(slope, q, b, _safe_step(model, q, b))
     assert np.linalg.norm(found - expected) < 1e-6 * np.linalg.norm(expected)
     found = model.contact.form(q, a, b, c)
-    expected = _difference(lambda x: model.contact.form(x, a, b), q, c, _safe_step(model, q, c))
+    expected = difference(lambda x: model.contact.form(x, a, b), q, c, _safe_step(model, q, c))
     assert np.linalg.norm(found - expected) < 1e-6 * np.linalg.norm(expected)
 
 

@@ -17,7 +17,8 @@ from dbvfiv.model.symmetry import HALF_SYMMETRIES, SYMMETRIES
 from dbvfiv.motion.start import steady_positions
 from dbvfiv.record.mesh import MeshData, WholeValve
 from eigen.search import leading_modes
-from tests.model.test_coupled_tangent import difference, direction_of
+from tests.differences import difference
+from tests.model.test_coupled_tangent import direction_of
 from tests.model.test_flow_laws import MU
 from tests.model.test_residual_forms import check, motions
 from tests.model.test_residual_forms import difference as mixed_difference
