@@ -23,7 +23,7 @@ from ..shell.pressure import Weight
 from ..shell.section import Layer, Section, Zones
 from ..shell.shell import Shell
 from .preset import pressure_for_overlap, stress_free_shape
-from .supports import free_unknowns
+from .symmetry import equilibria_of
 
 
 def build_section(case: Case) -> Section:
@@ -53,7 +53,7 @@ def build_shell(case: Case, section: Section | None = None) -> tuple[ValveMesh, 
     section = section or build_section(case)
     zones = layer_zones(case, mesh) if fillers else None
     choices = (case.shell.metric, case.mesh.element, zones, case.shell.mass)
-    shell = Shell(surface, section, free_unknowns(mesh), *choices)
+    shell = Shell(surface, section, equilibria_of(mesh.part).free_unknowns(mesh), *choices)
     return mesh, _preset(case, mesh, shell) if case.valve.is_preset else shell
 
 

@@ -29,18 +29,6 @@ from ..shell.mesh import nodal_thickness
 from ..shell.shell import Shell
 
 
-def free_unknowns(mesh: ValveMesh) -> np.ndarray:
-    """(nn, 5) free displacements and rotations of the part of the valve that is computed (App. A).
-
-    The frames' first vector lies in each symmetry plane, so a plane of symmetry fixes the second rotation.
-    """
-    free = np.ones((len(mesh.nodes), 5), bool)
-    for column, across in mesh.part.edges:
-        free[np.ix_(mesh.rows[:, column], [across, 4])] = False
-    free[mesh.rows[-1]] = False
-    return free
-
-
 def held_rows(case: Case, mesh: ValveMesh) -> np.ndarray:
     """(rows,) true for rows of the duckbill, which supports of Th. 3.6 hold shut."""
     return mesh.z <= case.valve.duckbill_length * (1 + 1e-9)

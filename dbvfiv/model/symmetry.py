@@ -64,9 +64,10 @@ class Symmetry:
         return np.prod(np.where(np.asarray(mirrors)[:, :2] < 0, self.signs, 1), axis=1)
 
     def free_unknowns(self, mesh: ValveMesh) -> np.ndarray:
-        """(nn, 5) free displacements and rotations of the part of the valve in this class.
+        """(nn, 5) free displacements and rotations of the part of the valve in this class (App. A).
 
-        The frames' first vector lies in each symmetry plane.
+        The frames' first vector lies in each symmetry plane, so such a plane fixes the second rotation of symmetric
+        motions.
         """
         free = np.ones((len(mesh.nodes), 5), bool)
         for column, across in mesh.part.edges:

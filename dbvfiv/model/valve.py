@@ -36,7 +36,7 @@ from .newton import EquilibriumSolver, NewtonOptions
 from .outside import OutsideFluid
 from .preset import PressedShell
 from .relaxing import WallRelaxation
-from .supports import HELD_LIPS, face_contact, free_unknowns, held_rows, lip_stops
+from .supports import HELD_LIPS, face_contact, held_rows, lip_stops
 
 #: Faces that meet change the residual from one step to the next: its norm has to fall.
 _AT_REST = NewtonOptions(1e-10, 200, "l2")
@@ -92,7 +92,7 @@ class ValveModel(PressedShell):
         self.case = case
         self.mesh, self.shell = build_shell(case, section)
         if closed_by == HELD_LIPS:
-            free = free_unknowns(self.mesh)
+            free = self.shell.dofs.free.copy()
             free[self.mesh.rows[held_rows(case, self.mesh)].ravel(), 1] = False
             self.shell = self.shell.with_free(free)
         dofs = self.shell.dofs
@@ -422,10 +422,9 @@ class ValveModel(PressedShell):
         moulded = self._film <= self.parting * self._film.min()
         return int(max(np.argmin(area), np.flatnonzero(moulded & (area <= self.parting * self._film)).max(initial=0)))
 
-    def mass_flow(self, area: np.ndarray, pressure: float, density: float | None = None) -> float:
+    def mass_flow(self, area: np.ndarray, pressure: float) -> float:
         """Steady mass flow of the whole valve, kg/s; none where its faces shut a section."""
-        density = self.case.fluid.density if density is None else density
-        velocity = self.flow.inlet_velocity(area, pressure, density)
-        density = self.flow.inlet_density(area, pressure, density)
+        velocity = self.flow.inlet_velocity(area, pressure, self.case.fluid.density)
+        density = self.flow.inlet_density(area, pressure, self.case.fluid.density)
         inlet = float(self.mesh.rest_area[-1] - self.mesh.wall_deduction[-1])
         return self.open_share(area) * self.mesh.part.copies * density * velocity * inlet

@@ -7,7 +7,7 @@ import pytest
 
 from dbvfiv.flow import RowAreas
 from dbvfiv.geometry import valve_mesh
-from dbvfiv.model.supports import free_unknowns
+from dbvfiv.model.symmetry import SYMMETRIES
 from dbvfiv.shell import DofMap
 from dbvfiv.studies.case import thesis_case
 
@@ -16,7 +16,7 @@ from dbvfiv.studies.case import thesis_case
 def rows():
     case = thesis_case({"mesh.around": 8, "mesh.along": 14})
     mesh = valve_mesh(case.valve, case.mesh)
-    dofs = DofMap(free_unknowns(mesh), mesh.quads)
+    dofs = DofMap(SYMMETRIES["SS"].free_unknowns(mesh), mesh.quads)
     return mesh, dofs, RowAreas(mesh, dofs.index)
 
 
