@@ -205,13 +205,9 @@ class Loading:
 
     def __init__(self, model: Any, pressure: float):
         self.model, self.whole = model, float(pressure)
-        self.mesh, self.nodal, self.rest = model.mesh, model.nodal, model.rest
+        self.mesh, self.size, self.nodal, self.rest = model.mesh, model.size, model.nodal, model.rest
         self.apply, self.rounding = model.apply, model.rounding
-
-    @property
-    def size(self) -> int:
-        """Number of unknowns n."""
-        return self.model.size
+        self.factor, self.refactor = model.factor, model.refactor
 
     def residual(self, q: np.ndarray, share: float) -> np.ndarray:
         """Unbalanced force (n,) under a share of the load."""
@@ -220,14 +216,6 @@ class Loading:
     def tangent(self, q: np.ndarray, share: float) -> Any:
         """Residual and linearisation there."""
         return self.model.tangent(q, self.whole, share)
-
-    def factor(self) -> Any:
-        """A new factorisation object."""
-        return self.model.factor()
-
-    def refactor(self, factor: Any, tangent: Any) -> None:
-        """Factor a tangent."""
-        self.model.refactor(factor, tangent)
 
     def pressure_derivative(self, q: np.ndarray, share: float) -> np.ndarray:
         """Derivative (n,) of the residual by the share."""
