@@ -10,12 +10,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..case.model import Case
-from ..contact import PlaneContact
 from ..errors import SolveError
-from ..geometry.valve_mesh import ValveMesh
 from ..shell.mesh import nodal_thickness
-from ..shell.shell import Shell
-from ..texts import shortly
 from .load_curve import LoadCurve
 from .load_steps import LARGEST_JUMP, LoadStepOptions, LoadSteps
 from .newton import NewtonOptions
@@ -95,58 +91,6 @@ class Passage:
         return [(float(a), float(b)) for a, b in cuts]
 
 
-@shortly
-@dataclass(frozen=True)
-class InnerFace:
-    """Inner face of the wall before the closing plane, and the passage between them.
-
-    Attributes
-    ----------
-    mesh : ValveMesh
-    shell : Shell
-    plane : PlaneContact
-        Contact of this face, for its gaps.
-    initial_gap : float, m
-        Least gap at the lip at rest of what a passage is measured against.
-    shut_fraction : float
-    """
-
-    mesh: ValveMesh
-    shell: Shell
-    plane: PlaneContact
-    initial_gap: float
-    shut_fraction: float
-
-    def gaps(self, nodal: np.ndarray) -> np.ndarray:
-        """Gaps (nn,), m, of all nodes for nodal unknowns (nn, c), measured as the contact measures them: faces that
-        touch leave none.
-        """
-        return self._points(nodal)[0]
-
-    def passage(self, nodal: np.ndarray, held: np.ndarray | None = None) -> Passage:
-        """Passage for nodal unknowns (nn, c); `held` (rows,) are rows shut by their supports."""
-        gap, x = self._points(nodal)
-        at_rest, x_rest = self._points(np.zeros_like(nodal))
-        rows = self.mesh.rows
-        area = area_under(gap[rows], x[rows])
-        if held is not None:
-            area[held] = 0.0
-        reference = float(area_under(np.maximum(at_rest[rows[:1]], self.initial_gap), x_rest[rows[:1]])[0])
-        return Passage(self.mesh.z, area, reference, self.shut_fraction)
-
-    def _points(self, nodal: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Gap (nn,) and x position (nn,) of the inner face at all nodes; the clamped flange is no contact node but has
-        a face all the same.
-        """
-        shell, plane = self.shell, self.plane
-        depth, lift = 0.5 * nodal_thickness(shell.mesh), np.zeros(shell.mesh.node_count)
-        depth[plane.nodes], lift[plane.nodes] = plane.depth, plane.lift
-        directors = shell.directors(nodal)[0] if nodal.any() else shell.mesh.directors
-        point = shell.mesh.nodes + nodal[:, :3] - depth[:, None] * directors
-        gap = point[:, 1] + lift
-        return np.where(gap < plane.law.rounding, np.minimum(gap, 0.0), gap), point[:, 0]
-
-
 def area_under(gap: np.ndarray, x: np.ndarray) -> np.ndarray:
     """Area (rows,) under the gap of rows of points; where the face folds back on itself no width is counted."""
     height = np.maximum(gap, 0.0)
@@ -165,8 +109,8 @@ class ClosedValve(ValveModel):
 
     Attributes
     ----------
-    face : InnerFace
-        For measuring gaps with either supports.
+    plane : PlaneContact
+        Contact of the inner faces, for measuring gaps with either supports.
     held : (rows,) bool array
         Rows that are shut by the supports.
     """
@@ -175,17 +119,40 @@ class ClosedValve(ValveModel):
         self.supports = case.closure.supports
         super().__init__(case.replace(CLOSED), closed_by=self.supports)
         self.held = held_rows(case, self.mesh) & (self.supports == HELD_LIPS)
-        faces = face_contact(self.case, self.mesh, self.shell, CONTACT)
-        self.face = InnerFace(self.mesh, self.shell, faces, case.valve.initial_gap, case.closure.shut_fraction)
+        self.plane = face_contact(self.case, self.mesh, self.shell, CONTACT)
 
     @property
     def nodes_beyond(self) -> np.ndarray:
         """Numbers of the nodes whose inner face starts beyond the closing plane."""
-        return self.face.plane.nodes[self.face.plane.start < 0]
+        return self.plane.nodes[self.plane.start < 0]
+
+    def gaps(self, nodal: np.ndarray) -> np.ndarray:
+        """Gaps (nn,), m, of all nodes for nodal unknowns (nn, c), measured as the contact measures them: faces that
+        touch leave none.
+        """
+        return self._points(nodal)[0]
 
     def passage(self, q: np.ndarray) -> Passage:
-        """Passage of a state (n,)."""
-        return self.face.passage(self.nodal(q), self.held)
+        """Passage of a state (n,); at rest the lip has the initial gap at least."""
+        nodal, rows, valve = self.nodal(q), self.mesh.rows, self.case.valve
+        gap, x = self._points(nodal)
+        at_rest, x_rest = self._points(np.zeros_like(nodal))
+        area = area_under(gap[rows], x[rows])
+        area[self.held] = 0.0
+        reference = float(area_under(np.maximum(at_rest[rows[:1]], valve.initial_gap), x_rest[rows[:1]])[0])
+        return Passage(self.mesh.z, area, reference, self.case.closure.shut_fraction)
+
+    def _points(self, nodal: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Gap (nn,) and x position (nn,) of the inner face at all nodes; the clamped flange is no contact node but has
+        a face all the same.
+        """
+        shell, plane = self.shell, self.plane
+        depth, lift = 0.5 * nodal_thickness(shell.mesh), np.zeros(shell.mesh.node_count)
+        depth[plane.nodes], lift[plane.nodes] = plane.depth, plane.lift
+        directors = shell.directors(nodal)[0] if nodal.any() else shell.mesh.directors
+        point = shell.mesh.nodes + nodal[:, :3] - depth[:, None] * directors
+        gap = point[:, 1] + lift
+        return np.where(gap < plane.law.rounding, np.minimum(gap, 0.0), gap), point[:, 0]
 
     @property
     def reference_opening(self) -> float:
@@ -194,7 +161,7 @@ class ClosedValve(ValveModel):
 
     def start_warnings(self) -> Iterator[str]:
         """Warnings about where the inner face starts, and about supports that hold it."""
-        plane, beyond = self.face.plane, self.nodes_beyond
+        plane, beyond = self.plane, self.nodes_beyond
         if len(beyond):
             z = self.mesh.nodes[plane.nodes[plane.lifted], 2]
             yield (

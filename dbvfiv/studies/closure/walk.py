@@ -94,7 +94,7 @@ class Pressed:
         self.contact_nodes = int(np.count_nonzero(touch.touching))
         self.contact_pressure, self.gap = np.zeros(len(self.nodal)), np.zeros(len(self.nodal))
         self.contact_pressure[plane.nodes] = touch.pressure
-        self.gap[model.mesh.rows] = model.face.gaps(self.nodal)[model.mesh.rows]
+        self.gap[model.mesh.rows] = model.gaps(self.nodal)[model.mesh.rows]
         centre = LipCentre(model.mesh, model.shell)
         self.lip_opening, self.lip_displacement = centre.opening(self.q), centre.displacement(self.q)
         self.layers = layer_fields(model.shell, self.q)
@@ -107,7 +107,7 @@ class Pressed:
     @property
     def overlap(self) -> float:
         """Deepest overlap of the inner faces, m; rows held shut are left out."""
-        plane, model = self.model.face.plane, self.model
+        plane, model = self.model.plane, self.model
         movable = np.ones(len(self.nodal), bool)
         movable[model.mesh.rows[model.held].ravel()] = False
         gap = plane.gaps(self.q)
@@ -120,7 +120,7 @@ class Pressed:
         """
         model, z = self.model, self.model.mesh.z
         # just less than the gap that lifted rows have at rest
-        gap = np.where(model.held, 0.0, model.face.gaps(self.nodal)[model.mesh.centre_line])
+        gap = np.where(model.held, 0.0, model.gaps(self.nodal)[model.mesh.centre_line])
         gap = gap - 0.999 * model.case.valve.initial_gap
         met = np.flatnonzero(gap <= 0)
         if not len(met):
