@@ -47,20 +47,20 @@ class LinearisedClass(LinearisedState):
     def resolved(self, mu) -> float:
         return np.inf  # a plug has no waves
 
-    def fluid_parts(self, density, storage=None, line=None) -> dict[str, np.ndarray]:
+    def fluid_parts(self, given) -> dict[str, np.ndarray]:
         """A0 to A2 of the plug; neither the continuity law nor a line matters, since no area changes."""
-        flow = self.model.flow
+        flow, density = self.model.flow, given["density"]
         if self.symmetry.sway_axis is None or not flow.has_fluid:
             return {}
         speeds = flow.steady_velocities(self.area, self.inlet, density)
         passage = np.asarray(flow.open_area(self.area)), np.asarray(speeds) * float(self.seal is None)
         return plug_parts(self.model.mesh.z, *passage, density, flow.unsteady)
 
-    def shut_parts(self, density, storage, line) -> dict[str, np.ndarray]:
-        return self.no_flow() | self.fluid_parts(density)
+    def shut_parts(self, given) -> dict[str, np.ndarray]:
+        return self.no_flow() | self.fluid_parts(given)
 
     def steady_parts(self) -> dict[str, np.ndarray]:
-        return self.fluid_parts(1.0)  # the centrifugal force, which depends on the pressure alone
+        return self.fluid_parts({"density": 1.0})  # the centrifugal force, which depends on the pressure alone
 
     def nodal(self, q: np.ndarray) -> np.ndarray:
         return self.shell.dofs.small(q)

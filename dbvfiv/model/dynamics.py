@@ -17,7 +17,7 @@ import scipy.sparse as sp
 
 from eigen.operator import FLUID_PARTS, CoupledPencil, Relaxation
 
-from ..case.parameters import PIPES, Mu
+from ..case.parameters import Mu
 from ..errors import SolveError
 from ..flow.channel import Channel
 from ..flow.law import FlowLaw, FlowMotion
@@ -88,10 +88,9 @@ class LinearisedState:
         rigid = still_channel(flow)
         return flow if (rigid.storage if storage is None else storage) > 0 else rigid
 
-    def shut_parts(self, density: float, storage: float | None, line: Mapping[str, float]) -> dict[str, np.ndarray]:
-        """A0 to S1 of the still fluid in front of a seal."""
-        given = {"inlet": self.inlet, "density": density, **line} | ({} if storage is None else {"storage": storage})
-        law = self._still_law(storage)
+    def shut_parts(self, given: Mapping[str, float]) -> dict[str, np.ndarray]:
+        """A0 to S1 of the still fluid in front of a seal, `given` the parameters of the flow law."""
+        law = self._still_law(given.get("storage"))
         rest = law.with_velocity(law.steady_inner(self.area, given), 0.0)
         found = law.shut(self.seal).linearise(FlowMotion.still(self.area, rest), given).parts()
         parts = self.no_flow(self.model.flow.inner)
@@ -105,11 +104,9 @@ class LinearisedState:
             parts[name][rates], parts[rate][rates] = parts[rate][rates], 0.0
         return parts
 
-    def fluid_parts(self, density: float, storage: float | None = None, line: Mapping[str, float] = {}):
-        """A0 to S1 of `eigen.CoupledPencil`: response of the unsteady fluid to `slope`; `line` as `Mu.pipes`."""
+    def fluid_parts(self, given: Mapping[str, float]) -> dict[str, np.ndarray]:
+        """A0 to S1 of `eigen.CoupledPencil`: response of the unsteady fluid to `slope`."""
         self.check_pump()
-        given = {"inlet": self.inlet, "density": density, **line}
-        given = given if storage is None else given | {"storage": storage}
         return self.model.flow.linearise_still(self.area, given).parts()
 
     def steady_parts(self) -> dict[str, np.ndarray]:
@@ -168,25 +165,20 @@ class LinearisedState:
         flowing = fluid and (self.model.flow.has_fluid or self.inner is not None)
         if not flowing and self.added is None:
             return CoupledPencil(damped.M, damped.C, damped.K, relaxation=damped.relaxation)
-        parts = self._flow_parts(mu) if flowing else {}
+        parts = self.flow_parts(mu) if flowing else {}
         if self.added is not None:
             density = self.model.case.outside.density(mu["density"])
             parts = self.added.parts(parts or self.no_flow(), density)
         return damped.replace(**parts)
 
-    def _flow_parts(self, mu: Mapping[str, float]) -> dict[str, np.ndarray]:
-        """A0 to S1 of the flow at a parameter point."""
+    def flow_parts(self, mu: Mapping[str, float]) -> dict[str, np.ndarray]:
+        """A0 to S1 of the flow alone at a parameter point; of a steady flow A0 is all."""
         if self.inner is not None:
             return self.model.flow.linearise(FlowMotion.still(self.area, self.inner), mu).parts()
-        pipes = {name: mu[name] for name in PIPES if name in mu}
-        return self.flow_parts(mu["density"], mu.get("storage"), pipes)
-
-    def flow_parts(self, density: float, storage: float | None = None, line: dict | None = None) -> dict:
-        """A0 to S1 of the flow alone at a density; of a steady flow A0 is all."""
-        moving = self.model.flow.unsteady
+        given, moving = {**mu, "inlet": self.inlet}, self.model.flow.unsteady
         if self.seal is not None and moving:
-            return self.shut_parts(density, storage, line or {})
-        return self.no_flow() | (self.fluid_parts(density, storage, line or {}) if moving else self.steady_parts())
+            return self.shut_parts(given)
+        return self.no_flow() | (self.fluid_parts(given) if moving else self.steady_parts())
 
     def no_flow(self, inner: int = 0) -> dict:
         """A0 to S1 of a flow that does nothing."""

@@ -135,7 +135,8 @@ class ValveFamily(PencilFamily):
         if "wave_speed" in line:  # so that the compressibility is that of the fluid
             line["wave_speed"] *= np.sqrt(law.density)
         line |= flow.at_unit_density()
-        parts = linear.flow_parts(1.0, law.storage, line) if flow.has_fluid else linear.no_flow()
+        unit = {"density": 1.0, "storage": law.storage} | line
+        parts = linear.flow_parts(unit) if flow.has_fluid else linear.no_flow()
         if linear.added is None:
             return parts
         return linear.added.parts(parts, law.outside / law.density if law.outside else 1.0)
