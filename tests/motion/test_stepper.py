@@ -1,11 +1,14 @@
 """Steps of the coupled valve: order, energy, contact, slamming, step control."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
 from dbvfiv.motion.control import ControlOptions, FixedSteps, step_control
 from dbvfiv.motion.equations import ValveMotion
 from dbvfiv.motion.scheme import scheme
+from dbvfiv.motion.start import steady_positions
 from dbvfiv.motion.stepper import StepFailure, StepOptions, Stepper, consistent_state
 from tests.small_valves import FORMER
 
@@ -22,6 +25,13 @@ def advance(motion, state, h, steps, pressure, name="generalised-alpha", nd=0.0,
     return state, results, stepper, control
 
 
+def flowing(motion, q, start=None):
+    """State at rest in the steady flow at 12 kPa through a shape, or elsewhere with the velocity of that flow."""
+    model = motion.model
+    speed = model.flow.inlet_velocity(model.rows.areas(model.nodal(q)), 12e3, motion.mu.density)
+    return consistent_state(motion, 0.0, q if start is None else start, 0 * q, 12e3, np.array([speed]))
+
+
 @pytest.mark.parametrize(
     "law, name, nd, order",
     [
@@ -36,8 +46,7 @@ def test_order_of_accuracy(valve, open_state, law, name, nd, order):
     """Step refinement of a smooth motion: the open valve after the pressure has changed gently."""
     model = valve({"fluid.density": 300.0, "fluid.continuity": law})
     motion = ValveMotion(model)
-    speed = model.flow.inlet_velocity(model.rows.areas(model.nodal(open_state)), 12e3, 300.0)
-    state = consistent_state(motion, 0.0, open_state, 0 * open_state, 12e3, np.array([speed]))
+    state = flowing(motion, open_state)
     pressure = lambda t: 12e3 + 4e3 * (1 - np.cos(60 * t))  # noqa: E731
     lip = model.shell.dofs.index[model.mesh.rows[0, 0], 1]
     ends = []
@@ -62,8 +71,6 @@ def test_work_and_damping_account_for_the_energy(valve):
 
 
 def test_a_free_swing_keeps_its_energy(valve, open_state):
-    from dbvfiv.motion.start import steady_positions
-
     start = steady_positions(valve(), 2e3)
     model = valve(
         {
@@ -130,18 +137,15 @@ def test_steps_are_robust_while_fluid_is_drawn_in_and_of_second_order_after(valv
 
 def test_steps_of_a_smooth_cycle_are_of_second_order(valve, open_state):
     """Large outward oscillations of a light fluid, flow changing by a tenth in a step."""
-    model = valve({"fluid.density": 50.0, "damping.alpha": 0.0})
-    motion = ValveMotion(model)
-    speed = model.flow.inlet_velocity(model.rows.areas(model.nodal(open_state)), 12e3, 50.0)
-    state = consistent_state(motion, 0.0, 1.15 * open_state, 0 * open_state, 12e3, np.array([speed]))
+    motion = ValveMotion(valve({"fluid.density": 50.0, "damping.alpha": 0.0}))
+    state = flowing(motion, open_state, 1.15 * open_state)
     robust, inward = _kinds(motion, state, 5e-4, 100, lambda t: 12e3).T
     assert not robust.any() and not inward.any()
 
 
 def test_factors_are_kept(valve, open_state):
     motion = ValveMotion(valve({"fluid.density": 300.0}))
-    speed = motion.model.flow.inlet_velocity(motion.model.rows.areas(motion.model.nodal(open_state)), 12e3, 300.0)
-    state = consistent_state(motion, 0.0, open_state, 0 * open_state, 12e3, np.array([speed]))
+    state = flowing(motion, open_state)
     _, results, stepper, _ = advance(
         motion, state, 1e-4, 100, lambda t: 12e3 + 50 * np.sin(200 * t), options=StepOptions()
     )
@@ -159,8 +163,6 @@ class Fails:
         if state.time + h > self.bad[0] and state.time < self.bad[1] and h > self.limit:
             raise StepFailure("no")
         self.taken.append(h)
-        from types import SimpleNamespace
-
         return SimpleNamespace(state=SimpleNamespace(time=state.time + h), error=0.0)
 
     def forget(self, all=True):
@@ -168,8 +170,6 @@ class Fails:
 
 
 def test_halved_steps_come_back_to_the_grid():
-    from types import SimpleNamespace
-
     stepper = Fails((0.0101, 0.0125), 1.3e-4)
     control = FixedSteps(stepper, ControlOptions(1e-3))
     state = SimpleNamespace(time=0.0)
@@ -182,8 +182,6 @@ def test_halved_steps_come_back_to_the_grid():
 
 
 def test_steps_are_not_halved_for_ever():
-    from types import SimpleNamespace
-
     control = FixedSteps(Fails((0.0, 1.0), 0.0), ControlOptions(1e-3, smallest=1 / 64))
     with pytest.raises(StepFailure):
         control.advance(SimpleNamespace(time=0.0), 1.0)
@@ -191,10 +189,8 @@ def test_steps_are_not_halved_for_ever():
 
 
 def test_adaptive_steps_follow_the_error(valve, open_state):
-    model = valve({"fluid.density": 300.0})
-    motion = ValveMotion(model)
-    speed = model.flow.inlet_velocity(model.rows.areas(model.nodal(open_state)), 12e3, 300.0)
-    state = consistent_state(motion, 0.0, open_state, 0 * open_state, 12e3, np.array([speed]))
+    motion = ValveMotion(valve({"fluid.density": 300.0}))
+    state = flowing(motion, open_state)
     pressure = lambda t: 12e3 + 2e3 * np.exp(-(((t - 0.05) / 0.002) ** 2))  # noqa: E731
     stepper = Stepper(motion, scheme("generalised-alpha", 0.1), pressure)
     control = step_control(stepper, ControlOptions(2e-3, True, 2e-8))

@@ -9,9 +9,9 @@ import scipy.sparse as sp
 
 from dbvfiv.flow.stepping import Flow, FluidState
 from dbvfiv.model.linear import CoupledFactor
+from dbvfiv.model.preset import PressedShell
 from dbvfiv.model.relaxing import WallRelaxation
 from dbvfiv.shell import Shell, WallMemory
-from dbvfiv.shell.pressure import pressure_force, pressure_stiffness
 
 NONE = np.zeros(1)
 
@@ -111,19 +111,13 @@ class ShellMotion(Motion):
         self.wall = WallMemory(shell, branches.strengths, branches.times) if branches else None
         pattern = shell.dofs.matrix(np.ones(len(shell.dofs.pattern[1])))
         self._factor = CoupledFactor(pattern, sp.csr_matrix((shell.size, 0)), sp.csr_matrix((0, shell.size)))
-        self._all = np.ones(shell.mesh.element_count)
-
-    def _pressure(self, pressure):
-        return np.full(self.shell.mesh.node_count, pressure)
+        self._pressed = PressedShell(shell, 1.0)
 
     def internal_force(self, q, step=None):
         return self.shell.force(q, step)
 
     def pressure_force(self, q, pressure):
-        mesh, nodal = self.shell.mesh, self.shell.dofs.expand(q)
-        out = np.zeros_like(nodal)
-        pressure_force(mesh.quads, mesh.nodes, nodal, self._pressure(pressure), self._all, out)
-        return self.shell.dofs.restrict(out)
+        return self._pressed.pressure_force(self.shell.dofs.expand(q), pressure)
 
     def inertia(self, q, v, a):
         return self.shell.inertia(q, v, a)
@@ -133,21 +127,11 @@ class ShellMotion(Motion):
         self._factor.refactor(values, none, none, np.zeros((0, 0)))
 
     def linearise(self, q_new, v_new, q, v, load, weights, q_load=None, v_load=None, step=None):
-        shell, mesh = self.shell, self.shell.mesh
+        shell = self.shell
         _, values = shell.force_and_tangent(q_new, step=step)
         values = weights.force * values + weights.inertia * shell.mass(q)
         pressure = weights.load * weights.theta * load.inlet
-        pressure_stiffness(
-            mesh.quads,
-            mesh.nodes,
-            shell.dofs.expand(q),
-            self._pressure(pressure),
-            self._all,
-            shell.dofs.slots,
-            -1.0,
-            values,
-        )
-        self._refactor(values)
+        self._refactor(self._pressed.follower_stiffness(shell.dofs.expand(q), pressure, values))
 
     def solve(self, force):
         return self._factor.solve(force)
