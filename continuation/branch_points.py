@@ -8,7 +8,7 @@ from continuation.branch import CurvePoint
 from continuation.conditions import BranchPointCondition, generic_borders, null_pair
 from continuation.event_location import locate_zero, solve_augmented, special_at
 from continuation.linear import Bordered
-from continuation.options import SingularSystem
+from continuation.options import NotConverged, SingularSystem
 from continuation.system import System
 from continuation.tracer import Monitor
 
@@ -76,20 +76,16 @@ class BranchPointMonitor(Monitor):
     def _examine(self, tracer, before, after, index, g0, g1, borders):
         if not np.isfinite(g0 * g1) or (g0 * g1 >= 0 and g1 != 0):
             return []
-        if not tracer.options.locate:
-            return [special_at(tracer, "branch point", after, index, False, "location was not asked for")]
-        sizes = []
+        sizes = [0.0]
 
         def indicator(point):
             g = self._test(tracer, point, borders)
             sizes.append(abs(g))
             return g
 
-        def attempt(guess, *_):
-            result = self.solve(tracer, guess, borders)
-            return result if isinstance(result, str) else (result.z[:-1], result)
-
-        result, guess, reason = locate_zero(tracer, before, after, indicator, attempt)
+        result, guess, reason = locate_zero(
+            tracer, before, after, indicator, lambda guess, *_: self.solve(tracer, guess, borders)
+        )
         if result is None:
             if sizes[-1] > max(abs(g0), abs(g1)):
                 return []  # The test function went through infinity: no branch point.
@@ -97,12 +93,12 @@ class BranchPointMonitor(Monitor):
         return [self.describe(tracer, result, guess, index)]
 
     def solve(self, tracer, guess, borders):
-        """Newton on the augmented system; a `Correction` or a sentence that says why not."""
+        """Newton on the augmented system; see `solve_augmented`."""
         problem = tracer.problem
         for _ in range(3):
             _, v, w = self._scalar(tracer, guess, borders)
             if v is None:
-                return "The bordered matrix is singular."
+                raise NotConverged("The bordered matrix is singular.")
             borders = w / np.linalg.norm(w), v / np.linalg.norm(v)
         unfolded = Unfolded(problem.system, w[: problem.n])
         rows = problem.frame(np.stack([guess.tangent, v], axis=1))
@@ -117,10 +113,8 @@ class BranchPointMonitor(Monitor):
             unfolded,
             {**problem.mu(guess.z), unfolded.name: 0.0},
         )
-        if isinstance(result, str):
-            return result
         if abs(result.z[-1]) > 1e-6 * (1 + np.abs(result.z[:-1]).max()):
-            return "The point is a branch point of an unfolded system only."
+            raise NotConverged("The point is a branch point of an unfolded system only.")
         return result
 
     def describe(self, tracer, result, guess, index):

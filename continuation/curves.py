@@ -26,6 +26,7 @@ from continuation.options import (
     ContinuationOptions,
     DerivativeMissing,
     NotABifurcation,
+    NotConverged,
     SingularSystem,
 )
 from continuation.problem import Problem
@@ -83,9 +84,10 @@ class FoldCurveMonitor(Monitor):
             return special_at(tracer, kind, after, index, False, "the curve was lost")
         v, w = point.data["orientation"]
         if kind == "bogdanov-takens":
-            result = solve_bogdanov_takens(tracer, point.z, v, w)
-            if isinstance(result, str):
-                return special_at(tracer, kind, point, index, False, result)
+            try:
+                result = solve_bogdanov_takens(tracer, point.z, v, w)
+            except NotConverged as error:
+                return special_at(tracer, kind, point, index, False, str(error))
             if tracer.fraction(before, after, result.z)[1] >= 1.0:
                 return special_at(tracer, kind, point, index, False, "Newton's method left the bracket")
             return bogdanov_takens_special(tracer, result, point.tangent, index)
@@ -169,12 +171,12 @@ class HopfCurveMonitor(Monitor):
         linear = before.local.linear
         for _ in range(2):
             _, v, w, _ = null_pair(linear, w / np.linalg.norm(w), v / np.linalg.norm(v))
-        result = solve_bogdanov_takens(tracer, z, v, w)
-        if isinstance(result, str):
-            point = special_at(tracer, "bogdanov-takens", before, index, False, result)
-        else:
+        try:
+            result = solve_bogdanov_takens(tracer, z, v, w)
             point = bogdanov_takens_special(tracer, result, before.tangent[: n + 2], index)
             point.z, point.tangent = np.append(point.z, 0.0), np.append(point.tangent, 0.0)
+        except NotConverged as error:
+            point = special_at(tracer, "bogdanov-takens", before, index, False, str(error))
         # Behind the point the equations only mirror omega; that part is not the curve's.
         point.values["beyond"] = 1.0
         return point

@@ -14,7 +14,7 @@ import numpy as np
 
 from continuation.branch import CurvePoint, SpecialPoint
 from continuation.conditions import FoldCondition, fold_coefficient, null_pair
-from continuation.options import DerivativeMissing, SingularSystem
+from continuation.options import DerivativeMissing, NotConverged, SingularSystem
 from continuation.problem import Problem, correct
 from continuation.tracer import Monitor
 
@@ -60,10 +60,10 @@ def solve_augmented(tracer, condition, z, frame, names=None, system=None, mu=Non
     names, system, mu : optional
         In place of the tracer's own.
 
-    Returns
-    -------
-    Correction or str
-        The solution, or a sentence that says why there is none.
+    Raises
+    ------
+    NotConverged
+        There is no solution near the guess.
     """
     problem, options = tracer.problem, tracer.options
     augmented = Problem(
@@ -75,7 +75,9 @@ def solve_augmented(tracer, condition, z, frame, names=None, system=None, mu=Non
         options.units(names or problem.names),
     )
     result = correct(augmented, z, frame, options.newton, None, options.location_tolerance)
-    return result if result.converged else f"Newton's method on the augmented system: {result.reason}"
+    if not result.converged:
+        raise NotConverged(f"Newton's method on the augmented system: {result.reason}", result.reason.kind, result)
+    return result
 
 
 def locate_zero(tracer, before, after, indicator, attempt):
@@ -88,18 +90,18 @@ def locate_zero(tracer, before, after, indicator, attempt):
     indicator : callable
         Of a point; its zero is the point sought.
     attempt : callable
-        ``attempt(guess, before, after)`` returns ``(z, result)`` or a sentence that says why
-        it failed.  ``z`` is checked to lie in the bracket.
+        ``attempt(guess, before, after)`` returns a `Correction`, whose ``z`` begins with the unknowns of the curve and
+        is checked to lie in the bracket, or raises `NotConverged`.
 
     Returns
     -------
     (result, guess, reason)
         ``result`` is None if nothing was located; ``guess`` is then the best bracket point.
     """
+    if not tracer.options.locate:
+        return None, after, "location was not asked for"
     f0, f1 = indicator(before), indicator(after)
-    reason = "no attempt was made"
     first = (before, after)
-    guess = None
     for _ in range(HALVINGS):
         share = f0 / (f0 - f1) if f0 != f1 else 0.5
         # Close to an end the other half of the bracket would never shrink.
@@ -107,18 +109,15 @@ def locate_zero(tracer, before, after, indicator, attempt):
         if guess is None:
             return None, before if abs(f0) < abs(f1) else after, "the curve was lost in the bracket"
         try:
-            outcome = attempt(guess, before, after)
-        except DerivativeMissing as error:
-            return None, guess, str(error)
-        except SingularSystem as error:
-            outcome = str(error)
-        if not isinstance(outcome, str):
-            z, result = outcome
-            s, away = tracer.fraction(*first, z)
+            result = attempt(guess, before, after)
+            s, away = tracer.fraction(*first, result.z[: guess.z.size])
             if -SLACK <= s <= 1 + SLACK and away <= 1.0:
                 return result, guess, ""
-            outcome = "Newton's method left the bracket"
-        reason = outcome
+            reason = "Newton's method left the bracket"
+        except DerivativeMissing as error:
+            return None, guess, str(error)
+        except (NotConverged, SingularSystem) as error:
+            reason = str(error)
         middle = tracer.at(before, after, 0.5)
         f = np.nan if middle is None else indicator(middle)
         if not np.isfinite(f):
@@ -144,14 +143,9 @@ class FoldMonitor(Monitor):
             first = self.between(tracer, before, turn, index, found)
             return first + self.between(tracer, turn, after, index, found)
         problem = tracer.problem
-        if not tracer.options.locate:
-            return [special_at(tracer, "fold", after, index, False, "location was not asked for")]
-
-        def attempt(guess, *_):
-            result = solve_fold(tracer, guess)
-            return result if isinstance(result, str) else (result.z, result)
-
-        result, guess, reason = locate_zero(tracer, before, after, lambda point: point.tangent[problem.n], attempt)
+        result, guess, reason = locate_zero(
+            tracer, before, after, lambda point: point.tangent[problem.n], lambda guess, *_: solve_fold(tracer, guess)
+        )
         if result is None:
             return [special_at(tracer, "fold", guess, index, False, reason)]
         local = result.local

@@ -13,7 +13,7 @@ from continuation.branch_points import BranchPointMonitor
 from continuation.conditions import HopfCondition, null_pair
 from continuation.event_location import SLACK, locate_zero, solve_augmented, special_at
 from continuation.normal_form import hopf_normal_form
-from continuation.options import ContinuationError, DerivativeMissing
+from continuation.options import ContinuationError, DerivativeMissing, NotConverged
 from continuation.spectra import count_unstable, match_modes, mode_distance
 from continuation.tracer import SUBDIVISIONS, Monitor
 
@@ -35,8 +35,8 @@ def solve_hopf(tracer, guess, omega, vector):
     p, q = hopf_borders(guess.local.linear, omega, vector)
     frame = tracer.problem.frame(guess.tangent[:, None])
     result = solve_augmented(tracer, HopfCondition(p, q), np.append(guess.z, omega), frame)
-    if not isinstance(result, str) and not result.z[-1] > 0:
-        return "Newton's method went to a frequency that is not positive"
+    if not result.z[-1] > 0:
+        raise NotConverged("Newton's method went to a frequency that is not positive")
     return result
 
 
@@ -213,8 +213,7 @@ class SpectrumMonitor(Monitor):
 
         def attempt(guess, *_):
             vector = np.append(mode_at(guess)[1][:, 0].real, 0.0)
-            result = search.solve(tracer, guess, (vector, vector))
-            return result if isinstance(result, str) else (result.z[:-1], result)
+            return search.solve(tracer, guess, (vector, vector))
 
         result, guess, reason = locate_zero(tracer, before, after, lambda point: mode_at(point)[0][0].real, attempt)
         if result is None:
@@ -264,20 +263,18 @@ class SpectrumMonitor(Monitor):
             omega = (1 - share) * x[0][0].imag + share * y[0][0].imag
             vector = (x if share < 0.5 else y)[1][:, 0]
             result = solve_hopf(tracer, guess, omega, vector)
-            if isinstance(result, str):
-                return result
             found_omega = float(result.z[-1])
             room = max(abs(x[0][0].imag - y[0][0].imag), 0.05 * abs(omega))
             if abs(found_omega - omega) > room:
-                return "Newton's method went to another frequency"
+                raise NotConverged("Newton's method went to another frequency")
             for other in special:
                 if (
                     other.kind == "hopf"
                     and other.located
                     and np.allclose(np.append(other.z, other.values["omega"]), result.z, rtol=1e-9, atol=1e-12)
                 ):
-                    return "Newton's method found the same point again"
-            return result.z[:-1], result
+                    raise NotConverged("Newton's method found the same point again")
+            return result
 
         result, guess, reason = locate_zero(tracer, before, after, lambda point: mode_at(point)[0][0].real, attempt)
         if result is None:

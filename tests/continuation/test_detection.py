@@ -1,5 +1,7 @@
 """Detection that does not miss, and location of the point that was detected."""
 
+from types import SimpleNamespace
+
 import jax.numpy as jnp
 import numpy as np
 import pytest
@@ -84,12 +86,12 @@ def test_a_located_point_outside_of_its_bracket_is_refused():
     def attempt(guess, low, high):
         calls.append(guess.z[0])
         x = -fold if len(calls) < 3 else fold  # the other fold, at first
-        return np.array([x, x**3 - x]), x
+        return SimpleNamespace(z=np.array([x, x**3 - x]))
 
     result, _, reason = locate_zero(tracer, *here, lambda h: 3 * h.z[0] ** 2 - 1, attempt)
-    assert result == fold and len(calls) == 3 and reason == ""
+    assert result.z[0] == fold and len(calls) == 3 and reason == ""
     never, guess, reason = locate_zero(
-        tracer, *here, lambda h: 3 * h.z[0] ** 2 - 1, lambda *_: (np.array([-fold, 0.0]), 0.0)
+        tracer, *here, lambda h: 3 * h.z[0] ** 2 - 1, lambda *_: SimpleNamespace(z=np.array([-fold, 0.0]))
     )
     assert never is None and "left the bracket" in reason
     assert abs(guess.z[0] - fold) < 1e-3  # the best bracket is kept
