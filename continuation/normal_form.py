@@ -238,34 +238,34 @@ def hopf_normal_form_of(
     s = 1j * omega
     q, p = _eigenvectors(forms, s, np.asarray(q, complex))
 
-    def second(a, sa, b, sb):
-        return -forms.second(Motion(sa, a), Motion(sb, b))
-
-    def third(a, sa, b, sb, c, sc):
-        return -forms.third(Motion(sa, a), Motion(sb, b), Motion(sc, c))
-
-    def solve(shift, rhs):
-        return -forms.pencil(shift).solve(rhs)
-
-    c1, h20, h11, cancellation = cubic_coefficient(second, third, solve, q, p, s)
+    wave, back = Motion(s, q), Motion(-s, q.conj())
+    double = Motion(2 * s, -forms.pencil(2 * s).solve(forms.second(wave, wave)))
+    shift = Motion(0.0, -forms.pencil(0.0).solve(forms.second(wave, back).real))
+    terms = (
+        forms.second(wave, shift._replace(vector=shift.vector.astype(complex))),
+        0.5 * forms.second(back, double),
+        0.5 * forms.third(wave, wave, back),
+    )
+    parts = [-complex(np.vdot(p, term)) for term in terms]
+    c1, size = sum(parts), sum(map(abs, parts))
     crossing = None
     if parameter is not None:
         du = -forms.pencil(0.0).solve(forms.parameter_slope(parameter))
-        change = forms.mixed(Motion(s, q), parameter)
+        change = forms.mixed(wave, parameter)
         if np.any(du):
-            change = change + forms.second(Motion(s, q), Motion(0.0, du))
+            change = change + forms.second(wave, Motion(0.0, du))
         crossing = -complex(np.vdot(p, change))
     return HopfNormalForm(
         float(omega),
-        forms.state(Motion(s, q)),
+        forms.state(wave),
         p,
         c1,
         c1.real / omega,
-        forms.state(Motion(2 * s, h20)),
-        forms.state(Motion(0.0, h11)),
+        forms.state(double),
+        forms.state(shift),
         np.array(forms.rest),
         crossing,
-        cancellation,
+        abs(c1.real) / size if size > 0 else 0.0,
     )
 
 
@@ -293,38 +293,3 @@ def _eigenvectors(forms: SystemForms, s: complex, q: np.ndarray):
     if abs(overlap) <= 1e-10 * np.linalg.norm(p) * max(np.linalg.norm(slope), 1e-300):
         raise NotABifurcation("The critical eigenvalue is not simple: p* T' q vanishes.")
     return q, p / np.conj(overlap)
-
-
-def cubic_coefficient(second, third, solve, q, p, s):
-    """Cubic coefficient at a Hopf point from what a system makes of motions ``a exp(sa t)``.
-
-    Parameters
-    ----------
-    second, third : callable
-        Forms ``second(a, sa, b, sb)`` and ``third(a, sa, b, sb, c, sc)`` of ``L(s) a + N = 0``.
-    solve : callable
-        ``solve(s, rhs)``, the solution with ``L(s)``; real for ``s = 0``.
-    q, p : ndarray, complex, shape (n,)
-        ``L(s) q = 0``, ``p* L(s) = 0``, ``p* L'(s) q = -1``.
-    s : complex
-        ``i omega``.
-
-    Returns
-    -------
-    c1 : complex
-    h20, h11 : ndarray, shape (n,)
-    cancellation : float
-        See `HopfNormalForm`.
-    """
-    conj = q.conj()
-    h20 = -solve(2 * s, second(q, s, q, s))
-    h11 = -solve(0.0, second(q, s, conj, -s).real)
-    terms = (
-        second(q, s, h11.astype(complex), 0.0),
-        0.5 * second(conj, -s, h20, 2 * s),
-        0.5 * third(q, s, q, s, conj, -s),
-    )
-    parts = [complex(np.vdot(p, term)) for term in terms]
-    c1 = sum(parts)
-    size = sum(map(abs, parts))
-    return c1, h20, h11, abs(c1.real) / size if size > 0 else 0.0
