@@ -60,36 +60,26 @@ class JaxSystem(System):
         for name, matrix in (("mass", None if callable(mass) else mass), ("sparsity", sparsity)):
             shape = (self.size, self.size) if matrix is None else np.shape(matrix)
             require(shape == (self.size, self.size), f"The {name} has shape {shape}; the size is {self.size}.")
-        self._callable_mass = mass if callable(mass) else None
         self._constant_mass = None if callable(mass) else mass
         self.constant_mass, self.identity_mass = not callable(mass), mass is None
-        self._colouring = None if sparsity is None else ColouredJacobian(sparsity)
-        self._mass_colouring = None
-        if self._callable_mass:
-            self._mass_colouring = self._colouring
+        whole = np.eye(self.size), np.transpose
+        coloured = None if sparsity is None else ColouredJacobian(sparsity)
+        seeds, self._assemble = whole if coloured is None else (coloured.seeds, coloured.assemble)
+        seeds = jnp.asarray(seeds)
 
         def f(u, mu):
             return _evaluate(residual, "residual", u, mu)
 
         self._residual = jax.jit(f)
         self._along = _directional_derivatives(f)
-        if self._colouring is None:
-            self._jacobian = jax.jit(jax.jacfwd(f))
-        else:
-            seeds = jnp.asarray(self._colouring.seeds)
-            self._jacobian = jax.jit(
-                lambda u, mu: jax.vmap(lambda s: jax.jvp(lambda x: f(x, mu), (u,), (s,))[1])(seeds)
-            )
-        if self._callable_mass:
-            # The direction multiplied by B rides along as part of the frozen arguments.
+        self._jacobian = jax.jit(lambda u, mu: jax.vmap(lambda s: jax.jvp(lambda x: f(x, mu), (u,), (s,))[1])(seeds))
+        if callable(mass):
+            # The direction multiplied by B rides along, frozen.
             def b(u, mu, c):
                 return _evaluate(mass, "mass", u, mu, c)
 
-            self._mass_d1 = jax.jit(lambda u, mu, c, a: _jvp(lambda x: b(x, mu, c), u, a))
-            self._mass_d2 = jax.jit(lambda u, mu, c, a, d: _jvp(lambda x: _jvp(lambda y: b(y, mu, c), x, a), u, d))
-            self._mass_mu = jax.jit(lambda u, mu, dmu, c: jax.jvp(lambda m: b(u, m, c), (mu,), (dmu,))[1])
-            eye = jnp.eye(self.size) if self._mass_colouring is None else jnp.asarray(self._mass_colouring.seeds)
-            self._mass_matrix = jax.jit(lambda u, mu: jax.vmap(lambda s: b(u, mu, s))(eye))
+            self._mass_along = _directional_derivatives(b)
+            self._mass_matrix = jax.jit(lambda u, mu: jax.vmap(lambda s: b(u, mu, s))(seeds))
 
     # -- residual and first derivatives
 
@@ -98,18 +88,8 @@ class JaxSystem(System):
 
     def linear(self, u, mu):
         u, mu = np.asarray(u, float), _floats(mu)
-        jacobian = np.asarray(self._jacobian(u, mu))
-        if self._colouring is not None:
-            jacobian = self._colouring.assemble(jacobian)
-        return MatrixLinearisation(jacobian, self._mass(u, mu))
-
-    def _mass(self, u, mu):
-        if self._callable_mass is None:
-            return self._constant_mass
-        products = np.asarray(self._mass_matrix(u, mu))
-        if self._mass_colouring is None:
-            return products.T
-        return self._mass_colouring.assemble(products)
+        mass = self._constant_mass if self.constant_mass else self._assemble(np.asarray(self._mass_matrix(u, mu)))
+        return MatrixLinearisation(self._assemble(np.asarray(self._jacobian(u, mu))), mass)
 
     def d_parameter(self, u, mu, name):
         return self._directional(u, mu, [(None, name)])
@@ -128,7 +108,10 @@ class JaxSystem(System):
     def d_parameters2(self, u, mu, first, second):
         return self._directional(u, mu, [(None, first), (None, second)])
 
-    def _directional(self, u, mu, directions):
+    def _directional(self, u, mu, directions, *frozen):
+        """Derivative along directions, each of the state or a parameter: of B times a frozen vector where one is given,
+        else of F.
+        """
         mu = _floats(mu)
         tangents = []
         for vector, name in directions:
@@ -136,25 +119,25 @@ class JaxSystem(System):
                 raise NotAParameter.named(name, mu)
             step = np.zeros(self.size) if vector is None else np.asarray(vector, float)
             tangents.append((step, {key: float(key == name) for key in mu}))
-        return np.asarray(self._along[len(tangents)](np.asarray(u, float), mu, tangents))
+        along = self._mass_along if frozen else self._along
+        return np.asarray(along(np.asarray(u, float), mu, tangents, *frozen))
 
     # -- mass
 
     def mass_d(self, u, mu, c, a):
-        if self._callable_mass is None:
+        if self.constant_mass:
             return np.zeros(self.size)
-        return np.asarray(self._mass_d1(u, _floats(mu), c, a))
+        return self._directional(u, mu, [(a, None)], c)
 
     def mass_d2(self, u, mu, c, a, b):
-        if self._callable_mass is None:
+        if self.constant_mass:
             return np.zeros(self.size)
-        return np.asarray(self._mass_d2(u, _floats(mu), c, a, b))
+        return self._directional(u, mu, [(a, None), (b, None)], c)
 
     def mass_parameter(self, u, mu, name, c):
-        if self._callable_mass is None:
+        if self.constant_mass:
             return np.zeros(self.size)
-        mu = _floats(mu)
-        return np.asarray(self._mass_mu(u, mu, {k: float(k == name) for k in mu}, c))
+        return self._directional(u, mu, [(None, name)], c)
 
 
 def _evaluate(function: Callable, name: str, u, mu, *more):
@@ -181,24 +164,21 @@ def _floats(mu) -> dict[str, float]:
     return {name: float(value) for name, value in mu.items()}
 
 
-def _jvp(function, x, direction):
-    return jax.jvp(function, (x,), (direction,))[1]
-
-
-def _directional_derivatives(f) -> dict[int, Callable]:
-    """Jitted first to third derivatives of ``f(u, mu)`` along joint directions."""
+def _directional_derivatives(f) -> Callable:
+    """Jitted derivatives of ``f(u, mu, *frozen)`` along as many joint directions as are given."""
 
     def nest(g, direction):
         return lambda u, mu: jax.jvp(g, (u, mu), direction)[1]
 
-    def derivative(u, mu, directions):
-        g = f
+    def derivative(u, mu, directions, *frozen):
+        def g(u, mu):
+            return f(u, mu, *frozen)
+
         for direction in directions:
             g = nest(g, direction)
         return g(u, mu)
 
-    jitted = jax.jit(derivative)
-    return {1: jitted, 2: jitted, 3: jitted}
+    return jax.jit(derivative)
 
 
 def colour_columns(pattern: sp.spmatrix) -> np.ndarray:
@@ -247,5 +227,5 @@ class ColouredJacobian:
 
     def assemble(self, products: np.ndarray) -> sp.csc_matrix:
         """Matrix whose products with the seeds are ``products``, shape (colours, m)."""
-        data = np.asarray(products)[self._colour_of_entry, self._rows]
+        data = products[self._colour_of_entry, self._rows]
         return sp.csc_matrix((data, (self._rows, self._columns)), shape=self.shape)
