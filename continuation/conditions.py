@@ -32,6 +32,14 @@ def null_pair(solver, p, q):
     return right[-1], right[:-1], np.conj(left[:-1]), border
 
 
+def null_vectors(solver, p, q, passes=2):
+    """Left and right null vectors from vectors near them; the right one stands in for a left one that vanishes."""
+    p = q if np.linalg.norm(p) <= 1e-12 * np.linalg.norm(q) else p
+    for _ in range(passes):
+        _, q, p, _ = null_pair(solver, p / np.linalg.norm(p), q / np.linalg.norm(q))
+    return p, q
+
+
 def generic_borders(size):
     """Two fixed vectors without any symmetry a model might have."""
     i = np.arange(1.0, size + 1.0)

@@ -18,6 +18,7 @@ from continuation.conditions import (
     fold_coefficient,
     generic_borders,
     null_pair,
+    null_vectors,
 )
 from continuation.event_location import solve_augmented, special_at
 from continuation.normal_form import hopf_normal_form
@@ -166,11 +167,8 @@ class HopfCurveMonitor(Monitor):
         n = tracer.problem.n
         share = before.tests["omega"] ** 2 / (before.tests["omega"] ** 2 + after.tests["omega"] ** 2)
         z = before.z + share * (after.z - before.z)
-        v = before.local.condition.v.real
-        w = before.local.condition.w.real
-        linear = before.local.linear
-        for _ in range(2):
-            _, v, w, _ = null_pair(linear, w / np.linalg.norm(w), v / np.linalg.norm(v))
+        condition = before.local.condition
+        w, v = null_vectors(before.local.linear, condition.w.real, condition.v.real)
         try:
             result = solve_bogdanov_takens(tracer, z, v, w)
             point = bogdanov_takens_special(tracer, result, before.tangent[: n + 2], index)

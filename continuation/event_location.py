@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from continuation.branch import CurvePoint, SpecialPoint
-from continuation.conditions import FoldCondition, fold_coefficient, null_pair
+from continuation.conditions import FoldCondition, fold_coefficient, null_vectors
 from continuation.options import DerivativeMissing, NotConverged, SingularSystem
 from continuation.problem import Problem, correct
 from continuation.tracer import Monitor
@@ -185,10 +185,8 @@ class FoldMonitor(Monitor):
 def solve_fold(tracer, guess):
     """Newton on ``F = 0, g = 0`` from a point of the branch; see `solve_augmented`."""
     problem = tracer.problem
-    q, p = problem.u(guess.tangent), guess.local.columns[0]
-    for _ in range(2):
-        _, q, p, _ = null_pair(guess.local.linear, p / np.linalg.norm(p), q / np.linalg.norm(q))
-    return solve_augmented(tracer, FoldCondition(p, q), guess.z, problem.frame(guess.tangent[:, None]))
+    borders = null_vectors(guess.local.linear, guess.local.columns[0], problem.u(guess.tangent))
+    return solve_augmented(tracer, FoldCondition(*borders), guess.z, problem.frame(guess.tangent[:, None]))
 
 
 @dataclass(frozen=True)

@@ -20,7 +20,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from continuation.conditions import null_pair
+from continuation.conditions import null_vectors
 from continuation.options import NotABifurcation, SingularSystem
 from continuation.system import Derivatives
 
@@ -277,14 +277,9 @@ def require_frequency(omega):
 
 def _eigenvectors(forms: SystemForms, s: complex, q: np.ndarray):
     """Right vector of unit state and left vector with ``p* T'(s) q = 1``."""
-    pencil = forms.pencil(s)
-    q = q / np.linalg.norm(q)
-    p = forms.slope(Motion(s, q))
-    if np.linalg.norm(p) <= 1e-12:
-        p = q
+    pencil, q = forms.pencil(s), q / np.linalg.norm(q)
     try:
-        for _ in range(3):
-            _, q, p, _ = null_pair(pencil, p / np.linalg.norm(p), q / np.linalg.norm(q))
+        p, q = null_vectors(pencil, forms.slope(Motion(s, q)), q, passes=3)
     except SingularSystem as error:
         raise NotABifurcation(f"The critical eigenvalue is not simple: {error}") from error
     q = q / np.linalg.norm(forms.state(Motion(s, q)))

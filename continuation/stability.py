@@ -10,7 +10,7 @@ import numpy as np
 
 from continuation.branch import CurvePoint
 from continuation.branch_points import BranchPointMonitor
-from continuation.conditions import HopfCondition, null_pair
+from continuation.conditions import HopfCondition, null_vectors
 from continuation.event_location import SLACK, locate_zero, solve_augmented, special_at
 from continuation.normal_form import hopf_normal_form
 from continuation.options import ContinuationError, DerivativeMissing, NotConverged
@@ -18,23 +18,12 @@ from continuation.spectra import count_unstable, match_modes, mode_distance
 from continuation.tracer import SUBDIVISIONS, Monitor
 
 
-def hopf_borders(linear, omega, vector):
-    """Left and right vectors near the null vectors of ``A - i omega B``."""
-    shifted = linear.shifted(1j * omega)
-    q = np.asarray(vector, complex)
-    p = linear.mass_matvec(q)
-    if np.linalg.norm(p) <= 1e-12 * np.linalg.norm(q):
-        p = q
-    for _ in range(2):
-        _, q, p, _ = null_pair(shifted, p / np.linalg.norm(p), q / np.linalg.norm(q))
-    return p, q
-
-
 def solve_hopf(tracer, guess, omega, vector):
     """Newton on ``F = 0, g = 0`` in state, parameter and frequency; see `solve_augmented`."""
-    p, q = hopf_borders(guess.local.linear, omega, vector)
+    linear, q = guess.local.linear, np.asarray(vector, complex)
+    borders = null_vectors(linear.shifted(1j * omega), linear.mass_matvec(q), q)
     frame = tracer.problem.frame(guess.tangent[:, None])
-    result = solve_augmented(tracer, HopfCondition(p, q), np.append(guess.z, omega), frame)
+    result = solve_augmented(tracer, HopfCondition(*borders), np.append(guess.z, omega), frame)
     if not result.z[-1] > 0:
         raise NotConverged("Newton's method went to a frequency that is not positive")
     return result
