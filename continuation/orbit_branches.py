@@ -50,7 +50,7 @@ from continuation.options import (
     require,
 )
 from continuation.periodic import PeriodicMotion
-from continuation.tracer import as_observers, run_observed
+from continuation.tracer import as_observers, notify, run_observed
 
 
 class OrbitSolver(CycleSolver):
@@ -500,13 +500,10 @@ class _Follower:
         if isinstance(item, CyclePoint):
             branch.points.append(self._point(item))
             self._fill()
-            for observer in self.observers:
-                observer.accepted(branch)
-            return
-        special = self._special(item)
-        branch.special.append(special)
-        for observer in self.observers:
-            observer.found(branch, special)
+            notify(self.observers, "accepted", branch)
+        else:
+            branch.special.append(self._special(item))
+            notify(self.observers, "found", branch, branch.special[-1])
 
     def _z(self, cycle: Cycle) -> np.ndarray:
         return np.concatenate([cycle.motion.coefficients.ravel(), [cycle.motion.period, cycle.mu[self.parameter]]])

@@ -10,7 +10,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from continuation.options import DerivativeMissing
+from continuation.options import DerivativeMissing, NotAParameter
 from continuation.spectra import Spectrum, compute_spectrum
 
 Parameters = Mapping[str, float]
@@ -50,8 +50,7 @@ class System:
 
     def _sides(self, mu: Parameters, name: str):
         if name not in mu:
-            known = ", ".join(sorted(mu))
-            raise KeyError(f"The parameter {name!r} is not one of: {known}.")
+            raise NotAParameter.named(name, mu)
         h = self.parameter_step * max(1e-3, abs(mu[name]))
         up, down = mu[name] + h, mu[name] - h
         return {**mu, name: up}, {**mu, name: down}, up - down

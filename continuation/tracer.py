@@ -112,14 +112,19 @@ def _observer_of(function: Callable) -> Observer:
     return observer
 
 
+def notify(observers: list[Observer], hook: str, *arguments) -> None:
+    """Call one hook of all observers."""
+    for observer in observers:
+        getattr(observer, hook)(*arguments)
+
+
 def run_observed(branch, observers: list[Observer], steps: Callable[[], Said]):
     """Run the steps of a branch between its first and last call of the observers; the branch itself.
 
     The steps return why they ended.  An interruption ends the branch; an error goes on to the caller, with the branch
     so far as its attribute ``branch``.
     """
-    for observer in observers:
-        observer.started(branch)
+    notify(observers, "started", branch)
     try:
         branch.reason = steps()
     except KeyboardInterrupt:
@@ -129,8 +134,7 @@ def run_observed(branch, observers: list[Observer], steps: Callable[[], Said]):
         error.branch = branch
         raise
     finally:
-        for observer in observers:
-            observer.ended(branch)
+        notify(observers, "ended", branch)
     return branch
 
 
@@ -301,7 +305,7 @@ class Tracer:
             if last:
                 branch.special += found
                 for special in found:
-                    self._notify("found", branch, special)
+                    notify(self.observers, "found", branch, special)
                 return Reason.STOPPED(kind=last[0].kind)
             stopping = [s for s in found if s.kind in options.stop_at or s.values.get("stop")]
             if stopping:
@@ -318,9 +322,9 @@ class Tracer:
             closed = self._closed(branch, first, before, after)
             before = after
             self._remember(branch, step)
-            self._notify("accepted", branch)
+            notify(self.observers, "accepted", branch)
             for special in found:
-                self._notify("found", branch, special)
+                notify(self.observers, "found", branch, special)
             if ending:
                 return ending
             if closed:
@@ -383,7 +387,7 @@ class Tracer:
                         found = [] if trouble else self._between(branch, before, after)
             if trouble is None:
                 break
-            self._notify("refused", branch, trouble, used)
+            notify(self.observers, "refused", branch, trouble, used)
             if used <= options.min_step * (1 + 1e-9):
                 return Reason.SMALLEST_STEP(why=trouble)
             step = max(used * SHRINK, options.min_step)
@@ -499,7 +503,3 @@ class Tracer:
         s, away = self.fraction(before, after, first.z)
         same_way = self.problem.dot(first.tangent, after.tangent) > 0.9 * self.problem.norm(first.tangent)
         return 0.0 < s <= 1.0 and away < 0.1 and same_way
-
-    def _notify(self, hook, *arguments):
-        for observer in self.observers:
-            getattr(observer, hook)(*arguments)
