@@ -43,7 +43,7 @@ class StructureMatrices:
 
     def __init__(self, pencil: CoupledPencil):
         parts = _parts(pencil)
-        self._sources = None
+        self._sources: list[tuple] = []
         self.shape = pencil.M.shape
         pattern = sum(sp.csr_matrix((np.ones(p.nnz), p.indices, p.indptr), p.shape) for p in parts)
         pattern = (pattern + pattern.T + sp.identity(pencil.n, format="csr")).tocsr()
@@ -52,38 +52,24 @@ class StructureMatrices:
         self.indices = pattern.indices.astype(np.int32)
         self.load(pencil)
 
-    def fits(self, pencil: CoupledPencil) -> bool:
-        """True where a pencil has the very pattern of the one this was made for."""
+    def load(self, pencil: CoupledPencil) -> bool:
+        """Take the numbers of a pencil, whose parts may have fewer entries than the common pattern; False where one of
+        them lies beyond it.
+        """
         parts = _parts(pencil)
-        return (
-            self._sources is not None
-            and len(parts) == len(self._sources)
-            and all(_same_pattern(p, *old) for p, old in zip(parts, self._sources))
-        )
-
-    def covers(self, pencil: CoupledPencil) -> bool:
-        """True where all entries of a pencil lie on the common pattern, though its parts may have fewer."""
         if pencil.M.shape != self.shape:
             return False
-        keys = _keys(self.indptr, self.indices, self.shape[1])
-        for part in _parts(pencil):
-            wanted = _keys(part.indptr, part.indices, self.shape[1])
-            place = np.searchsorted(keys, wanted)
-            if not (place < keys.size).all() or not np.array_equal(keys[place], wanted):
+        if len(parts) != len(self._sources) or not all(map(_same_pattern, parts, self._sources)):
+            keys, wanted = _keys(self), [_keys(part) for part in parts]
+            places = [np.searchsorted(keys, own) for own in wanted]
+            if not all(np.array_equal(np.take(keys, at, mode="clip"), own) for at, own in zip(places, wanted)):
                 return False
-        return True
-
-    def load(self, pencil: CoupledPencil) -> None:
-        """Take the numbers of a pencil whose entries lie on the common pattern."""
-        parts = _parts(pencil)
+            self._places, self._sources = places, [(p.indptr, p.indices) for p in parts]
         self.relaxation = pencil.relaxation
-        if not self.fits(pencil):
-            keys = _keys(self.indptr, self.indices, self.shape[1])
-            self._places = [np.searchsorted(keys, _keys(p.indptr, p.indices, self.shape[1])) for p in parts]
-            self._sources = [(p.indptr, p.indices) for p in parts]
         self.data = np.zeros((len(parts), self.indices.size))
         for row, place, part in zip(self.data, self._places, parts):
             row[place] = part.data
+        return True
 
     def values(self, s: complex) -> np.ndarray:
         """Entries of s^2 M + s C + K + sum phi_g(s) K_g on the common pattern; real for a real s."""
@@ -324,15 +310,13 @@ def _parts(pencil):
     return (pencil.M, pencil.C, pencil.K, *pencil.relaxing)
 
 
-def _keys(indptr, indices, width):
-    rows = np.repeat(np.arange(indptr.size - 1, dtype=np.int64), np.diff(indptr))
-    return rows * width + indices
+def _keys(matrix):
+    rows = np.repeat(np.arange(matrix.shape[0], dtype=np.int64), np.diff(matrix.indptr))
+    return rows * matrix.shape[1] + matrix.indices
 
 
-def _same_pattern(matrix, indptr, indices):
-    if matrix.indptr is indptr and matrix.indices is indices:
-        return True
-    return np.array_equal(matrix.indptr, indptr) and np.array_equal(matrix.indices, indices)
+def _same_pattern(matrix, pattern):
+    return all(a is b or np.array_equal(a, b) for a, b in zip((matrix.indptr, matrix.indices), pattern))
 
 
 def _real_if_real(s):
@@ -365,9 +349,7 @@ class Workspace:
         """M, C, K and what relaxes of the pencil on the common pattern."""
         if self._loaded is pencil:
             return self._structure
-        if self._structure is not None and (self._structure.fits(pencil) or self._structure.covers(pencil)):
-            self._structure.load(pencil)
-        else:
+        if self._structure is None or not self._structure.load(pencil):
             self._structure = StructureMatrices(pencil)
             self._real = None
         self._loaded = pencil
