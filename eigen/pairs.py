@@ -106,27 +106,19 @@ class Residuals:
         self.pencil = pencil
 
     @cached_property
-    def _norms(self):
-        p = self.pencil
-        coupling = _norm(p.G) * _norm(p.J)
-        return {
-            "M": _norm(p.M),
-            "C": _norm(p.C),
-            "K": _norm(p.K),
-            "relaxing": [_norm(matrix) for matrix in p.relaxing],
-            "A": [coupling * np.linalg.norm(a) for a in (p.A0, p.A1, p.A2)],
-            "B": [_norm(p.G) * np.linalg.norm(a) for a in (p.B0, p.B1)],
-        }
+    def _norms(self) -> tuple[np.ndarray, ...]:
+        """Norms by powers of lambda of what acts on q and on U, in the structure and in each row of the fluid; rows may
+        carry different units.
+        """
+        p, g, j = self.pencil, _norm(self.pencil.G), _norm(self.pencil.J)
+        structure = [_norm(own) + g * j * np.linalg.norm(a) for own, a in ((p.K, p.A0), (p.C, p.A1), (p.M, p.A2))]
+        coupling = [g * np.linalg.norm(b) for b in (p.B0, p.B1)]
+        rows = [j * np.linalg.norm(r, axis=1) for r in (p.R0, p.R1, p.R2)]
+        return tuple(map(np.array, (structure, coupling, rows, [np.linalg.norm(s, axis=1) for s in (p.S0, p.S1)])))
 
     @cached_property
-    def _fluid_rows(self):
-        # per row: rows of the fluid may carry different units
-        p = self.pencil
-        J = _norm(p.J)
-        return (
-            [J * np.linalg.norm(a, axis=1) for a in (p.R0, p.R1, p.R2)],
-            [np.linalg.norm(a, axis=1) for a in (p.S0, p.S1)],
-        )
+    def _relaxing_norms(self) -> np.ndarray:
+        return np.array([_norm(matrix) for matrix in self.pencil.relaxing])
 
     def measure(self, eigenvalues, q, u) -> tuple[np.ndarray, np.ndarray]:
         """Residual and backward error of pairs, as `Spectrum` defines them.
@@ -146,22 +138,16 @@ class Residuals:
         structure, fluid = self.pencil.terms(s, q, u)
         left = np.linalg.norm(sum(structure), axis=0)
         terms = sum(np.linalg.norm(t, axis=0) for t in structure)
-        a = np.abs(s)
+        powers = np.abs(s) ** np.arange(3)[:, None]
         size_q, size_u = np.linalg.norm(q, axis=0), np.linalg.norm(u, axis=0)
-        n = self._norms
-        stiffness = n["K"]
+        on_q, on_u, rows_on_q, rows_on_u = self._norms
+        stiffness = on_q @ powers
         if self.pencil.relaxation is not None:
-            stiffness = stiffness + np.array(n["relaxing"]) @ np.abs(self.pencil.relaxation.factors(s))
-        full = (a**2 * n["M"] + a * n["C"] + stiffness + sum(a**k * x for k, x in enumerate(n["A"]))) * size_q + sum(
-            a**k * x for k, x in enumerate(n["B"])
-        ) * size_u
+            stiffness = stiffness + self._relaxing_norms @ np.abs(self.pencil.relaxation.factors(s))
+        full = stiffness * size_q + on_u @ powers[:2] * size_u
         residual, backward = _ratio(left, terms), _ratio(left, full)
         if self.pencil.b:
-            R, S = self._fluid_rows
-            scale = (
-                sum(np.outer(r, a**k) for k, r in enumerate(R)) * size_q
-                + sum(np.outer(r, a**k) for k, r in enumerate(S)) * size_u
-            )
+            scale = rows_on_q.T @ powers * size_q + rows_on_u.T @ powers[:2] * size_u
             fluid_error = _ratio(np.abs(sum(fluid)), scale).max(axis=0)
             residual, backward = np.maximum(residual, fluid_error), np.maximum(backward, fluid_error)
         return residual, backward
@@ -292,6 +278,11 @@ class Found:
         """Oval in which all were found."""
         return SearchedRegion(tuple(self.ovals.values()), self.everything, self.lowest, self.slope)
 
+    @property
+    def parts(self) -> tuple[str, ...]:
+        """Names of the arrays with an entry or a column for each pair."""
+        return ("values", "q", "u", "residual", "backward") + ("left_q", "left_u") * (self.left_q is not None)
+
     def note(self, sentence: str) -> None:
         """Add a sentence once."""
         if sentence not in self.notes:
@@ -406,9 +397,7 @@ def refine(pencil, batch, aim, band, tolerance, found) -> np.ndarray:
         batch.q[:, [i]], batch.u[:, [i]] = normalised(q[:, None], u[:, None])
         found.refined += 1
     dropped = batch.values[~good]
-    names = ["values", "q", "u", "residual", "backward"]
-    names += ["left_q", "left_u"] if batch.left_q is not None else []
-    for name in names:
+    for name in batch.parts:
         setattr(batch, name, getattr(batch, name)[..., good])
     return dropped
 
@@ -422,14 +411,12 @@ def merge(found: Found, batch: Found) -> None:
         if distance.size and distance.min() <= SAME * abs(batch.values[i]):
             partner[i] = int(np.argmin(distance))
             taken[partner[i]] = True
-    names = ["values", "q", "u", "residual", "backward"]
-    names += ["left_q", "left_u"] if found.left_q is not None else []
     for i in np.flatnonzero(partner >= 0):
         if batch.residual[i] < found.residual[partner[i]]:
-            for name in names:
+            for name in found.parts:
                 getattr(found, name)[..., partner[i]] = getattr(batch, name)[..., i]
     new = partner < 0
-    for name in names:
+    for name in found.parts:
         old = getattr(found, name)
         setattr(found, name, np.concatenate([old, getattr(batch, name)[..., new]], axis=-1))
 
