@@ -10,7 +10,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from .certificate import OPTIONS as CERTIFICATES
-from .certificate import Certificate, certified_spectrum
+from .certificate import Certificate, CertifiedSpectrum, certified_spectrum
 from .count import Count
 from .factor import SingularShiftError, Workspace
 from .family import PencilFamily, ReducedFamily
@@ -270,9 +270,7 @@ class ColumnSolver:
         for mu in points:
             key = family.structure(mu)
             if key not in known:
-                known[key] = certified_spectrum(
-                    family.at(mu), OPTIONS.searched, family.search(mu), workspace=self.workspace
-                )
+                known[key] = self._certified(family, mu)
             listed, own = _modes_of(family, mu, known[key].spectrum).eigenvalues, known[key].certificate
             cells.append(Cell(listed[: OPTIONS.kept], replace(own, certain=own.certain and len(listed) > 0), DIRECT))
         return cells
@@ -290,9 +288,12 @@ class ColumnSolver:
                 cells[i] = found
         return cells
 
+    def _certified(self, family: PencilFamily, mu: Hashable) -> CertifiedSpectrum:
+        return certified_spectrum(family.at(mu), OPTIONS.searched, family.search(mu), workspace=self.workspace)
+
     def _anew(self, family: PencilFamily, mu: Hashable) -> Cell:
         """Cell of the full operator, counted on a basis of structural modes, made finer as far as it takes."""
-        found = certified_spectrum(family.at(mu), OPTIONS.searched, family.search(mu), workspace=self.workspace)
+        found = self._certified(family, mu)
         return Cell(found.spectrum.eigenvalues[: OPTIONS.kept], found.certificate, DIRECT)
 
     def counted_whole(self, family: PencilFamily, mu: Hashable, cell: Cell) -> Cell:

@@ -13,6 +13,7 @@ import scipy.linalg as la
 from .basis import orthonormal, outside
 from .count import Count, counted_line, unstable_count
 from .determinant import Structure
+from .factor import StructureMatrices
 from .operator import CoupledPencil, Relaxation, edge_of, real_apply
 from .pairs import all_eigenvalues
 from .spectrum import CLEAR, LOWEST, SLOPE, SearchOptions
@@ -247,17 +248,14 @@ class ReducedFamily(PencilFamily):
     def _condense(self, pencil: CoupledPencil) -> tuple:
         """Patterns of motion and of force, equally many, the structure between them, and what a count knows of it."""
         G, J, samples = self.forces, self.slope, []
-        M, C, K, *relaxing = (matrix.toarray() for matrix in (pencil.M, pencil.C, pencil.K, *pencil.relaxing))
+        matrices = StructureMatrices(pencil)
         for s in 1j * self.lowest_frequency * np.array(SAMPLED):
-            D = s * s * M + s * C + K
-            if relaxing:
-                D = D + np.tensordot(pencil.relaxation.factors(s), relaxing, 1)
-            H = J @ np.linalg.solve(D, G)
+            H = J @ np.linalg.solve(matrices.matrix(s).toarray(), G)
             samples += [part / np.abs(H).max() for part in (H.real, H.imag)]
         P, Q = _patterns(samples), _patterns([part.T for part in samples])
         rank = min(P.shape[1], Q.shape[1])
         P, Q = P[:, :rank], Q[:, :rank]
-        small = CoupledPencil(M, C, K, G @ Q, P.T @ J, relaxation=pencil.relaxation)
+        small = CoupledPencil(pencil.M, pencil.C, pencil.K, G @ Q, P.T @ J, relaxation=pencil.relaxation)
         structure = Structure(small, counted_line(pencil, self.lowest_frequency))
         return P, Q, small, structure
 
