@@ -9,30 +9,23 @@ from continuation import (
     ContinuationOptions,
     NotABifurcation,
     Reason,
-    continue_branch,
     continue_fold,
     continue_hopf,
     resume,
 )
 from continuation.jax_system import JaxSystem
+from tests.systems.following import follow, hopf_of
 from tests.systems.normal_forms import bautin, bogdanov_takens, cusp
 
 
 @pytest.fixture(scope="module")
 def cusp_fold():
-    branch = continue_branch(cusp(), [-1.5], {"a": -2.0, "b": 1.0}, "a", ContinuationOptions(limits={"a": (-2.0, 2.0)}))
-    return branch.of_kind("fold")[0]
+    return follow(cusp(), [-1.5], {"a": -2.0, "b": 1.0}, "a", (-2.0, 2.0), eigenvalues=0).of_kind("fold")[0]
 
 
 @pytest.fixture(scope="module")
 def takens():
-    return continue_branch(
-        bogdanov_takens(),
-        [-1.2, 0.0],
-        {"b1": -0.3, "b2": -1.0, "s": -1.0},
-        "b1",
-        ContinuationOptions(eigenvalues=2, limits={"b1": (-0.5, 2.0)}, max_step=0.1),
-    )
+    return follow(bogdanov_takens(), [-1.2, 0.0], {"b1": -0.3, "b2": -1.0, "s": -1.0}, "b1", (-0.5, 2.0), max_step=0.1)
 
 
 def test_fold_curve_through_a_cusp(cusp_fold):
@@ -74,12 +67,8 @@ def test_hopf_curve_ends_at_the_bogdanov_takens_point(takens):
 
 
 def test_generalised_hopf_point():
-    branch = continue_branch(
-        bautin(), [0, 0], {"mu": -0.5, "nu": -0.5}, "mu", ContinuationOptions(eigenvalues=2, limits={"mu": (-1, 1)})
-    )
-    curve = continue_hopf(
-        bautin(), branch.of_kind("hopf")[0], ("mu", "nu"), ContinuationOptions(limits={"nu": (-1, 1)})
-    )
+    hopf = hopf_of(bautin(), [0, 0], {"mu": -0.5, "nu": -0.5}, "mu", (-1, 1))
+    curve = continue_hopf(bautin(), hopf, ("mu", "nu"), ContinuationOptions(limits={"nu": (-1, 1)}))
     # c1 = nu per |z|^2, twice that with q* q = 1.
     assert np.allclose(curve.values("l1"), 2 * curve.values("nu"), rtol=0, atol=1e-10)
     (point,) = curve.of_kind("generalised hopf")
@@ -94,12 +83,8 @@ def test_zero_hopf_point_and_counts():
         return jnp.stack([mu["mu"] * x - y - x**3, x + mu["mu"] * y, mu["a"] * z - z**3])
 
     system = JaxSystem(residual, 3)
-    branch = continue_branch(
-        system, np.zeros(3), {"mu": -0.5, "a": -0.6}, "mu", ContinuationOptions(eigenvalues=3, limits={"mu": (-1, 1)})
-    )
-    curve = continue_hopf(
-        system, branch.of_kind("hopf")[0], ("mu", "a"), ContinuationOptions(limits={"a": (-1, 1)}, eigenvalues=3)
-    )
+    hopf = hopf_of(system, np.zeros(3), {"mu": -0.5, "a": -0.6}, "mu", (-1, 1))
+    curve = continue_hopf(system, hopf, ("mu", "a"), ContinuationOptions(limits={"a": (-1, 1)}, eigenvalues=3))
     (point,) = curve.of_kind("zero-hopf")
     assert abs(point.mu["a"]) < 1e-9
     assert np.array_equal(curve.unstable, (curve.values("a") > 0).astype(int))
@@ -113,10 +98,7 @@ def test_curve_with_a_turning_point_in_both_parameters():
         return jnp.stack([g * u[0] - 2 * u[1] - u[0] ** 3, 2 * u[0] + g * u[1]])
 
     system = JaxSystem(residual, 2)
-    branch = continue_branch(
-        system, np.zeros(2), {"mu": -2.0, "nu": 0.1}, "mu", ContinuationOptions(eigenvalues=2, limits={"mu": (-2, 2)})
-    )
-    points = branch.of_kind("hopf")
+    points = follow(system, np.zeros(2), {"mu": -2.0, "nu": 0.1}, "mu", (-2, 2)).of_kind("hopf")
     assert len(points) == 2
     curve = continue_hopf(system, points[0], ("mu", "nu"), ContinuationOptions(max_step=0.2))
     assert curve.reason.kind is Reason.CLOSED

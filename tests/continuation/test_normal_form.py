@@ -5,24 +5,21 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from continuation import ContinuationOptions, NotABifurcation, continue_branch, hopf_normal_form
+from continuation import NotABifurcation, hopf_normal_form
 from continuation.amplitude import amplitude_equation
 from continuation.first_order import FirstOrderSystem
 from continuation.jax_system import JaxSystem
 from continuation.normal_form import SystemForms
 from tests.systems.brusselator import brusselator
+from tests.systems.following import follow, normal_form_of
 from tests.systems.normal_forms import bautin, stuart_landau, warped_stuart_landau
 
 MU = {"mu": -0.5, "w": 2.0, "c": 0.7}
 
 
 def hopf_of(system, u, mu, parameter, low, high):
-    branch = continue_branch(
-        system, u, mu, parameter, ContinuationOptions(eigenvalues=3, limits={parameter: (low, high)})
-    )
-    (point,) = branch.of_kind("hopf")
-    form = hopf_normal_form(system, point.u, point.mu, point.values["omega"], point.vectors["right"], parameter)
-    return point, form
+    (point,) = follow(system, u, mu, parameter, (low, high)).of_kind("hopf")
+    return point, normal_form_of(system, point, parameter)
 
 
 @pytest.mark.parametrize("make", [stuart_landau, warped_stuart_landau])

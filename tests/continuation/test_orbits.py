@@ -14,7 +14,6 @@ from continuation import (
     NotConverged,
     OrbitOptions,
     Reason,
-    continue_branch,
     continue_orbits,
     find_orbit,
     hopf_normal_form,
@@ -28,6 +27,7 @@ from continuation.harmonics import Harmonics
 from continuation.normal_form import SystemForms
 from continuation.periodic import PeriodicMotion
 from tests.systems.brusselator import brusselator, brusselator_1d
+from tests.systems.following import follow, hopf_of, normal_form_of
 from tests.systems.literature import fitzhugh_nagumo
 from tests.systems.lorenz import lorenz
 from tests.systems.normal_forms import bautin, stuart_landau, warped_stuart_landau
@@ -93,9 +93,7 @@ def test_series_grow_for_relaxation_oscillations():
 
 def test_cycles_from_a_hopf_point_follow_the_square_root():
     system = stuart_landau()
-    hopf = continue_branch(
-        system, [0, 0], {**MU, "mu": -0.5}, "mu", ContinuationOptions(eigenvalues=2, limits={"mu": (-1, 1)})
-    ).of_kind("hopf")[0]
+    hopf = hopf_of(system, [0, 0], {**MU, "mu": -0.5}, "mu", (-1, 1))
     branch = orbits_from_hopf(system, hopf, "mu", ContinuationOptions(limits={"mu": (0, 0.5)}))
     assert branch.reason.kind is Reason.LIMIT
     assert np.allclose(branch.values("period"), 2 * np.pi / (2 - 0.7 * branch.values()), rtol=1e-8)
@@ -124,11 +122,10 @@ def scaled_brusselator(unit):
 )
 def test_first_orbits_beside_hopf_points(system, start, mu, parameter, limits, criticality):
     """Found without any number given, on the side and with the amplitude that the normal form says."""
-    eigenvalues = ContinuationOptions(eigenvalues=system.size, limits={parameter: limits})
-    hopf = continue_branch(system, start, mu, parameter, eigenvalues).of_kind("hopf")[0]
+    hopf = hopf_of(system, start, mu, parameter, limits)
     assert hopf.values["criticality"] == criticality
     branch = orbits_from_hopf(system, hopf, parameter, ContinuationOptions(limits={parameter: limits}, max_points=1))
-    form = hopf_normal_form(system, hopf.u, hopf.mu, hopf.values["omega"], hopf.vectors["right"], parameter)
+    form = normal_form_of(system, hopf, parameter)
     change = branch.values()[0] - hopf.mu[parameter]
     amplitude = orbit_at(system, branch, 0).amplitude()
     assert amplitude.max() > 0
@@ -156,9 +153,7 @@ def test_the_amplitude_equation_begins_with_the_normal_form():
 def test_steps_of_any_unit_pass_a_fold_of_cycles_once(scale):
     """Cycles mu = r^4 - nu r^2 of the Bautin system in order, by steps of a fifth of the range and others."""
     system, given = bautin(), {} if scale is None else {"mu": scale}
-    hopf = continue_branch(
-        system, [0, 0], {"mu": -0.5, "nu": 1.0}, "mu", ContinuationOptions(eigenvalues=2, limits={"mu": (-1, 1)})
-    ).of_kind("hopf")[0]
+    hopf = hopf_of(system, [0, 0], {"mu": -0.5, "nu": 1.0}, "mu", (-1, 1))
     branch = orbits_from_hopf(system, hopf, "mu", ContinuationOptions(limits={"mu": (-1, 0.3)}, parameter_scales=given))
     assert branch.values()[-1] == 0.3
     assert [(s.kind, s.located) for s in branch.special] == [("fold of cycles", True)]
@@ -172,11 +167,8 @@ def test_steps_of_any_unit_pass_a_fold_of_cycles_once(scale):
 def test_orbits_towards_a_homoclinic_one_have_no_false_bifurcations():
     """The branch of Lorenz ends on the homoclinic orbit at r = 13.926 (Sparrow 1982)."""
     system, mu = lorenz(), {"sigma": 10.0, "b": 8 / 3, "r": 10.0}
-    limits = {"r": (2.0, 30.0)}
-    hopf = continue_branch(system, [4.9, 4.9, 9.0], mu, "r", ContinuationOptions(eigenvalues=3, limits=limits))
-    branch = orbits_from_hopf(
-        system, hopf.of_kind("hopf")[0], "r", ContinuationOptions(limits=limits), OrbitOptions(max_harmonics=60)
-    )
+    hopf, options = hopf_of(system, [4.9, 4.9, 9.0], mu, "r", (2.0, 30.0)), ContinuationOptions(limits={"r": (2, 30)})
+    branch = orbits_from_hopf(system, hopf, "r", options, OrbitOptions(max_harmonics=60))
     assert not branch.special and set(branch.unstable) <= {1, -1}
     assert abs(branch.values()[-1] - 13.926) < 1e-2 and "harmonics are too few" in branch.reason
 
@@ -184,10 +176,7 @@ def test_orbits_towards_a_homoclinic_one_have_no_false_bifurcations():
 def test_fold_of_cycles_of_the_bautin_system(tmp_path):
     """z' = (mu + i) z + nu z|z|^2 - z|z|^4, nu = 1: cycles mu = r^4 - r^2, fold at -1/4."""
     system = bautin()
-    mu = {"mu": -0.5, "nu": 1.0}
-    hopf = continue_branch(
-        system, [0, 0], mu, "mu", ContinuationOptions(eigenvalues=2, limits={"mu": (-1, 1)})
-    ).of_kind("hopf")[0]
+    hopf = hopf_of(system, [0, 0], {"mu": -0.5, "nu": 1.0}, "mu", (-1, 1))
     assert hopf.values["criticality"] == "sub"
     branch = orbits_from_hopf(system, hopf, "mu", ContinuationOptions(limits={"mu": (-1, 0.3)}))
     (fold,) = branch.of_kind("fold of cycles")
@@ -282,14 +271,12 @@ def test_an_orbit_of_a_discretised_equation_takes_few_sparse_factorisations(monk
         original(self, matrix, *arguments)
 
     points, mu = 20, {"A": 2.0, "B": 5.45, "D1": 0.008, "D2": 0.004, "l": 0.49}
-    system, limits = brusselator_1d(points), {"l": (0.48, 0.53)}
-    hopf = continue_branch(
-        system, np.tile([2.0, 2.725], points), mu, "l", ContinuationOptions(eigenvalues=4, near=2.2j, limits=limits)
-    ).of_kind("hopf")[0]
+    system, limits = brusselator_1d(points), (0.48, 0.53)
+    hopf = hopf_of(system, np.tile([2.0, 2.725], points), mu, "l", limits, eigenvalues=4, near=2.2j)
     original = linear.SparseSolver.__init__
     monkeypatch.setattr(linear.SparseSolver, "__init__", count)
     monkeypatch.setattr(linear.DenseSolver, "__init__", None)
-    branch = orbits_from_hopf(system, hopf, "l", ContinuationOptions(limits=limits))
+    branch = orbits_from_hopf(system, hopf, "l", ContinuationOptions(limits={"l": limits}))
     assert branch.reason.kind is Reason.LIMIT and set(branch.unstable) == {0} and not branch.special
     whole = [size for size in made if size > system.size]
     assert len(whole) <= 3 * len(branch)
@@ -302,13 +289,7 @@ def test_a_guess_that_is_no_orbit():
 
 
 def test_orbits_start_at_hopf_points_only():
-    branch = continue_branch(
-        bautin(),
-        [0, 0],
-        {"mu": -0.5, "nu": 1.0},
-        "mu",
-        ContinuationOptions(eigenvalues=2, limits={"mu": (-1, 1)}, locate=False),
-    )
+    branch = follow(bautin(), [0, 0], {"mu": -0.5, "nu": 1.0}, "mu", (-1, 1), locate=False)
     with pytest.raises(NotABifurcation):
         orbits_from_hopf(bautin(), branch.special[0], "mu")
 

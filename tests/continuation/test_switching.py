@@ -6,6 +6,7 @@ import pytest
 
 from continuation import ContinuationOptions, NotABifurcation, continue_branch, switch_branch
 from continuation.jax_system import JaxSystem
+from tests.systems.following import follow
 from tests.systems.normal_forms import pitchfork, transcritical
 
 OPTIONS = ContinuationOptions(eigenvalues=2, limits={"mu": (-1.0, 1.0)}, max_step=0.3)
@@ -63,12 +64,6 @@ def test_points_on_both_sides_of_the_buckled_column_tree():
 
 def test_only_located_branch_points_will_do():
     system = pitchfork()
-    trunk = continue_branch(
-        system,
-        np.zeros(2),
-        {"mu": -1.0, "e": 0.0},
-        "mu",
-        ContinuationOptions(eigenvalues=2, limits={"mu": (-1.0, 1.0)}, branch_points=False),
-    )
+    trunk = follow(system, np.zeros(2), {"mu": -1.0, "e": 0.0}, "mu", (-1.0, 1.0), branch_points=False)
     with pytest.raises(NotABifurcation, match="zero eigenvalue"):
         switch_branch(system, trunk.special[0], "mu", OPTIONS)

@@ -12,6 +12,7 @@ import pytest
 from continuation import ContinuationOptions, NewtonOptions, Reason, continue_branch, continue_hopf
 from tests.systems.bratu import bratu_1d, bratu_chebyshev
 from tests.systems.brusselator import brusselator, brusselator_1d
+from tests.systems.following import follow, hopf_of
 from tests.systems.lorenz import lorenz
 from tests.systems.one_degree_valve import one_degree_valve
 from tests.systems.pipe import pipe
@@ -20,10 +21,7 @@ from tests.systems.pipe import pipe
 @pytest.mark.parametrize(("a", "l1"), [(1.0, -1 / 2), (2.0, -1 / 6)])
 def test_brusselator(a, l1):
     """Newton's last step squares an error below 1e-8, so rounding is what remains."""
-    branch = continue_branch(
-        brusselator(), [a, 1.0], {"A": a, "B": a}, "B", ContinuationOptions(eigenvalues=2, limits={"B": (0.0, 8.0)})
-    )
-    (point,) = branch.of_kind("hopf")
+    (point,) = follow(brusselator(), [a, 1.0], {"A": a, "B": a}, "B", (0.0, 8.0)).of_kind("hopf")
     assert np.isclose(point.mu["B"], 1 + a**2, rtol=1e-12)
     assert np.isclose(point.values["omega"], a, rtol=1e-12)
     assert np.isclose(point.values["first_lyapunov_coefficient"], l1, rtol=1e-10)
@@ -32,17 +30,9 @@ def test_brusselator(a, l1):
 
 def test_brusselator_hopf_curve():
     """B = 1 + A^2 and omega = A over a range of A; l1 at A = 1 and 2 on the way."""
-    branch = continue_branch(
-        brusselator(),
-        [0.5, 1.0],
-        {"A": 0.5, "B": 0.5},
-        "B",
-        ContinuationOptions(eigenvalues=2, limits={"B": (0.0, 8.0)}),
-    )
+    hopf = hopf_of(brusselator(), [0.5, 1.0], {"A": 0.5, "B": 0.5}, "B", (0.0, 8.0))
     for end, l1 in ((1.0, -1 / 2), (2.0, -1 / 6)):
-        curve = continue_hopf(
-            brusselator(), branch.of_kind("hopf")[0], ("B", "A"), ContinuationOptions(limits={"A": (0.1, end)})
-        )
+        curve = continue_hopf(brusselator(), hopf, ("B", "A"), ContinuationOptions(limits={"A": (0.1, end)}))
         a = curve.values("A")
         assert a[-1] == end
         assert np.abs(curve.values("B") - 1 - a**2).max() < 1e-8
@@ -56,13 +46,8 @@ def test_brusselator_in_one_dimension():
     lengths = {}
     for points in (47, 95):
         mu = {"A": 2.0, "B": 5.45, "D1": 0.008, "D2": 0.004, "l": 0.3}
-        branch = continue_branch(
-            brusselator_1d(points),
-            np.tile([2.0, 2.725], points),
-            mu,
-            "l",
-            ContinuationOptions(eigenvalues=8, near=2.2j, limits={"l": (0.2, 1.7)}, step=0.1, max_step=0.3),
-        )
+        steps, start = {"step": 0.1, "max_step": 0.3}, np.tile([2.0, 2.725], points)
+        branch = follow(brusselator_1d(points), start, mu, "l", (0.2, 1.7), eigenvalues=8, near=2.2j, **steps)
         found = branch.of_kind("hopf")
         lengths[points] = np.array([s.mu["l"] for s in found])
         # Central differences replace k pi by 2/h sin(k pi h/2), and nothing else.
@@ -79,14 +64,8 @@ def test_brusselator_in_one_dimension():
 def test_lorenz():
     sigma, b, r = 10.0, 8 / 3, 10.0
     x = np.sqrt(b * (r - 1))
-    branch = continue_branch(
-        lorenz(),
-        [x, x, r - 1],
-        {"sigma": sigma, "b": b, "r": r},
-        "r",
-        ContinuationOptions(eigenvalues=3, step=0.5, max_step=3.0, limits={"r": (2.0, 30.0)}),
-    )
-    (point,) = branch.of_kind("hopf")
+    mu = {"sigma": sigma, "b": b, "r": r}
+    (point,) = follow(lorenz(), [x, x, r - 1], mu, "r", (2.0, 30.0), step=0.5, max_step=3.0).of_kind("hopf")
     critical = sigma * (sigma + b + 3) / (sigma - b - 1)
     assert np.isclose(point.mu["r"], critical, rtol=1e-11)
     assert abs(point.mu["r"] - 24.7368) < 5e-5
@@ -95,14 +74,8 @@ def test_lorenz():
 
 
 def test_lorenz_pitchfork_at_one():
-    branch = continue_branch(
-        lorenz(),
-        np.zeros(3),
-        {"sigma": 10.0, "b": 8 / 3, "r": 0.2},
-        "r",
-        ContinuationOptions(eigenvalues=3, limits={"r": (0.1, 2.0)}),
-    )
-    (point,) = branch.of_kind("branch point")
+    mu = {"sigma": 10.0, "b": 8 / 3, "r": 0.2}
+    (point,) = follow(lorenz(), np.zeros(3), mu, "r", (0.1, 2.0)).of_kind("branch point")
     assert abs(point.mu["r"] - 1.0) < 1e-10
 
 
@@ -140,10 +113,7 @@ def test_bratu_in_two_dimensions():
 def test_one_degree_valve():
     mu = {"m": 1.0, "c": 0.1, "k": 1.0, "r": 0.5, "B": 0.0}
     system = one_degree_valve()
-    branch = continue_branch(
-        system, np.zeros(3), mu, "B", ContinuationOptions(eigenvalues=3, limits={"B": (-1.0, 1.0)})
-    )
-    (point,) = branch.of_kind("hopf")
+    (point,) = follow(system, np.zeros(3), mu, "B", (-1.0, 1.0)).of_kind("hopf")
     assert abs(point.mu["B"] - 0.216667) < 5e-7 and abs(point.values["omega"] - 0.912871) < 5e-7
     curve = continue_hopf(
         system, point, ("B", "r"), ContinuationOptions(limits={"r": (0.05, 3.0)}, eigenvalues=3), lyapunov=False
@@ -152,23 +122,15 @@ def test_one_degree_valve():
     assert np.allclose(curve.values("B"), 1 + 0.1 * r - r / (0.1 + r), rtol=0, atol=1e-8)
     assert np.allclose(curve.values("omega") ** 2, r / (0.1 + r), rtol=0, atol=1e-8)
     assert set(curve.unstable) == {0}
-    opening = continue_branch(
-        system, np.zeros(3), mu, "B", ContinuationOptions(eigenvalues=3, direction=-1, limits={"B": (-5.0, 1.0)})
-    )
+    opening = follow(system, np.zeros(3), mu, "B", (-5.0, 1.0), direction=-1)
     assert not opening.special and set(opening.unstable) == {0}
 
 
 def test_pipe_conveying_fluid_along_the_hopf_curve():
     """One curve through all tabulated mass ratios and the S-bend near 0.295 between them."""
     system = pipe(14)
-    branch = continue_branch(
-        system,
-        np.zeros(28),
-        {"beta": 0.1, "u": 3.0},
-        "u",
-        ContinuationOptions(eigenvalues=28, limits={"u": (3.0, 6.0)}, branch_points=False),
-    )
-    (point,) = branch.of_kind("hopf")
+    mu = {"beta": 0.1, "u": 3.0}
+    (point,) = follow(system, np.zeros(28), mu, "u", (3.0, 6.0), branch_points=False).of_kind("hopf")
     assert abs(point.mu["u"] - 4.7499) < 5.1e-5 and abs(point.values["omega"] - 14.2171) < 5.1e-5
     for beta, velocity, omega in ((0.2, 5.5914, 13.7147), (0.5, 9.3224, 26.4973)):
         curve = continue_hopf(

@@ -4,16 +4,9 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from continuation import (
-    ContinuationOptions,
-    continue_branch,
-    find_orbit,
-    hopf_normal_form,
-    orbit_at,
-    orbits_from_hopf,
-    special_orbit,
-)
+from continuation import ContinuationOptions, find_orbit, orbit_at, orbits_from_hopf, special_orbit
 from tests.systems.brusselator import brusselator
+from tests.systems.following import follow, normal_form_of
 from tests.systems.langford import langford
 from tests.systems.lorenz import lorenz
 from tests.systems.van_der_pol import van_der_pol
@@ -42,10 +35,7 @@ def test_van_der_pol(mu, period, amplitude, multiplier):
 def test_langford():
     """Circular orbit from mu = 5 - sqrt(11); torus bifurcation at exactly 2."""
     system = langford()
-    equilibria = continue_branch(
-        system, [0, 0, 1.5], {"mu": 1.5}, "mu", ContinuationOptions(eigenvalues=3, limits={"mu": (1.2, 2.5)})
-    )
-    (hopf,) = equilibria.of_kind("hopf")
+    (hopf,) = follow(system, [0, 0, 1.5], {"mu": 1.5}, "mu", (1.2, 2.5)).of_kind("hopf")
     # On the axis z = mu the growth is 2 mu - 3 + 0.2 (1 - mu^2).
     assert np.isclose(hopf.mu["mu"], 5 - np.sqrt(11), rtol=1e-10)
     assert abs(hopf.mu["mu"] - 1.683) < 5e-4 and np.isclose(hopf.values["omega"], 0.25)
@@ -65,15 +55,8 @@ def test_langford():
 
 
 def hopf_form(system, u, mu, parameter, low, high):
-    branch = continue_branch(
-        system,
-        u,
-        mu,
-        parameter,
-        ContinuationOptions(eigenvalues=3, step=0.2, max_step=2.0, limits={parameter: (low, high)}),
-    )
-    (point,) = branch.of_kind("hopf")
-    return point, hopf_normal_form(system, point.u, point.mu, point.values["omega"], point.vectors["right"], parameter)
+    (point,) = follow(system, u, mu, parameter, (low, high), step=0.2, max_step=2.0).of_kind("hopf")
+    return point, normal_form_of(system, point, parameter)
 
 
 def swing(system, start, mu, time, functional):

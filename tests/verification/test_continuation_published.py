@@ -19,13 +19,13 @@ from continuation import (
     orbit_at,
     switch_branch,
 )
+from tests.systems import following
 from tests.systems.literature import fitzhugh_nagumo, gelfand, hodgkin_huxley, lorenz_84, predator_prey, roessler
 
 
-def follow(system, start, mu, parameter, limits, **options):
+def follow(*given):
     """Branch to its limit, all of whose special points are located."""
-    options = ContinuationOptions(eigenvalues=system.size, limits={parameter: limits}, **options)
-    branch = continue_branch(system, start, mu, parameter, options)
+    branch = following.follow(*given)
     assert branch.reason.kind is Reason.LIMIT and all(s.located for s in branch.special), branch
     return branch
 
