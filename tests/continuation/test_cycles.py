@@ -14,6 +14,7 @@ from continuation.hill import floquet_exponents
 from continuation.orbit_branches import find_orbit
 from continuation.periodic import PeriodicMotion
 from tests.systems import periodic
+from tests.systems.langford import langford
 from tests.systems.van_der_pol import van_der_pol as first_order_van_der_pol
 
 EXACT = 1e-10
@@ -24,6 +25,25 @@ CIRCLE = np.stack([np.cos(PHASE), np.sin(PHASE)], axis=1)
 def solved(system, guess, mu, tolerance=EXACT, **unknown):
     solver = CycleSolver(system, system.basis, tolerance)
     return solver, solver.solve(guess, mu, **unknown)
+
+
+def begun(system, guess, mu, other, name, options, *shape, **wanted):
+    """Tracer with its first two cycles, the second at another value of the parameter."""
+    solver, first = solved(system, guess, mu)
+    tracer = CycleTracer(solver, name, options, *shape, **wanted)
+    tracer.extend(first)
+    tracer.extend(solver.solve(first.motion, mu | {name: other}))
+    return tracer
+
+
+def circling(gain):
+    """Rate of z' = (gain - |z|^2 + i) z."""
+
+    def rate(u, mu):
+        own = gain(mu["mu"]) - u[0] ** 2 - u[1] ** 2
+        return jnp.stack([own * u[0] - u[1], u[0] + own * u[1]])
+
+    return rate
 
 
 def exponents_of(solver, cycle, count=4):
@@ -113,16 +133,11 @@ def test_folds_of_the_forced_duffing():
     """
     mu = {"w": 0.8, "d": 0.02, "e": 0.02, "f": 0.05}
     system = periodic.duffing()
-    solver = CycleSolver(system, system.basis, EXACT)
     guess = periodic.guess_of(0.15 * np.cos(PHASE)[:, None], 5, 1.0)
-    first = solver.solve(guess, mu)
-    second = solver.solve(first.motion, mu | {"w": 0.82})
     options = ContinuationOptions(
         max_step=0.4, parameter_scales={"w": 0.2}, limits={"w": (0.5, 1.3)}, max_points=150, location_tolerance=1e-2
     )
-    tracer = CycleTracer(solver, "w", options, OrbitOptions(exponents=2, tail=1e-3))
-    tracer.extend(first)
-    tracer.extend(second)
+    tracer = begun(system, guess, mu, 0.82, "w", options, OrbitOptions(exponents=2, tail=1e-3))
     assert tracer.run() == "ended on the limit w = 1.3"
     folds = [s for s in tracer.special if s.kind == FOLD]
     assert len(folds) == 2 and all(s.located for s in folds)
@@ -144,29 +159,18 @@ def test_folds_of_the_forced_duffing():
 # -- bifurcations
 
 
-def langford(u, mu):
-    x, y, z = u
-    m = mu["mu"]
-    gain = m - 3 + z + 0.2 * (1 - z**2)
-    return jnp.stack([gain * x - 0.25 * y, 0.25 * x + gain * y, m * z - (x**2 + y**2 + z**2)])
-
-
 def trace(system, guess, mu, other, name, limits, tail=1e-3, max_harmonics=24, located=1e-2, **options):
-    solver = CycleSolver(system, system.basis, EXACT)
-    first = solver.solve(guess, mu)
-    second = solver.solve(first.motion, mu | {name: other})
     options = ContinuationOptions(
         limits={name: limits}, parameter_scales={name: 1.0}, max_angle=1.5, location_tolerance=located, **options
     )
-    tracer = CycleTracer(solver, name, options, OrbitOptions(tail=tail, max_harmonics=max_harmonics, exponents=4))
-    tracer.extend(first)
-    tracer.extend(second)
+    shape = OrbitOptions(tail=tail, max_harmonics=max_harmonics, exponents=4)
+    tracer = begun(system, guess, mu, other, name, options, shape)
     return tracer, tracer.run()
 
 
 def test_torus_of_langford():
     """Neimark-Sacker at exactly mu = 2 with exponents +- i sqrt(1.2) modulo the frequency 1/4."""
-    system = periodic.of_first_order(langford, 3)
+    system = periodic.of_first_order(langford()._residual, 3)
     samples = np.hstack([CIRCLE, np.ones((64, 1))])
     guess = periodic.guess_of(samples, 3, 0.25)
     tracer, reason = trace(
@@ -204,12 +208,7 @@ def test_period_doubling_of_an_adaptive_control_system():
 
 def test_a_branch_between_two_onsets_ends_at_the_second():
     """z' = (mu (1 - mu) + i) z - z|z|^2: radius sqrt(mu (1 - mu)), back on itself beyond 1."""
-
-    def rate(u, mu):
-        gain = mu["mu"] * (1 - mu["mu"]) - u[0] ** 2 - u[1] ** 2
-        return jnp.stack([gain * u[0] - u[1], u[0] + gain * u[1]])
-
-    system = periodic.of_first_order(rate, 2)
+    system = periodic.of_first_order(circling(lambda mu: mu * (1 - mu)), 2)
     guess = periodic.guess_of(0.2 * CIRCLE, 2, 1.0)
     options = {"step": 0.1, "max_step": 0.1, "limits": (-1.0, 2.0), "max_points": 60}
     tracer, reason = trace(system, guess, {"mu": 0.04}, 0.06, "mu", **options)
@@ -220,26 +219,16 @@ def test_a_branch_between_two_onsets_ends_at_the_second():
 
 def test_events_are_located():
     """The radius of Stuart and Landau's cycle, sqrt(mu), passes 0.6 at 0.36."""
-
-    def rate(u, mu):
-        gain = mu["mu"] - u[0] ** 2 - u[1] ** 2
-        return jnp.stack([gain * u[0] - u[1], u[0] + gain * u[1]])
-
-    system = periodic.of_first_order(rate, 2)
-    solver = CycleSolver(system, system.basis, EXACT)
-    first = solver.solve(periodic.guess_of(0.3 * CIRCLE, 2, 1.0), {"mu": 0.09})
-    second = solver.solve(first.motion, {"mu": 0.12})
+    system, guess = periodic.of_first_order(circling(lambda mu: mu), 2), periodic.guess_of(0.3 * CIRCLE, 2, 1.0)
     event = {"radius": lambda cycle: float(np.linalg.norm(cycle.motion.at([0.0]))) - 0.6}
     options = ContinuationOptions(limits={"mu": (0.0, 0.5)}, location_tolerance=1e-9)
-    tracer = CycleTracer(solver, "mu", options, values=(0.2, 0.3), events=event)
-    tracer.extend(first)
-    tracer.extend(second)
+    tracer = begun(system, guess, {"mu": 0.09}, 0.12, "mu", options, values=(0.2, 0.3), events=event)
     told = []
     tracer.run(told.append)
     (special,) = tracer.special
     assert special.kind == "radius" and abs(special.value - 0.36) < 1e-5 and special in told
     assert {0.2, 0.3} <= {p.value for p in tracer.points if p.asked}
-    again = CycleTracer(solver, "mu", options, values=(0.2, 0.3), events=event)
+    again = CycleTracer(tracer.solver, "mu", options, values=(0.2, 0.3), events=event)
     again.restore(tracer.points[:3])
     again.run()
     assert np.isclose(again.points[-1].value, tracer.points[-1].value) and len(again.special) == 1
@@ -248,24 +237,17 @@ def test_events_are_located():
 def test_an_event_that_ends_a_branch_is_located_from_one_side():
     """Motions that reach x = -0.6 are refused, and the radius sqrt(mu) is that at 0.36."""
 
-    def rate(u, mu):
-        gain = mu["mu"] - u[0] ** 2 - u[1] ** 2
-        return jnp.stack([gain * u[0] - u[1], u[0] + gain * u[1]])
-
     class Walled(periodic.SmallPeriodic):
         def residual(self, motion, mu):
             if np.linalg.norm(motion.samples, axis=1).max() > 0.6 + 1e-9:
                 raise OutOfDomain("beyond the wall")
             return super().residual(motion, mu)
 
+    rate, guess = circling(lambda mu: mu), periodic.guess_of(0.3 * CIRCLE, 2, 1.0)
     system = Walled(lambda u, v, a, t, mu: v - rate(u, mu), 2)
-    solver = CycleSolver(system, system.basis, EXACT)
-    first = solver.solve(periodic.guess_of(0.3 * CIRCLE, 2, 1.0), {"mu": 0.09})
-    second = solver.solve(first.motion, {"mu": 0.12})
     event = {"wall": lambda cycle: 0.6 - float(np.linalg.norm(cycle.motion.at([0.0])))}
-    tracer = CycleTracer(solver, "mu", ContinuationOptions(limits={"mu": (0.0, 0.5)}), events=event)
-    tracer.extend(first)
-    tracer.extend(second)
+    options = ContinuationOptions(limits={"mu": (0.0, 0.5)})
+    tracer = begun(system, guess, {"mu": 0.09}, 0.12, "mu", options, events=event)
     told = []
     assert "no further cycle" in tracer.run(told.append)
     (special,) = tracer.special

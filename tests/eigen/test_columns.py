@@ -25,7 +25,17 @@ class Point(NamedTuple):
     loss: float = 0.0
 
 
-class Chain(PencilFamily):
+class PointFamily(PencilFamily):
+    """A family over such points, of couplings `_parts` by their law."""
+
+    def rayleigh(self, mu):
+        return mu.alpha, mu.beta
+
+    def coupling(self, mu):
+        return {name: value * mu.inertia ** (int(name[1]) / 2) for name, value in self._parts[mu.law].items()}
+
+
+class Chain(PointFamily):
     """Masses on springs, with a coupling that feeds motion where it is dense enough, and one inner unknown."""
 
     def __init__(self, max_frequency=None):
@@ -42,12 +52,6 @@ class Chain(PencilFamily):
         parts |= {"A1": 0.1 * np.diag([1.0, 0.5, 0.2]), "B0": np.full((3, 1), 0.3), "S0": np.ones((1, 1))}
         parts |= {"R0": np.array([[0.1, 0.0, 0.2]]), "S1": 0.01 * np.ones((1, 1))}
         self._parts = {0.0: parts, 1.0: parts | {"A2": -0.02 * np.eye(3)}}
-
-    def rayleigh(self, mu):
-        return mu.alpha, mu.beta
-
-    def coupling(self, mu):
-        return {name: value * mu.inertia ** (int(name[1]) / 2) for name, value in self._parts[mu.law].items()}
 
     def search(self, condition):
         band = self.max_frequency if self.max_frequency or condition.beta else 40.0

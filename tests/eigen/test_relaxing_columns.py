@@ -2,26 +2,24 @@
 
 import numpy as np
 import pytest
-import scipy.linalg as la
 import scipy.sparse as sp
 
 from eigen import (
     ColumnSolver,
     CoupledPencil,
     FamilyReduction,
-    PencilFamily,
     ReducedFamily,
     Relaxation,
     SearchOptions,
     lowest_frequencies,
 )
 from eigen.operator import FLUID_PARTS
-from tests.eigen.test_columns import Point
+from tests.eigen.test_columns import Point, PointFamily, dense
 
 SIZE, GROUPS, TIMES = 12, 2, 3
 
 
-class RelaxingFamily(PencilFamily):
+class RelaxingFamily(PointFamily):
     """A random structure of which two thirds relax, with a coupling of three forces and one inner unknown."""
 
     def __init__(self, seed: int, coupling: float = 0.1):
@@ -57,12 +55,6 @@ class RelaxingFamily(PencilFamily):
             self._known[loss] = Relaxation(self.relaxing, loss * self.strengths[:, kept], self.times[kept])
         return self._known[loss] if loss else None
 
-    def rayleigh(self, mu):
-        return mu.alpha, mu.beta
-
-    def coupling(self, mu):
-        return {name: value * mu.inertia ** (int(name[1]) / 2) for name, value in self._parts[mu.law].items()}
-
     def search(self, condition):
         return SearchOptions()
 
@@ -79,11 +71,6 @@ def random_conditions(seed: int, number: int) -> list[Point]:
         )
         for _ in range(number)
     ]
-
-
-def dense(family, condition) -> np.ndarray:
-    values = la.eigvals(*family.at(condition).first_order())
-    return values[np.isfinite(values)]
 
 
 @pytest.mark.parametrize("seed", range(15))
