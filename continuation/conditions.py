@@ -69,7 +69,7 @@ class FoldCondition:
     def evaluate(self, system, u, mu, names, linear, extra):
         """Condition at a point; ``linear`` is the linearisation there."""
         at = copy(self)
-        at.linear, at._derivatives = linear, Derivatives(system, u, mu)
+        at.linear, at._names, at._derivatives = linear, names, Derivatives(system, u, mu)
         at._measure(extra)
         return at
 
@@ -148,11 +148,12 @@ class BogdanovTakensCondition(FoldCondition):
         return np.array([-self.w @ av, second])
 
 
-class BranchPointCondition:
+class BranchPointCondition(FoldCondition):
     """``[F_u, F_p]`` loses rank, for the system unfolded by ``F + beta * p``.
 
     The freed parameters are the branch's and ``beta``; at the solution ``beta = 0``
-    (Moore 1980; Allgower & Schwetlick 1997).
+    (Moore 1980; Allgower & Schwetlick 1997).  At a point ``null`` are two vectors of shape (n + 1,) that span the
+    kernel where ``values = 0``.
 
     Parameters
     ----------
@@ -162,28 +163,19 @@ class BranchPointCondition:
         Near the two null vectors of ``[F_u, F_p]``.
     """
 
-    extra, count = 0, 2
-    extra_names: tuple[str, ...] = ()
+    count = 2
     d_extra = np.zeros((2, 0))
 
     def __init__(self, p, rows):
         self.p, self.rows = p / np.linalg.norm(p), rows
 
-    def evaluate(self, system, u, mu, names, linear, extra):
-        """Condition at a point: ``null`` are two vectors of shape (n + 1,) that span the kernel at ``values = 0``."""
-        at = copy(self)
-        at._system, at._u, at._mu, at._name = system, u, mu, names[0]
-        at._derivatives = Derivatives(system, u, mu)
-        at._measure(linear)
-        return at
-
-    def _measure(self, linear):
-        n = self._u.size
-        columns = [self._system.d_parameter(self._u, self._mu, self._name), self.p]
+    def _measure(self, extra):
+        at, n = self._derivatives, self.p.size
+        columns = [at.system.d_parameter(at.u, at.mu, self._names[0]), self.p]
         rows = np.hstack([self.rows, np.zeros((2, 1))])
         # The first border must not be singular with its row alone, so the rows are ordered
         # by the caller: the tangent of the branch first.
-        solver = bordered(linear, columns, rows)
+        solver = bordered(self.linear, columns, rows)
         units = np.eye(2, n + 2, n)
         right = [solver.solve(unit) for unit in units]
         self.null = [x[: n + 1] for x in right]
@@ -192,13 +184,13 @@ class BranchPointCondition:
 
     def extended_along(self, x, du, dmu):
         """``d([F_u, F_p] x)`` for a change of state and parameters."""
-        v, s = x[:-1], x[-1]
-        change = self._derivatives.jacobian_along(v, du, dmu)
+        v, s, at = x[:-1], x[-1], self._derivatives
+        change = at.jacobian_along(v, du, dmu)
         if s != 0.0:
-            change = change + s * self._derivatives.d2_parameter(self._name, du)
+            change = change + s * at.d2_parameter(self._names[0], du)
             for name, amount in dmu.items():
                 if amount != 0.0:
-                    change = change + s * amount * self._system.d_parameters2(self._u, self._mu, self._name, name)
+                    change = change + s * amount * at.system.d_parameters2(at.u, at.mu, self._names[0], name)
         return change
 
     def along(self, du, dmu):

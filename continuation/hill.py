@@ -14,7 +14,7 @@ import numpy as np
 import scipy.linalg as la
 
 from continuation.harmonics import Harmonics
-from continuation.linear import SYMMETRIC, factorise
+from continuation.linear import SYMMETRIC, factorise, product
 from continuation.periodic import by_parts
 
 #: Shifts: distance right of the axis, and how far up the band of exponents, both over omega.
@@ -274,22 +274,14 @@ def _nearest(parts, shift: complex, most: int = 3 * _STEPS):
 
     def invert(x):
         if l2 is None:
-            return -solver.solve(_times(l1, x))
+            return -solver.solve(product(l1, x))
         y, z = x[:size], x[size:]
-        top = -solver.solve(_times(l2, z + shift * y) + _times(l1, y))
+        top = -solver.solve(product(l2, z + shift * y) + product(l1, y))
         return np.append(top, y + shift * top)
 
     for pairs, next_one, steps in _arnoldi(invert, size if l2 is None else 2 * size, matrix.dtype, most):
         radius = 1.0 / next_one if next_one else np.inf
         yield [(shift + 1.0 / value, vector[:size]) for value, vector in pairs], radius, steps
-
-
-def _times(matrix, x: np.ndarray) -> np.ndarray:
-    """Product with a vector, without making a real matrix complex."""
-    if np.iscomplexobj(matrix) or not np.iscomplexobj(x):
-        return matrix @ x
-    both = matrix @ np.stack([x.real, x.imag], axis=1)
-    return both[:, 0] + 1j * both[:, 1]
 
 
 def _arnoldi(apply, size: int, dtype, most: int):

@@ -119,6 +119,15 @@ def _parity(permutation) -> int:
     return -1 if (permutation.size - count) % 2 else 1
 
 
+def product(matrix, x: np.ndarray) -> np.ndarray:
+    """Product with an array, without making a real matrix complex."""
+    if np.iscomplexobj(matrix) or not np.iscomplexobj(x):
+        return matrix @ x
+    flat = np.ascontiguousarray(x).reshape(len(x), -1)
+    out = matrix @ flat.view(float)
+    return np.ascontiguousarray(out).view(complex).reshape((matrix.shape[0], *x.shape[1:]))
+
+
 def factorise(matrix, ordering: str = "COLAMD"):
     """A factorised solver for a dense or sparse matrix, with an ordering of `scipy.sparse.linalg.splu`."""
     return SparseSolver(matrix, ordering) if sp.issparse(matrix) else DenseSolver(np.asarray(matrix))

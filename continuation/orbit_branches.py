@@ -49,7 +49,7 @@ from continuation.options import (
     Said,
     require,
 )
-from continuation.periodic import PeriodicMotion
+from continuation.periodic import PeriodicMotion, peak
 from continuation.tracer import as_observers, notify, run_observed
 
 
@@ -110,7 +110,7 @@ class Orbit:
     def extrema(self, samples: int = 4000) -> tuple[np.ndarray, np.ndarray]:
         """Smallest and largest value of each unknown, (n,) each, with parabolic refinement."""
         x = self(np.linspace(0.0, self.period, samples, endpoint=False))
-        return -_peak(-x), _peak(x)
+        return -peak(-x), peak(x)
 
     def amplitude(self) -> np.ndarray:
         """Half of peak to peak of each unknown, (n,)."""
@@ -143,16 +143,6 @@ class Orbit:
     def stable(self) -> bool | None:
         """True without growing perturbations; None where the exponents are not to be trusted."""
         return None if self.floquet.unstable < 0 else self.floquet.stable
-
-
-def _peak(x):
-    top = np.argmax(x, axis=0)
-    k = np.arange(x.shape[1])
-    size = x.shape[0]
-    a, b, c = x[top - 1, k], x[top, k], x[(top + 1) % size, k]
-    bend = a - 2 * b + c
-    safe = np.where(bend == 0, 1.0, bend)
-    return np.where(bend < 0, b - 0.125 * (c - a) ** 2 / safe, b)
 
 
 def find_orbit(system, states, period: float, mu, options: OrbitOptions | None = None) -> Orbit:

@@ -19,10 +19,10 @@ from math import comb
 from typing import Any
 
 import numpy as np
-import scipy.sparse as sp
 
 from continuation.blocks import DenseBlocks, SparseBlocks, sum_of_products
 from continuation.harmonics import Harmonics, Rates
+from continuation.linear import product
 
 #: Least size over the largest of parts that projections of terms through few numbers are sums of.
 TAKEN = 1e-8
@@ -201,16 +201,15 @@ def _times(blocks, samples: np.ndarray) -> np.ndarray:
         if samples.ndim == 2:
             return np.matmul(blocks, samples[:, :, None])[:, :, 0]
         return np.matmul(blocks, samples)
-    return np.stack([_product(block, x) for block, x in zip(blocks, samples)])
+    return np.stack([product(block, x) for block, x in zip(blocks, samples)])
 
 
-def _product(block, x: np.ndarray) -> np.ndarray:
-    """Product of a real block with a real or complex array, without making the block complex."""
-    if not np.iscomplexobj(x) or not sp.issparse(block):
-        return block @ x
-    flat = np.ascontiguousarray(x).reshape(len(x), -1)
-    out = block @ flat.view(float)
-    return np.ascontiguousarray(out).view(complex).reshape((block.shape[0], *x.shape[1:]))
+def peak(values: np.ndarray) -> np.ndarray:
+    """Largest values of periodic signals (samples, ...), by the parabola through largest sample and neighbours."""
+    top = np.asarray(np.argmax(values, axis=0))
+    a, b, c = (np.take_along_axis(values, (top + k)[None] % len(values), axis=0)[0] for k in (-1, 0, 1))
+    bend = a - 2 * b + c
+    return np.where(bend < 0, b - 0.125 * (c - a) ** 2 / np.where(bend == 0, 1.0, bend), b)
 
 
 class PeriodicOperator:

@@ -14,7 +14,7 @@ from continuation.cycle_points import CyclePoint
 from continuation.cycles import Cycle, CycleSolver, cycles_beside_onset
 from continuation.harmonics import Harmonics
 from continuation.options import ContinuationError, ContinuationOptions, OrbitOptions
-from continuation.periodic import PeriodicMotion
+from continuation.periodic import PeriodicMotion, peak
 
 from ..case.parameters import PARAMETERS, Mu
 from ..errors import SolveError
@@ -129,7 +129,7 @@ class Orbit:
     @cached_property
     def lip_extremes(self) -> tuple[float, float]:
         """Least and largest displacement of the lip, m, between instants too."""
-        return -_peak(-self.lip), _peak(self.lip)
+        return -float(peak(-self.lip)), float(peak(self.lip))
 
     @property
     def lip_harmonics(self) -> np.ndarray:
@@ -164,14 +164,6 @@ class Orbit:
         lip = LipCentre(self.model.mesh, self.model.shell)
         samples = self.motion.at(self.phases[::4])[:, : self.model.size]
         return float(min(lip.opening(q) for q in samples))
-
-
-def _peak(values: np.ndarray) -> float:
-    """Largest value of a periodic signal, by the parabola through its largest sample and both neighbours."""
-    top = int(np.argmax(values))
-    a, b, c = values[top - 1], values[top], values[(top + 1) % len(values)]
-    bend = a - 2 * b + c
-    return float(b - 0.125 * (c - a) ** 2 / bend) if bend < 0 else float(b)
 
 
 #: Displacement of the lip, m, that a step of one along the branch stands for.
