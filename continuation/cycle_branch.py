@@ -24,11 +24,11 @@ from continuation.cycle_points import (
     change_between,
     crossing_of,
     growth_of_crossing,
-    lagrange,
     parameter_predicts_better,
     predict_by_arclength,
     predict_by_parameter,
     value_at_zero,
+    value_by_arclength,
     zero_ahead,
 )
 from continuation.cycles import Cycle, CycleSolver
@@ -252,9 +252,7 @@ class CycleTracer:
 
     def _value_at(self, step: float) -> float:
         """The parameter a step ahead, by the polynomial through the last points."""
-        last = self._last()
-        weights = lagrange([p.arclength for p in last], last[-1].arclength + step)
-        return float(sum(w * p.value for w, p in zip(weights, last)))
+        return value_by_arclength(self._last(), self.points[-1].arclength + step)
 
     def _last(self) -> list[CyclePoint]:
         """Points that predictions are made of."""
@@ -281,7 +279,8 @@ class CycleTracer:
         else:
             motion = predict_by_arclength(self._last(), last.arclength + step, self._series())
             value = self._value_at(step)
-            free, conditions = (self.parameter,), (self._plane(motion, value),)
+            way = motion.coefficients - motion.harmonics.resized(last.motion.coefficients)
+            free, conditions = (self.parameter,), (self._plane(way, value - last.value, motion, value),)
         mu = last.cycle.mu | {self.parameter: value}
         return self._solved(motion, mu, free, conditions), replace(last.cycle, motion=motion, mu=mu)
 
@@ -314,15 +313,12 @@ class CycleTracer:
         longer = min(last.harmonics.count + 2, options.max_harmonics)
         return Harmonics(longer) if last.tail > 0.4 * options.tail else last.harmonics
 
-    def _plane(self, motion, value: float) -> Condition:
-        """Normal to the way from the last point, through the prediction."""
-        last = self.points[-1]
-        c = motion.coefficients
-        row = (c - motion.harmonics.resized(last.motion.coefficients)) * self._weight
-        extra = np.zeros(len(self.solver.unknowns((self.parameter,))))
-        extra[-1] = (value - last.value) / self.scale**2
+    def _plane(self, way: np.ndarray, moved: float, motion: PeriodicMotion, value: float) -> Condition:
+        """Normal to a way of coefficients and of the parameter, through a motion at a value."""
+        row, extra = way * self._weight, np.zeros(len(self.solver.unknowns((self.parameter,))))
+        extra[-1] = moved / self.scale**2
         size = np.sqrt(np.sum(row**2 / self._weight) + (extra[-1] * self.scale) ** 2)
-        return Condition(row / size, extra / size, float(np.vdot(row, c) + extra[-1] * value) / size)
+        return Condition(row / size, extra / size, float(np.vdot(row, motion.coefficients) + extra[-1] * value) / size)
 
     # -- points
     # ----
@@ -402,13 +398,9 @@ class CycleTracer:
         """A cycle between points, at an arclength; None where it is not found."""
         h = max((p.motion.harmonics for p in near), key=lambda h: h.count)
         guess = predict_by_arclength(near, arclength, h)
-        c, weights = guess.coefficients, lagrange([p.arclength for p in near], arclength)
-        value = float(sum(w * p.value for w, p in zip(weights, near)))
-        first, last = near[0], near[-1]
-        row = h.resized(last.motion.coefficients) - h.resized(first.motion.coefficients)
-        extra = np.zeros(len(self.solver.unknowns((self.parameter,))))
-        extra[-1] = (last.value - first.value) / self.scale**2
-        condition = Condition(row * self._weight, extra, float(np.vdot(row * self._weight, c) + extra[-1] * value))
+        value, first, last = value_by_arclength(near, arclength), near[0], near[-1]
+        way = h.resized(last.motion.coefficients) - h.resized(first.motion.coefficients)
+        condition = self._plane(way, last.value - first.value, guess, value)
         mu = near[0].cycle.mu | {self.parameter: value}
         try:
             cycle = self._solved(guess, mu, (self.parameter,), (condition,))
@@ -439,10 +431,9 @@ class CycleTracer:
             if point.tests[name] * near[-1].tests[name] <= 0:
                 return self._located(name, near[-1], point, lambda p: p.tests[name])
             near.append(point)
-        last = near[-3:]
-        weights = lagrange([p.arclength for p in last], last[-1].arclength + zero_ahead(near, name))
-        value = float(sum(w * p.value for w, p in zip(weights, last)))
-        return SpecialCycle(name, last[-1], value, 0.0, abs(last[-1].tests[name]) <= 1e-2 * whole)
+        last = near[-1]
+        value = value_by_arclength(near[-3:], last.arclength + zero_ahead(near, name))
+        return SpecialCycle(name, last, value, 0.0, abs(last.tests[name]) <= 1e-2 * whole)
 
     def _located(self, kind: str, a: CyclePoint, b: CyclePoint, test) -> SpecialCycle:
         """A zero of a test between two points, by false positions with halving (Illinois)."""

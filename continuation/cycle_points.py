@@ -152,6 +152,12 @@ POINTS = 4
 GROWTH = 50.0
 
 
+def value_by_arclength(points: Sequence[CyclePoint], arclength: float) -> float:
+    """The parameter at an arclength, by the polynomial through points."""
+    weights = lagrange([p.arclength for p in points], arclength)
+    return float(sum(w * p.value for w, p in zip(weights, points)))
+
+
 def predict_by_arclength(points: Sequence[CyclePoint], arclength: float, h: Harmonics) -> PeriodicMotion:
     """The motion at an arclength, by the polynomial through points."""
     weights = lagrange([p.arclength for p in points], arclength)
