@@ -19,6 +19,7 @@ import numpy as np
 
 from eigen.family import ReducedFamily
 from eigen.reduction import OPTIONS, FamilyReduction
+from eigen.spectrum import number_right_of
 
 from .case.parameters import PARAMETERS, Mu
 from .errors import CaseError, SolveError
@@ -277,7 +278,7 @@ class Explorer:
     def _predicted(self, place: Mu, state: SteadyState, bound: float) -> Answer:
         _, space, _ = self._space
         values = np.asarray(space.leading(place))[: self.case.modes.count]
-        unstable = int(np.where(values.imag > 0, 2, 1)[values.real > 0].sum())
+        unstable = number_right_of(values)
         said = f"{unstable} unstable eigenvalues of the reduced operator; the full one has not confirmed them."
         found = replace(Verdict.of(values, unstable, unstable, True, proven=False, statement=said), certain=False)
         if values.size and abs(values[0].real) <= bound * abs(values[0]):

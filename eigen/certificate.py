@@ -15,7 +15,7 @@ from .krylov import KrylovPairs, krylov_pairs
 from .operator import CoupledPencil, real_apply
 from .pairs import SAME, Found, acceptable, all_pairs, newton, normalised
 from .search import leading_modes
-from .spectrum import SearchOptions, Spectrum
+from .spectrum import SearchOptions, Spectrum, number_right_of
 
 
 @dataclass(frozen=True)
@@ -388,8 +388,7 @@ def _judged(pencil, options, search, workspace, spectrum, basis, finer=0, within
 
 def listed_unstable(spectrum: Spectrum, count: Count) -> int:
     """Number of eigenvalues of a spectrum in the region of a count, conjugates counted apart."""
-    inside = np.flatnonzero(spectrum.frequency <= count.band)
-    return spectrum.select(inside).count_right_of(count.line)
+    return number_right_of(spectrum.eigenvalues, count.line, count.band)
 
 
 def response_error(

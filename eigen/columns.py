@@ -18,7 +18,7 @@ from .operator import CoupledPencil
 from .pairs import acceptable, newton
 from .reduction import OPTIONS, FamilyReduction
 from .search import leading_modes
-from .spectrum import Spectrum
+from .spectrum import Spectrum, number_right_of
 
 #: How a cell was found.
 REDUCED, DIRECT, MISSING = 0, 1, 2
@@ -50,7 +50,7 @@ class Cell:
         """Cell of the leading ones of some eigenvalues and a count, which is certain if that is as well."""
         number = found.number if isinstance(found, Count) else found.counted
         certain = bool(certain and found.certain and len(listed))
-        unstable = _unstable(values, found.line, found.band)
+        unstable = number_right_of(values, found.line, found.band)
         return cls(
             listed[: OPTIONS.kept], Certificate(unstable, number, certain, float(found.line), float(found.band)), how
         )
@@ -340,7 +340,7 @@ def cell_beside(reduction: FamilyReduction, mu: Hashable, error: float, safety: 
     doubt = np.maximum(np.abs(change), error * np.abs(leading)) / np.abs(leading.real)
     clear = bool(np.isfinite(leading).all() and doubt.max(initial=0.0) <= 1.0 / safety)
     band = _counted_band(family, mu)
-    number = _unstable(values, 0.0, band)
+    number = number_right_of(values, 0.0, band)
     return Cell.of(leading, leading, Certificate(number, number, True, 0.0, band), clear, REDUCED)
 
 
@@ -453,12 +453,6 @@ def _lacks(searched: np.ndarray, listed: np.ndarray, error: float) -> bool:
     near = listed[listed.real > -2.0 * error * np.abs(listed)]
     apart = np.abs(near[:, None] - searched).min(axis=1, initial=np.inf)
     return bool((apart > CERTIFICATES.apart * np.abs(near)).any())
-
-
-def _unstable(values: np.ndarray, line: float, band: float) -> int:
-    """Number of eigenvalues right of a line up to a band, Hz, conjugates counted apart."""
-    inside = (values.real > line) & (values.imag <= 2 * np.pi * band)
-    return int(np.where(values.imag > 0, 2, 1)[inside].sum())
 
 
 def spread(points, number: int) -> list[int]:

@@ -16,6 +16,12 @@ END = 0.97
 LOWEST, SLOPE = 0.05, 0.75
 
 
+def number_right_of(values: np.ndarray, line: float = 0.0, band: float = math.inf) -> int:
+    """Number of eigenvalues right of a line up to a band, Hz, conjugates, of which one is given, counted apart."""
+    inside = (values.real > line) & (values.imag <= 2 * np.pi * band)
+    return int(np.where(values.imag > 0, 2, 1)[inside].sum())
+
+
 @dataclass(frozen=True)
 class SearchOptions:
     """Options of `leading_modes`.
@@ -276,8 +282,7 @@ class Spectrum:
 
     def count_right_of(self, line: float) -> int:
         """Number of eigenvalues listed right of a line, conjugates counted apart."""
-        right = self.eigenvalues.real > line
-        return int(np.where(self.eigenvalues.imag > 0, 2, 1)[right].sum())
+        return number_right_of(self.eigenvalues, line)
 
     def mode(self, index: int) -> Mode:
         """One pair."""

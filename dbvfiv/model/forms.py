@@ -15,7 +15,7 @@ import numpy as np
 
 from continuation.normal_form import Motion
 from continuation.system import expand
-from eigen.factor import SingularShiftError, Workspace
+from eigen.factor import Workspace, first_regular
 from eigen.operator import CoupledPencil, real_apply
 
 from .dynamics import linearise
@@ -141,19 +141,6 @@ class ValveForms:
         return tuple(np.split(joined, [n, 2 * n, 3 * n, 3 * n + inner]))
 
 
-def factored(pencil: CoupledPencil, shift: complex):
-    """LU at a shift, a hair beside it where an eigenvalue sits on it to rounding: products use the exact shift, so
-    bordered solves refine themselves.
-    """
-    size = max(abs(shift), 1.0)
-    for nudge in (0.0, 1e-9, -1e-8, 1e-7, -1e-6):
-        try:
-            return Workspace().shifted(pencil, shift + nudge * size)
-        except SingularShiftError as error:
-            refused = error
-    raise refused
-
-
 class PencilAt:
     """T(s) of a coupled pencil as products and solves in (q, U).
 
@@ -169,7 +156,9 @@ class PencilAt:
 
     @cached_property
     def _factor(self):
-        return factored(self.pencil, self.s)
+        # a hair beside an eigenvalue to rounding: products use s itself, so bordered solves refine themselves
+        shifts = (self.s + nudge * max(abs(self.s), 1.0) for nudge in (0.0, 1e-9, -1e-8, 1e-7, -1e-6))
+        return first_regular(Workspace().shifted, self.pencil, shifts)[1]
 
     def matvec(self, x):
         return np.concatenate(self.pencil.apply(self.s, *self._parts(x)))

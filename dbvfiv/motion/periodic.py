@@ -25,7 +25,7 @@ import scipy.sparse as sp
 from continuation.blocks import BlockRows, SparseBlocks
 from continuation.harmonics import Harmonics, Rates
 from continuation.options import OutOfDomain
-from continuation.periodic import PeriodicMotion, PeriodicOperator, Term
+from continuation.periodic import PeriodicMotion, PeriodicOperator, Term, by_parts
 from eigen.factor import SingularShiftError, Workspace
 from eigen.operator import FLUID_PARTS, CoupledPencil
 
@@ -475,8 +475,9 @@ class AveragedSolves:
 
     def __call__(self, coefficients: np.ndarray) -> np.ndarray:
         """Coefficients (2 H + 1, n + l), real or complex, of solutions."""
-        if np.iscomplexobj(coefficients):
-            return self(coefficients.real) + 1j * self(coefficients.imag)
+        return by_parts(self._solved, coefficients)
+
+    def _solved(self, coefficients: np.ndarray) -> np.ndarray:
         n, h = self.size, self.harmonics
         found = np.vstack(self._factor.solve(coefficients[:, :n].T, coefficients[:, n:].T / self.weight)).T
         return h.real(self._shares[:, None] * h.complex(np.real(found)))
@@ -560,17 +561,11 @@ class MemoryTerm:
     def apply(self, samples: np.ndarray, rates: Rates) -> np.ndarray:
         """Samples (N, size) of forces for those of a change."""
         n = self.q.shape[1]
-        held = self.memory.filtered(self._slopes(samples[:, :n]), rates)
+        held = self.memory.filtered(self._each(self.memory.slopes, samples[:, :n]), rates)
         out = np.zeros((len(samples), self.size), held.dtype)
-        out[:, :n] = self._forces(held)
+        out[:, :n] = self._each(self.memory.force, held)
         return out
 
-    def _slopes(self, ways: np.ndarray) -> np.ndarray:
-        if np.iscomplexobj(ways):
-            return self._slopes(ways.real) + 1j * self._slopes(ways.imag)
-        return np.stack([self.memory.slopes(q, way) for q, way in zip(self.q, ways)])
-
-    def _forces(self, held: np.ndarray) -> np.ndarray:
-        if np.iscomplexobj(held):
-            return self._forces(held.real) + 1j * self._forces(held.imag)
-        return np.stack([self.memory.force(q, h) for q, h in zip(self.q, held)])
+    def _each(self, function, samples: np.ndarray) -> np.ndarray:
+        """What a function of the positions is at the samples of something real or complex, linear in that."""
+        return by_parts(lambda part: np.stack([function(q, one) for q, one in zip(self.q, part)]), samples)
