@@ -80,7 +80,9 @@ def test_series_are_exact():
     [(0.5, 6.380676, 2.002488, 0.0391769), (1.0, 6.663287, 2.008620, 8.59695e-4)],
 )
 def test_van_der_pol(mu, period, amplitude, multiplier):
-    """To the printed digits, as an equation of second order and as two of first order."""
+    """To the printed digits, as an equation of second order and as two of first order; by Liouville's formula the
+    product of the multipliers is exp of the integrated divergence.
+    """
     system = periodic.van_der_pol()
     guess = periodic.guess_of(2 * np.cos(PHASE)[:, None], 30, 1.0)
     solver, cycle = solved(system, guess, {"mu": mu})
@@ -91,6 +93,11 @@ def test_van_der_pol(mu, period, amplitude, multiplier):
     assert abs(found.multipliers[0] - multiplier) < 0.51 * digit and found.trivial < 1e-8 and found.stable
     orbit = find_orbit(first_order_van_der_pol(), 2 * CIRCLE * [1, -1], 6.4, {"mu": mu})
     assert np.isclose(cycle.motion.period, orbit.period, rtol=1e-9)
+    assert abs(orbit.period - period) < 5.1e-7 and abs(orbit.amplitude()[0] - amplitude) < 5.1e-7
+    assert abs(orbit.nontrivial[0] - multiplier) < 0.51 * digit
+    t = np.linspace(0, orbit.period, 2001)[:-1]
+    divergence = np.mean(mu * (1 - orbit(t)[:, 0] ** 2)) * orbit.period
+    assert np.isclose(np.prod(orbit.multipliers).real, np.exp(divergence), rtol=1e-6)
 
 
 def test_more_harmonics_leave_less():

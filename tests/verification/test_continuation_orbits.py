@@ -4,32 +4,11 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from continuation import ContinuationOptions, find_orbit, orbit_at, orbits_from_hopf, special_orbit
+from continuation import ContinuationOptions, orbit_at, orbits_from_hopf, special_orbit
 from tests.systems.brusselator import brusselator
 from tests.systems.following import follow, normal_form_of
 from tests.systems.langford import langford
 from tests.systems.lorenz import lorenz
-from tests.systems.van_der_pol import van_der_pol
-
-PHASE = 2 * np.pi * np.arange(80) / 80
-
-
-@pytest.mark.parametrize(
-    ("mu", "period", "amplitude", "multiplier"),
-    [(0.5, 6.380676, 2.002488, 0.0391769), (1.0, 6.663287, 2.008620, 8.59695e-4)],
-)
-def test_van_der_pol(mu, period, amplitude, multiplier):
-    """To the printed digits."""
-    guess = 2 * np.stack([np.cos(PHASE), -np.sin(PHASE)], axis=1)
-    orbit = find_orbit(van_der_pol(), guess, 2 * np.pi, {"mu": mu})
-    assert abs(orbit.period - period) < 5.1e-7
-    assert abs(orbit.amplitude()[0] - amplitude) < 5.1e-7
-    digit = 10.0 ** (np.floor(np.log10(multiplier)) - 5)
-    assert abs(orbit.nontrivial[0] - multiplier) < 0.51 * digit
-    # Liouville: the product of the multipliers is exp of the integrated divergence.
-    t = np.linspace(0, orbit.period, 2001)[:-1]
-    divergence = np.mean(mu * (1 - orbit(t)[:, 0] ** 2)) * orbit.period
-    assert np.isclose(np.prod(orbit.multipliers).real, np.exp(divergence), rtol=1e-6)
 
 
 def test_langford():
