@@ -119,17 +119,8 @@ class Column:
         return 0.0 if self.model is None else self.model.error
 
     @property
-    def growth_rate(self) -> np.ndarray:
-        """Growth rates of the leading modes (cells,), 1/s; NaN where none was found."""
-        return self._leading.real
-
-    @property
-    def frequency(self) -> np.ndarray:
-        """Frequencies of the leading modes (cells,), Hz."""
-        return self._leading.imag / (2 * np.pi)
-
-    @property
-    def _leading(self) -> np.ndarray:
+    def leading(self) -> np.ndarray:
+        """Leading eigenvalue of each cell (cells,), complex, 1/s; NaN where none was found."""
         missing = complex(np.nan, np.nan)
         return np.array([cell.leading[0] if len(cell.leading) else missing for cell in self.cells])
 

@@ -156,7 +156,7 @@ def test_columns_carry_certificates_whatever_relaxes():
     for i, condition in enumerate(conditions):
         values = dense(family, condition)
         leading = family.reach(condition).leading(values)[0]
-        assert column.growth_rate[i] == pytest.approx(leading.real, abs=1e-6 * abs(leading))
+        assert column.leading[i].real == pytest.approx(leading.real, abs=1e-6 * abs(leading))
         assert column.unstable[i] == column.cells[i].certificate.counted == (values.real > 0).sum()
 
 
@@ -201,5 +201,5 @@ def test_columns_without_any_mode():
     conditions = [c for c in drawn if not family.reach(c).leading(dense(family, c)).size]
     assert len(conditions) > 3
     column = ColumnSolver().solve(family, conditions)
-    assert np.isnan(column.growth_rate).all() and not column.certified.any()
+    assert np.isnan(column.leading).all() and not column.certified.any()
     assert [(dense(family, c).real > 0).sum() for c in conditions] == list(column.unstable)

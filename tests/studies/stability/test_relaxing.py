@@ -52,7 +52,7 @@ def test_cells_agree_with_the_full_pencil(lossy_case, lossy_walk, parameter, val
     assert column.certified.all() and (column.how == 0).sum() > 6
     for i in range(0, 9, 2):
         full = lossy_walk.spectrum(places[i])
-        found = complex(column.growth_rate[i], 2 * np.pi * column.frequency[i])
+        found = column.leading[i]
         assert abs(found - full.eigenvalues[0]) < 1e-6 * abs(full.eigenvalues[0])
         assert column.unstable[i] == column.cells[i].certificate.counted == full.unstable_count
 
