@@ -225,65 +225,60 @@ class Bordered:
     """
 
     def __init__(self, inner, column, row, corner=0.0):
-        self.inner = inner
-        self.b = np.asarray(column)
-        self.c = np.asarray(row)
-        self.d = corner
-        self.size = self.b.size + 1
+        b, c, self.d = np.asarray(column), np.asarray(row), corner
         with np.errstate(all="ignore"):
-            self._v = inner.solve(self.b)
-            self._w = inner.solve_transpose(self.c)
-            self._delta = self.d - self.c @ self._v
-            self._delta_star = self.d - self._w @ self.b
-        sizes = np.array([abs(self._delta), abs(self._delta_star)])
+            v, w = inner.solve(b), inner.solve_transpose(c)
+            delta, delta_star = corner - c @ v, corner - w @ b
+        #: Product, solve, column, row, solutions with both and Schur complements by both, of the matrix and of its
+        #: transpose.
+        self._plain = inner.matvec, inner.solve, b, c, v, w, delta, delta_star
+        self._turned = inner.rmatvec, inner.solve_transpose, c, b, w, v, delta_star, delta
+        sizes = np.array([abs(delta), abs(delta_star)])
         if not np.all(np.isfinite(sizes)) or np.any(sizes == 0.0):
             raise SingularSystem("The bordered matrix is singular: the border does not lift the rank loss.")
 
     @property
     def complement_sign(self) -> float:
         """Sign of ``d - c' A^-1 b``: of the determinant, over that of ``A`` (real matrices)."""
-        return float(np.sign(self._delta))
+        return float(np.sign(self._plain[-2]))
 
     def matvec(self, z):
-        x, y = z[:-1], z[-1]
-        return np.append(self.inner.matvec(x) + self.b * y, self.c @ x + self.d * y)
+        return self._apply(self._plain, z)
 
     def rmatvec(self, z):
-        x, y = z[:-1], z[-1]
-        return np.append(self.inner.rmatvec(x) + self.c * y, self.b @ x + self.d * y)
+        return self._apply(self._turned, z)
 
     def solve(self, rhs):
         """Solve with the bordered matrix; ``rhs`` of shape (n + 1,)."""
-        return self._refined(rhs, self._eliminate, self.matvec)
+        return self._refined(self._plain, rhs)
 
     def solve_transpose(self, rhs):
         """Solve with its plain transpose."""
-        return self._refined(rhs, self._eliminate_transpose, self.rmatvec)
+        return self._refined(self._turned, rhs)
 
-    def _eliminate(self, rhs):
+    def _apply(self, side, z):
+        multiply, _, column, row, *_ = side
+        x, y = z[:-1], z[-1]
+        return np.append(multiply(x) + column * y, row @ x + self.d * y)
+
+    def _eliminate(self, side, rhs):
+        _, solve, column, row, v, w, delta, delta_star = side
         f, g = rhs[:-1], rhs[-1]
-        y1 = (g - self._w @ f) / self._delta_star
-        x = self.inner.solve(f - self.b * y1)
-        y2 = (g - self.d * y1 - self.c @ x) / self._delta
-        return np.append(x - self._v * y2, y1 + y2)
+        y1 = (g - w @ f) / delta_star
+        x = solve(f - column * y1)
+        y2 = (g - self.d * y1 - row @ x) / delta
+        return np.append(x - v * y2, y1 + y2)
 
-    def _eliminate_transpose(self, rhs):
-        f, g = rhs[:-1], rhs[-1]
-        y1 = (g - self._v @ f) / self._delta
-        x = self.inner.solve_transpose(f - self.c * y1)
-        y2 = (g - self.d * y1 - self.b @ x) / self._delta_star
-        return np.append(x - self._w * y2, y1 + y2)
-
-    def _refined(self, rhs, eliminate, apply):
-        z = eliminate(rhs)
-        defect = rhs - apply(z)
+    def _refined(self, side, rhs):
+        z = self._eliminate(side, rhs)
+        defect = rhs - self._apply(side, z)
         size = np.abs(defect).max()
         floor = 4 * np.finfo(float).eps * np.abs(rhs).max(initial=0.0)
         for _ in range(REFINEMENTS):
             if not size > floor:
                 break
-            better = z + eliminate(defect)
-            defect = rhs - apply(better)
+            better = z + self._eliminate(side, defect)
+            defect = rhs - self._apply(side, better)
             new = np.abs(defect).max()
             if not new < size:
                 break
