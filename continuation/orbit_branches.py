@@ -182,9 +182,7 @@ def find_orbit(system, states, period: float, mu, options: OrbitOptions | None =
     require(period > 0, f"The period must be positive, not {period}.")
     states = numbers_of(states, "orbit", (None, system_of(system).size))
     require(len(states) >= 3, f"An orbit needs three states at least, not {len(states)}.")
-    series = np.fft.rfft(states, axis=0)[: min(options.harmonics, (len(states) - 1) // 2) + 1] / len(states)
-    h = Harmonics(len(series) - 1)
-    guess = PeriodicMotion(h, h.real(series), 2 * np.pi / period).resized(options.harmonics)
+    guess = PeriodicMotion.of_samples(states, options.harmonics, 2 * np.pi / period)
     solver = OrbitSolver(system, options)
     least = 1e-6 * np.linalg.norm(guess.coefficients[1:])
     require(least != 0.0, "The guess of an orbit must vary over its period.")
@@ -437,8 +435,7 @@ class _Follower:
         kept, scale, system = self.tracer.options, self.tracer.scale, self.tracer.solver.system.system
         omega = float(special.values["omega"])
         q = np.asarray(special.vectors["right"], complex)
-        q, h = q / np.linalg.norm(q), Harmonics(self.shape.harmonics)
-        rate, most = 0.0, np.inf
+        q, rate, most = q / np.linalg.norm(q), 0.0, np.inf
         try:
             form = hopf_normal_form(system, special.u, special.mu, omega, q, self.parameter)
             rate = -form.c1.real / form.crossing.real
@@ -450,9 +447,7 @@ class _Follower:
         radius = min(kept.step * np.sqrt(2.0 / (a**2 + np.sqrt(a**4 + (2 * b * kept.step) ** 2))), most)
         reason = ""
         for _ in range(HALVINGS):
-            wave = np.zeros((h.count + 1, system.size), complex)
-            wave[0], wave[1] = special.u, radius * q
-            small = PeriodicMotion(h, h.real(wave), omega)
+            small = PeriodicMotion.of_waves([special.u, radius * q], self.shape.harmonics, omega)
             row = small.coefficients / np.linalg.norm(small.coefficients[1:])
             row[0] = 0.0
             try:

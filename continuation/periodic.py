@@ -45,6 +45,18 @@ class PeriodicMotion:
     coefficients: np.ndarray
     omega: float
 
+    @classmethod
+    def of_waves(cls, waves: Sequence[np.ndarray], count: int, omega: float) -> PeriodicMotion:
+        """Motion of H harmonics, c_0 + 2 Re sum c_k exp(i k omega t) with the first few c_k (n,)."""
+        few = Harmonics(len(waves) - 1)
+        return cls(few, few.real(np.array(waves, complex)), omega).resized(count)
+
+    @classmethod
+    def of_samples(cls, samples: np.ndarray, count: int, omega: float) -> PeriodicMotion:
+        """Motion of H harmonics from equally spaced samples (N, n) of a period, the end not repeated."""
+        waves = np.fft.rfft(samples, axis=0)[: min(count, (len(samples) - 1) // 2) + 1] / len(samples)
+        return cls.of_waves(waves, count, omega)
+
     @cached_property
     def samples(self) -> np.ndarray:
         """(N, n)."""

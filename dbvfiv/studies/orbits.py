@@ -12,7 +12,6 @@ from continuation.amplitude import AmplitudeEquation, amplitude_equation
 from continuation.cycle_branch import CycleTracer
 from continuation.cycle_points import CyclePoint
 from continuation.cycles import Cycle, CycleSolver, cycles_beside_onset
-from continuation.harmonics import Harmonics
 from continuation.options import ContinuationError, ContinuationOptions, OrbitOptions
 from continuation.periodic import PeriodicMotion, peak
 
@@ -216,7 +215,7 @@ class Follower:
         ------
         SolveError
         """
-        mu, h, mode = onset.place.for_system(), Harmonics(HARMONICS), onset.mode
+        mu, mode = onset.place.for_system(), onset.mode
         model = self.system.model(mu)
         q, amplitude = self.walk.equilibrium(onset.place), self.case.cycle.amplitude
         inner = model.flow.steady_inner(model.rows.areas(model.nodal(q)), mu)
@@ -225,9 +224,8 @@ class Follower:
             raise SolveError(
                 "The mode that becomes unstable does not move the middle of the lips, by which cycles are told."
             )
-        wave = np.zeros((HARMONICS + 1, self.system.size), complex)
-        wave[0], wave[1] = np.concatenate([q, inner]), 0.5 * amplitude * shape / shape[self.lip]
-        small = PeriodicMotion(h, h.real(wave), abs(onset.eigenvalue.imag))
+        waves = np.concatenate([q, inner]), 0.5 * amplitude * shape / shape[self.lip]
+        small = PeriodicMotion.of_waves(waves, HARMONICS, abs(onset.eigenvalue.imag))
         row = np.zeros_like(small.coefficients)
         row[1, self.lip] = 1.0
         try:

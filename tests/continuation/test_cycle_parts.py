@@ -159,7 +159,7 @@ def test_eigenvalues_in_the_circle_are_all_found():
 @pytest.mark.parametrize("tolerance", [1e-3, 1e-5, 1e-7])
 def test_corrections_leave_less_than_their_tolerance(tolerance):
     system = periodic.van_der_pol()
-    guess = periodic.guess_of(1.9 * np.cos(2 * np.pi * np.arange(64) / 64)[:, None], 9, 1.0)
+    guess = PeriodicMotion.of_samples(1.9 * np.cos(2 * np.pi * np.arange(64) / 64)[:, None], 9, 1.0)
     found, exact = (CycleSolver(system, system.basis, t).solve(guess, {"mu": 0.5}) for t in (tolerance, 1e-12))
     change = np.abs(found.motion.coefficients - exact.motion.coefficients).max()
     assert change <= tolerance * np.abs(exact.motion.coefficients[1:]).max()

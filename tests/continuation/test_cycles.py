@@ -84,7 +84,7 @@ def test_van_der_pol(mu, period, amplitude, multiplier):
     product of the multipliers is exp of the integrated divergence.
     """
     system = periodic.van_der_pol()
-    guess = periodic.guess_of(2 * np.cos(PHASE)[:, None], 30, 1.0)
+    guess = PeriodicMotion.of_samples(2 * np.cos(PHASE)[:, None], 30, 1.0)
     solver, cycle = solved(system, guess, {"mu": mu})
     x = cycle.motion.at(np.linspace(0, 2 * np.pi, 4000))[:, 0]
     assert abs(cycle.motion.period - period) < 5.1e-7 and abs(x.max() - amplitude) < 1.5e-6
@@ -104,7 +104,7 @@ def test_more_harmonics_leave_less():
     """The share of the last two harmonics bounds the error of amplitude and period."""
     system, errors, tails = periodic.van_der_pol(), [], []
     for count in (7, 11, 15):
-        _, cycle = solved(system, periodic.guess_of(2 * np.cos(PHASE)[:, None], count, 1.0), {"mu": 1.0})
+        _, cycle = solved(system, PeriodicMotion.of_samples(2 * np.cos(PHASE)[:, None], count, 1.0), {"mu": 1.0})
         errors.append(abs(cycle.motion.period - 6.66328686) / 6.663)
         tails.append(cycle.motion.tail)
     assert np.all(np.array(errors) < tails) and errors[2] < 1e-2 * errors[0]
@@ -114,7 +114,7 @@ def test_forced_duffing_against_integration():
     """Forced and damped: the motion, and the multipliers of its variational equation."""
     mu = {"w": 1.1, "d": 0.15, "e": 1.0, "f": 0.5}
     system = periodic.duffing()
-    solver, cycle = solved(system, periodic.guess_of(-1.2 * np.sin(PHASE - 0.5)[:, None], 11, 1.0), mu)
+    solver, cycle = solved(system, PeriodicMotion.of_samples(-1.2 * np.sin(PHASE - 0.5)[:, None], 11, 1.0), mu)
 
     def rate(t, u):
         x, v, *m = u
@@ -140,7 +140,7 @@ def test_folds_of_the_forced_duffing():
     """
     mu = {"w": 0.8, "d": 0.02, "e": 0.02, "f": 0.05}
     system = periodic.duffing()
-    guess = periodic.guess_of(0.15 * np.cos(PHASE)[:, None], 5, 1.0)
+    guess = PeriodicMotion.of_samples(0.15 * np.cos(PHASE)[:, None], 5, 1.0)
     options = ContinuationOptions(
         max_step=0.4, parameter_scales={"w": 0.2}, limits={"w": (0.5, 1.3)}, max_points=150, location_tolerance=1e-2
     )
@@ -179,7 +179,7 @@ def test_torus_of_langford():
     """Neimark-Sacker at exactly mu = 2 with exponents +- i sqrt(1.2) modulo the frequency 1/4."""
     system = periodic.of_first_order(langford()._residual, 3)
     samples = np.hstack([CIRCLE, np.ones((64, 1))])
-    guess = periodic.guess_of(samples, 3, 0.25)
+    guess = PeriodicMotion.of_samples(samples, 3, 0.25)
     tracer, reason = trace(
         system, guess, {"mu": 1.95}, 1.96, "mu", step=0.02, max_step=0.05, limits=(1.9, 2.05), located=1e-9
     )
@@ -200,7 +200,7 @@ def test_period_doubling_of_an_adaptive_control_system():
     )
     wave = 0.2 * np.stack([np.cos(PHASE), -np.sin(PHASE), -np.cos(PHASE)], axis=1)
     options = {"step": 0.05, "max_step": 0.2, "limits": (0.55, 1.0), "located": 1e-9, "tail": 1e-7, "max_harmonics": 40}
-    guess = periodic.guess_of(wave, 9, 1.0)
+    guess = PeriodicMotion.of_samples(wave, 9, 1.0)
     tracer, reason = trace(system, guess, {"a": 0.97, "b": 1.0}, 0.96, "a", **options)
     assert reason.startswith("ended on the limit a")
     (point,) = tracer.special
@@ -216,7 +216,7 @@ def test_period_doubling_of_an_adaptive_control_system():
 def test_a_branch_between_two_onsets_ends_at_the_second():
     """z' = (mu (1 - mu) + i) z - z|z|^2: radius sqrt(mu (1 - mu)), back on itself beyond 1."""
     system = periodic.of_first_order(circling(lambda mu: mu * (1 - mu)), 2)
-    guess = periodic.guess_of(0.2 * CIRCLE, 2, 1.0)
+    guess = PeriodicMotion.of_samples(0.2 * CIRCLE, 2, 1.0)
     options = {"step": 0.1, "max_step": 0.1, "limits": (-1.0, 2.0), "max_points": 60}
     tracer, reason = trace(system, guess, {"mu": 0.04}, 0.06, "mu", **options)
     assert "shrinks to nothing" in reason and len(tracer.points) < 30
@@ -226,7 +226,7 @@ def test_a_branch_between_two_onsets_ends_at_the_second():
 
 def test_events_are_located():
     """The radius of Stuart and Landau's cycle, sqrt(mu), passes 0.6 at 0.36."""
-    system, guess = periodic.of_first_order(circling(lambda mu: mu), 2), periodic.guess_of(0.3 * CIRCLE, 2, 1.0)
+    system, guess = periodic.of_first_order(circling(lambda mu: mu), 2), PeriodicMotion.of_samples(0.3 * CIRCLE, 2, 1.0)
     event = {"radius": lambda cycle: float(np.linalg.norm(cycle.motion.at([0.0]))) - 0.6}
     options = ContinuationOptions(limits={"mu": (0.0, 0.5)}, location_tolerance=1e-9)
     tracer = begun(system, guess, {"mu": 0.09}, 0.12, "mu", options, values=(0.2, 0.3), events=event)
@@ -250,7 +250,7 @@ def test_an_event_that_ends_a_branch_is_located_from_one_side():
                 raise OutOfDomain("beyond the wall")
             return super().residual(motion, mu)
 
-    rate, guess = circling(lambda mu: mu), periodic.guess_of(0.3 * CIRCLE, 2, 1.0)
+    rate, guess = circling(lambda mu: mu), PeriodicMotion.of_samples(0.3 * CIRCLE, 2, 1.0)
     system = Walled(lambda u, v, a, t, mu: v - rate(u, mu), 2)
     event = {"wall": lambda cycle: 0.6 - float(np.linalg.norm(cycle.motion.at([0.0])))}
     options = ContinuationOptions(limits={"mu": (0.0, 0.5)})
@@ -268,12 +268,12 @@ def test_an_event_that_ends_a_branch_is_located_from_one_side():
 def test_a_guess_that_is_no_cycle():
     system = periodic.of_first_order(lambda u, mu: jnp.stack([-u[0] - u[1], u[0] - u[1]]), 2)
     with pytest.raises(NotConverged, match="No periodic motion"):
-        solved(system, periodic.guess_of(CIRCLE, 3, 1.0), {"mu": 0.0})
+        solved(system, PeriodicMotion.of_samples(CIRCLE, 3, 1.0), {"mu": 0.0})
 
 
 def test_too_few_harmonics_end_a_branch_with_a_sentence():
     system = periodic.van_der_pol()
-    guess = periodic.guess_of(2 * np.cos(PHASE)[:, None], 9, 1.0)
+    guess = PeriodicMotion.of_samples(2 * np.cos(PHASE)[:, None], 9, 1.0)
     tracer, reason = trace(
         system, guess, {"mu": 0.5}, 0.6, "mu", max_step=0.5, limits=(0.1, 9.0), tail=1e-3, max_harmonics=13
     )
@@ -286,7 +286,7 @@ def test_bad_options():
         Harmonics(3, 6)
     with pytest.raises(ValueError, match="condition"):
         system = periodic.van_der_pol()
-        solved(system, periodic.guess_of(np.cos(PHASE)[:, None], 3, 1.0), {"mu": 0.5}, free=("mu",))
+        solved(system, PeriodicMotion.of_samples(np.cos(PHASE)[:, None], 3, 1.0), {"mu": 0.5}, free=("mu",))
 
 
 def test_motions_are_resized():

@@ -6,8 +6,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from continuation.harmonics import Harmonics
-from continuation.periodic import PeriodicMotion, PeriodicOperator, Term
+from continuation.periodic import PeriodicOperator, Term
 
 
 class SmallPeriodic:
@@ -36,15 +35,6 @@ class SmallPeriodic:
     @property
     def basis(self):
         return np.eye(self.size)
-
-
-def guess_of(samples, count: int, omega: float) -> PeriodicMotion:
-    """A motion of a few harmonics from its samples (N, n) over a period, the end not repeated."""
-    c = np.fft.rfft(samples, axis=0)[: count + 1] / len(samples)
-    padded = np.zeros((count + 1, samples.shape[1]), complex)
-    padded[: len(c)] = c
-    h = Harmonics(count)
-    return PeriodicMotion(h, h.real(padded), omega)
 
 
 def van_der_pol() -> SmallPeriodic:

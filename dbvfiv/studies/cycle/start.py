@@ -6,7 +6,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from continuation.harmonics import Harmonics
 from continuation.periodic import PeriodicMotion
 
 from ...case.parameters import PARAMETERS, Mu
@@ -181,5 +180,4 @@ def _last_period(model: ValveModel, case: Case, place: Mu, result) -> PeriodicMo
     # what is not periodic yet is spread over the period
     drift = np.append(now.q, now.fluid.velocity) - samples[0]
     rows = np.array(samples) - np.linspace(0.0, 1.0, STEPS, endpoint=False)[:, None] * drift
-    h = Harmonics(min(HARMONICS, case.cycle.max_harmonics))
-    return PeriodicMotion(h, h.real(np.fft.rfft(rows, axis=0)[: h.count + 1] / STEPS), 2 * np.pi / period)
+    return PeriodicMotion.of_samples(rows, min(HARMONICS, case.cycle.max_harmonics), 2 * np.pi / period)
