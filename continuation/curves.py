@@ -56,9 +56,7 @@ class FoldCurveMonitor(Monitor):
         system = tracer.problem.system
         v = value.v / np.linalg.norm(value.v)
         w = value.w / np.linalg.norm(value.w)
-        last = point.data.get("orientation")
-        if last is None:
-            last = getattr(self, "_last", (v, w))
+        last = point.data.get("orientation", getattr(self, "_last", (v, w)))
         # Null vectors have no sign of their own; keep that of the point before.
         v = v if v @ last[0] >= 0 else -v
         w = w if w @ last[1] >= 0 else -w
@@ -139,10 +137,9 @@ class HopfCurveMonitor(Monitor):
         special = []
         if after.tests["omega"] <= 0.0 < before.tests["omega"]:
             return [self._end(tracer, before, after, index)]
-        if before.tests["l1"] * after.tests["l1"] < 0:
-            special += self._root(tracer, "generalised hopf", "l1", before, after, index)
-        if before.tests["zero-hopf"] * after.tests["zero-hopf"] < 0:
-            special += self._root(tracer, "zero-hopf", "zero-hopf", before, after, index)
+        for kind, name in (("generalised hopf", "l1"), ("zero-hopf", "zero-hopf")):
+            if before.tests[name] * after.tests[name] < 0:
+                special += self._root(tracer, kind, name, before, after, index)
         return special
 
     def _root(self, tracer, kind, name, before, after, index):

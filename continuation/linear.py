@@ -28,7 +28,17 @@ SYMMETRIC = "MMD_AT_PLUS_A"
 REFINEMENTS = 2
 
 
-class DenseSolver:
+class _Solver:
+    """Products with the matrix of a factorisation."""
+
+    def matvec(self, x):
+        return self.matrix @ x
+
+    def rmatvec(self, x):
+        return self.matrix.T @ x
+
+
+class DenseSolver(_Solver):
     """LU of a dense matrix; exactly zero pivots are repaired."""
 
     def __init__(self, matrix: np.ndarray):
@@ -49,12 +59,6 @@ class DenseSolver:
             lu[i, i] = floor
         self._lu = lu
 
-    def matvec(self, x):
-        return self.matrix @ x
-
-    def rmatvec(self, x):
-        return self.matrix.T @ x
-
     def solve(self, rhs):
         return sla.lu_solve((self._lu, self._pivots), rhs, check_finite=False)
 
@@ -67,7 +71,7 @@ class DenseSolver:
         return float(np.prod(np.sign(np.diagonal(self._lu)))) * (-1.0) ** swaps
 
 
-class SparseSolver:
+class SparseSolver(_Solver):
     """SuperLU of a sparse matrix; a singular one is shifted by a rounding-sized multiple of 1."""
 
     def __init__(self, matrix: sp.spmatrix, ordering: str = "COLAMD"):
@@ -85,12 +89,6 @@ class SparseSolver:
             except RuntimeError as error:
                 raise SingularSystem(f"The sparse factorisation failed: {error}.") from error
             self.repaired = True
-
-    def matvec(self, x):
-        return self.matrix @ x
-
-    def rmatvec(self, x):
-        return self.matrix.T @ x
 
     def determinant_sign(self):
         """Sign of the determinant of the (real) matrix factorised."""

@@ -81,10 +81,7 @@ class SpectrumMonitor(Monitor):
             result = ask(problem.u(point.z), problem.mu(point.z), options.eigenvalues, options.near)
             point.data["modes"] = result.upper_half()
             point.eigenvalues = point.data["modes"][0]
-            complete = bool(np.all(result.converged))
-            point.unstable = -1
-            if complete:
-                point.unstable = count_unstable(point.eigenvalues)
+            point.unstable = count_unstable(point.eigenvalues) if np.all(result.converged) else -1
         return point.data["modes"]
 
     def measure(self, tracer, point):

@@ -477,9 +477,7 @@ class Tracer:
 
     def _land_on_limit(self, before, after, crossed, ending):
         """The last point, exactly on the limit that the curve crosses; why the branch ends; what went wrong."""
-        if ending is None and crossed is None:
-            return after, None, None
-        if ending is not None:
+        if ending is not None or crossed is None:
             return after, ending, None
         (i, limit), n = crossed, self.problem.n
         ending = Reason.LIMIT(name=self.problem.names[i], value=limit)
