@@ -9,6 +9,7 @@ from functools import cached_property
 import numpy as np
 import scipy.linalg as la
 import scipy.sparse as sp
+import scipy.sparse.linalg as spla
 
 from .spectrum import CLEAR
 
@@ -311,6 +312,19 @@ class CoupledPencil:
         A, B, R, S = ([none.get(f"{n}{k}", getattr(self, f"{n}{k}", None)) for k in range(3)] for n in "ABRS")
         return [np.block([[-a, -b], [r, s]]) for a, b, r, s in zip(A, B, R, S)]
 
+    @cached_property
+    def norms(self) -> tuple[np.ndarray, ...]:
+        """Norms by powers of lambda of what acts on q and on U, in the structure and in each row of the fluid, as rows
+        may carry different units; and those of the parts that relax.
+        """
+        g, j = _norm(self.G), _norm(self.J)
+        pairs = (self.K, self.A0), (self.C, self.A1), (self.M, self.A2)
+        structure = [_norm(wall) + g * j * np.linalg.norm(a) for wall, a in pairs]
+        inner = [g * np.linalg.norm(b) for b in (self.B0, self.B1)]
+        rows = [j * np.linalg.norm(r, axis=1) for r in (self.R0, self.R1, self.R2)]
+        own = [np.linalg.norm(s, axis=1) for s in (self.S0, self.S1)]
+        return tuple(map(np.array, (structure, inner, rows, own, [_norm(matrix) for matrix in self.relaxing])))
+
     def apply(self, s, q: np.ndarray, u: np.ndarray, transposed: bool = False) -> tuple[np.ndarray, np.ndarray]:
         """T(s) x of vectors (q, u), each column with an s of its own where s is (k,); see `polynomial`."""
         f, g = self.polynomial((q, u), (s * q, s * u), (s * s * q, s * s * u), transposed=transposed)
@@ -396,6 +410,12 @@ class CoupledPencil:
             F[z, z] = -np.eye(n)
             E[z, z] = self.relaxation.times[j] * np.eye(n)
         return F, E
+
+
+def _norm(matrix) -> float:
+    if 0 in matrix.shape or matrix.nnz == 0:
+        return 0.0
+    return float(np.sqrt(spla.norm(matrix, 1) * spla.norm(matrix, np.inf)))
 
 
 def fluid_values(p: Mapping[str, np.ndarray], s: complex):

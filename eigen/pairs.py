@@ -4,11 +4,9 @@ from __future__ import annotations
 
 from contextlib import suppress
 from dataclasses import dataclass, field
-from functools import cached_property
 
 import numpy as np
 import scipy.linalg as la
-import scipy.sparse.linalg as spla
 
 from .factor import SingularShiftError, Workspace, first_regular
 from .operator import CoupledPencil, real_apply
@@ -94,63 +92,38 @@ def _largest(matrix) -> float:
 ROUNDING = 64 * np.finfo(float).eps
 
 
-class Residuals:
-    """Residuals of pairs of one pencil.
+def measure(pencil: CoupledPencil, eigenvalues, q, u) -> tuple[np.ndarray, np.ndarray]:
+    """Residual and backward error of pairs, as `Spectrum` defines them.
 
     Parameters
     ----------
     pencil : CoupledPencil
+    eigenvalues : array, shape (k,)
+    q, u : arrays, shapes (n, k) and (b, k)
+
+    Returns
+    -------
+    residual, backward_error : ndarray, shape (k,)
     """
-
-    def __init__(self, pencil: CoupledPencil):
-        self.pencil = pencil
-
-    @cached_property
-    def _norms(self) -> tuple[np.ndarray, ...]:
-        """Norms by powers of lambda of what acts on q and on U, in the structure and in each row of the fluid; rows may
-        carry different units.
-        """
-        p, g, j = self.pencil, _norm(self.pencil.G), _norm(self.pencil.J)
-        structure = [_norm(own) + g * j * np.linalg.norm(a) for own, a in ((p.K, p.A0), (p.C, p.A1), (p.M, p.A2))]
-        coupling = [g * np.linalg.norm(b) for b in (p.B0, p.B1)]
-        rows = [j * np.linalg.norm(r, axis=1) for r in (p.R0, p.R1, p.R2)]
-        return tuple(map(np.array, (structure, coupling, rows, [np.linalg.norm(s, axis=1) for s in (p.S0, p.S1)])))
-
-    @cached_property
-    def _relaxing_norms(self) -> np.ndarray:
-        return np.array([_norm(matrix) for matrix in self.pencil.relaxing])
-
-    def measure(self, eigenvalues, q, u) -> tuple[np.ndarray, np.ndarray]:
-        """Residual and backward error of pairs, as `Spectrum` defines them.
-
-        Parameters
-        ----------
-        eigenvalues : array, shape (k,)
-        q, u : arrays, shapes (n, k) and (b, k)
-
-        Returns
-        -------
-        residual, backward_error : ndarray, shape (k,)
-        """
-        s = np.asarray(eigenvalues)
-        if not s.size:
-            return np.zeros(0), np.zeros(0)
-        structure, fluid = self.pencil.terms(s, q, u)
-        left = np.linalg.norm(sum(structure), axis=0)
-        terms = sum(np.linalg.norm(t, axis=0) for t in structure)
-        powers = np.abs(s) ** np.arange(3)[:, None]
-        size_q, size_u = np.linalg.norm(q, axis=0), np.linalg.norm(u, axis=0)
-        on_q, on_u, rows_on_q, rows_on_u = self._norms
-        stiffness = on_q @ powers
-        if self.pencil.relaxation is not None:
-            stiffness = stiffness + self._relaxing_norms @ np.abs(self.pencil.relaxation.factors(s))
-        full = stiffness * size_q + on_u @ powers[:2] * size_u
-        residual, backward = _ratio(left, terms), _ratio(left, full)
-        if self.pencil.b:
-            scale = rows_on_q.T @ powers * size_q + rows_on_u.T @ powers[:2] * size_u
-            fluid_error = _ratio(np.abs(sum(fluid)), scale).max(axis=0)
-            residual, backward = np.maximum(residual, fluid_error), np.maximum(backward, fluid_error)
-        return residual, backward
+    s = np.asarray(eigenvalues)
+    if not s.size:
+        return np.zeros(0), np.zeros(0)
+    structure, fluid = pencil.terms(s, q, u)
+    left = np.linalg.norm(sum(structure), axis=0)
+    terms = sum(np.linalg.norm(t, axis=0) for t in structure)
+    powers = np.abs(s) ** np.arange(3)[:, None]
+    size_q, size_u = np.linalg.norm(q, axis=0), np.linalg.norm(u, axis=0)
+    on_q, on_u, rows_on_q, rows_on_u, relaxing = pencil.norms
+    stiffness = on_q @ powers
+    if pencil.relaxation is not None:
+        stiffness = stiffness + relaxing @ np.abs(pencil.relaxation.factors(s))
+    full = stiffness * size_q + on_u @ powers[:2] * size_u
+    residual, backward = _ratio(left, terms), _ratio(left, full)
+    if pencil.b:
+        scale = rows_on_q.T @ powers * size_q + rows_on_u.T @ powers[:2] * size_u
+        fluid_error = _ratio(np.abs(sum(fluid)), scale).max(axis=0)
+        residual, backward = np.maximum(residual, fluid_error), np.maximum(backward, fluid_error)
+    return residual, backward
 
 
 def balanced(pencil: CoupledPencil, eigenvalues, q, u) -> np.ndarray:
@@ -190,18 +163,17 @@ def newton(pencil: CoupledPencil, eigenvalue: complex, q, u, *, workspace: Works
     eigenvalue, q, u, residual, backward_error
         The best pair seen; it may still miss the tolerance.
     """
-    residuals = Residuals(pencil)
     real = complex(eigenvalue).imag == 0.0
 
     def scaled(l, q, u):
         size = np.linalg.norm(q) or np.linalg.norm(u) or 1.0
         q, u = q / size, u / size
-        r, e = residuals.measure(np.array([l]), q[:, None], u[:, None])
+        r, e = measure(pencil, np.array([l]), q[:, None], u[:, None])
         plain = l, q, u, float(r[0]), float(e[0])
         if r[0] <= 0.1 * tolerance or not u.size:
             return plain
         other = balanced(pencil, [l], q[:, None], u[:, None])
-        r, e = residuals.measure(np.array([l]), q[:, None], other)
+        r, e = measure(pencil, np.array([l]), q[:, None], other)
         return (l, q, other[:, 0], float(r[0]), float(e[0])) if preferable(r, e, plain[3], plain[4])[0] else plain
 
     best = scaled(eigenvalue, np.asarray(q, complex), np.asarray(u, complex))
@@ -236,12 +208,6 @@ def factored_beside(pencil: CoupledPencil, eigenvalue, workspace: Workspace):
     with suppress(SingularShiftError):
         return first_regular(workspace.shifted, pencil, places)[1]
     return None
-
-
-def _norm(matrix) -> float:
-    if 0 in matrix.shape or matrix.nnz == 0:
-        return 0.0
-    return float(np.sqrt(spla.norm(matrix, 1) * spla.norm(matrix, np.inf)))
 
 
 def _ratio(a, b):
@@ -308,12 +274,11 @@ def upper_half(values, q, u):
 def verified(pencil, values, q, u) -> Found:
     """Pairs normalised and measured on the full pencil."""
     q, u = normalised(q, u)
-    residuals = Residuals(pencil)
-    residual, backward = residuals.measure(values, q, u)
+    residual, backward = measure(pencil, values, q, u)
     coarse = np.flatnonzero(residual > TIGHT)
     if pencil.b and coarse.size:
         other = balanced(pencil, values[coarse], q[:, coarse], u[:, coarse])
-        again = residuals.measure(values[coarse], q[:, coarse], other)
+        again = measure(pencil, values[coarse], q[:, coarse], other)
         better = preferable(*again, residual[coarse], backward[coarse])
         chosen = coarse[better]
         u[:, chosen] = other[:, better]
@@ -353,7 +318,7 @@ def polish(pencil, shifted, batch, tolerance) -> None:
         step = np.where(values.imag == 0, step.real, step)
         new = values - step
         q, u = normalised(q - dq + step * eq, u - du + step * eu)
-        residual, backward = Residuals(pencil).measure(new, q, u)
+        residual, backward = measure(pencil, new, q, u)
         better = (residual < batch.residual[bad]) & (np.abs(step) < 1e-4 * np.abs(values))
         if not better.any():
             return
