@@ -171,14 +171,9 @@ def missing_pairs(
 
 def joined(spectrum: Spectrum, found: Found, line: float) -> Spectrum:
     """The spectrum with further unstable pairs, sorted; as long as was asked for, if not more are unstable."""
-    new = {
-        "eigenvalues": found.values,
-        "q": found.q,
-        "u": found.u,
-        "residual": found.residual,
-        "backward_error": found.backward,
-    }
-    parts = {name: np.concatenate([getattr(spectrum, name), part], axis=-1) for name, part in new.items()}
+    names = ("eigenvalues", "q", "u", "residual", "backward_error")
+    new = zip(names, (found.values, found.q, found.u, found.residual, found.backward))
+    parts = {name: np.concatenate([getattr(spectrum, name), part], axis=-1) for name, part in new}
     order = np.lexsort((parts["eigenvalues"].imag, -parts["eigenvalues"].real))
     order = order[: max(spectrum.asked, int(np.sum(parts["eigenvalues"].real > line)))]
     real = found.values.imag == 0

@@ -73,7 +73,7 @@ class StructureMatrices:
 
     def values(self, s: complex) -> np.ndarray:
         """Entries of s^2 M + s C + K + sum phi_g(s) K_g on the common pattern; real for a real s."""
-        s = _real_if_real(s)
+        s = real_if_real(s)
         values = s * s * self.data[0] + s * self.data[1] + self.data[2]
         if self.relaxation is not None:
             values = values + self.relaxation.factors(s) @ self.data[3:]
@@ -319,7 +319,8 @@ def _same_pattern(matrix, pattern):
     return all(a is b or np.array_equal(a, b) for a, b in zip((matrix.indptr, matrix.indices), pattern))
 
 
-def _real_if_real(s):
+def real_if_real(s: complex) -> float | complex:
+    """A number without an imaginary part that is zero: matrices stay real at it."""
     s = complex(s)
     return s.real if s.imag == 0.0 else s
 
@@ -434,9 +435,7 @@ class ShiftedPencil:
     """
 
     def __init__(self, pencil, structure, shift, factor):
-        shift = complex(shift)
-        self.pencil, self.factor = pencil, factor
-        self.shift = shift.real if shift.imag == 0.0 else shift
+        self.pencil, self.factor, self.shift = pencil, factor, real_if_real(shift)
         self._A, self._B, self._R, self._S = pencil.fluid_at(self.shift)
         # m further right-hand sides, once
         self.response = factor.solve(pencil.G.toarray())

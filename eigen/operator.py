@@ -328,20 +328,18 @@ class CoupledPencil:
     def apply(self, s, q: np.ndarray, u: np.ndarray, transposed: bool = False) -> tuple[np.ndarray, np.ndarray]:
         """T(s) x of vectors (q, u), each column with an s of its own where s is (k,); see `polynomial`."""
         f, g = self.polynomial((q, u), (s * q, s * u), (s * s * q, s * s * u), transposed=transposed)
-        return f + self._relaxed(s, q, transposed), g
+        return f + self._relaxed(Relaxation.factors, s, q, transposed), g
 
     def apply_derivative(self, s, q: np.ndarray, u: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """T'(s) x of vectors (q, u), as `apply`."""
         f, g = self.polynomial(None, (q, u), (2 * s * q, 2 * s * u))
-        return f + (0.0 if self.relaxation is None else self._weighted(self.relaxation.slopes(s), q)), g
+        return f + self._relaxed(Relaxation.slopes, s, q), g
 
-    def _relaxed(self, s, q: np.ndarray, transposed: bool = False) -> np.ndarray | float:
-        """Sum of phi_g(s) K_g q."""
-        return 0.0 if self.relaxation is None else self._weighted(self.relaxation.factors(s), q, transposed)
-
-    def _weighted(self, factors, q: np.ndarray, transposed: bool = False) -> np.ndarray:
-        """Sum of K_g q with factors (g, ...)."""
-        parts = ((x, matrix.T if transposed else matrix) for x, matrix in zip(factors, self.relaxing))
+    def _relaxed(self, of, s, q: np.ndarray, transposed: bool = False) -> np.ndarray | float:
+        """Sum of K_g q with factors or slopes `of` the relaxation at s."""
+        if self.relaxation is None:
+            return 0.0
+        parts = ((x, matrix.T if transposed else matrix) for x, matrix in zip(of(self.relaxation, s), self.relaxing))
         return sum(x * real_apply(matrix, q) for x, matrix in parts)
 
     def terms(self, s: np.ndarray, q: np.ndarray, U: np.ndarray):

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from .factor import SingularShiftError, Workspace
+from .factor import SingularShiftError, Workspace, real_if_real
 from .krylov import KrylovPairs, krylov_pairs
 from .operator import CoupledPencil, apart_from_creep
 from .pairs import Found, all_pairs, attach_left, biorthogonalise, empty, merge, polish, refine, upper_half, verified
@@ -314,8 +314,7 @@ def _reach_to(place, shift, relaxing) -> float:
 
 def _clear_of_eigenvalues(pencil, shift, workspace, found, search):
     """Factor at the shift, moved aside if it sits on an eigenvalue."""
-    shift = complex(shift)
-    shift = shift.real if shift.imag == 0.0 else shift
+    shift = real_if_real(shift)
     unit = abs(shift) or 1.0
     for attempt in range(4):
         moved = shift + 1e-3 * unit * attempt * (1 + 0.7 * attempt)
