@@ -25,6 +25,7 @@ from continuation import (
     resume,
 )
 from continuation.jax_system import JaxSystem
+from tests.systems.following import follow
 from tests.systems.normal_forms import cusp, stuart_landau
 
 MU = {"a": -2.0, "b": 1.0}
@@ -36,10 +37,15 @@ def circle():
     return JaxSystem(lambda u, mu: u**2 + mu["p"] ** 2 - 1.0, 1)
 
 
+def on_cusp(events=(), observers=None, **options):
+    return continue_branch(
+        cusp(), [-1.5], MU, "a", ContinuationOptions(limits=LIMITS, **options), events, observers=observers
+    )
+
+
 def s_curve(**options):
     """Branch whose arclength is that of the plane of ``x`` and ``a``."""
-    options = ContinuationOptions(limits=LIMITS, state_scale=1.0, parameter_scales={"a": 1.0}, **options)
-    return continue_branch(cusp(), [-1.5], MU, "a", options)
+    return on_cusp(state_scale=1.0, parameter_scales={"a": 1.0}, **options)
 
 
 def test_every_point_is_an_equilibrium_and_the_end_is_the_limit():
@@ -98,11 +104,10 @@ def test_start_exactly_at_a_fold():
 
 def test_events_are_located_and_can_end_the_branch():
     crossing = Event("x is one half", lambda u, mu: u[0] - 0.5)
-    branch = continue_branch(cusp(), [-1.5], MU, "a", ContinuationOptions(limits=LIMITS), [crossing])
+    branch = on_cusp([crossing])
     (point,) = branch.of_kind("x is one half")
     assert abs(point.u[0] - 0.5) < 1e-9 and abs(point.mu["a"] + 0.5 - 0.125) < 1e-9
-    stopping = Event("x is one half", lambda u, mu: u[0] - 0.5, stop=True)
-    short = continue_branch(cusp(), [-1.5], MU, "a", ContinuationOptions(limits=LIMITS), [stopping])
+    short = on_cusp([Event("x is one half", lambda u, mu: u[0] - 0.5, stop=True)])
     assert short.reason == "stopped at: x is one half" and len(short) < len(branch)
 
 
@@ -166,14 +171,12 @@ class Stop(Observer):
 
 def test_interruption_keeps_points_and_resuming_gives_the_same_branch(tmp_path):
     path = tmp_path / "branch.h5"
-    options = ContinuationOptions(limits=LIMITS, eigenvalues=1)
-    whole = continue_branch(cusp(), [-1.5], MU, "a", options)
-    stop = Stop(after=8)
-    part = continue_branch(cusp(), [-1.5], MU, "a", options, observers=[stop, Checkpoint(path, 3)])
+    whole, stop = on_cusp(eigenvalues=1), Stop(after=8)
+    part = on_cusp(observers=[stop, Checkpoint(path, 3)], eigenvalues=1)
     assert part.reason.kind is Reason.INTERRUPTED and len(part) == 8 and stop.end == 1
     loaded = Branch.load(path)
     assert loaded.reason.kind is Reason.INTERRUPTED and len(loaded) == 8
-    longer = resume(cusp(), loaded, options)
+    longer = resume(cusp(), loaded, ContinuationOptions(limits=LIMITS, eigenvalues=1))
     assert len(loaded) == 8  # the one handed over stays as it is
     assert longer.reason == whole.reason and len(longer) == len(whole)
     assert np.allclose(longer.values(), whole.values(), rtol=0, atol=1e-9)
@@ -182,43 +185,29 @@ def test_interruption_keeps_points_and_resuming_gives_the_same_branch(tmp_path):
 
 def test_observers_hear_of_refusals_and_finds():
     stop = Stop(after=-1)
-    continue_branch(
-        cusp(), [-1.5], MU, "a", ContinuationOptions(limits=LIMITS, step=0.5, max_angle=0.15), observers=stop
-    )
+    on_cusp(observers=stop, step=0.5, max_angle=0.15)
     assert stop.finds == ["fold", "fold"]
     assert stop.refusals and all(step > 0 for _, step in stop.refusals)
 
 
 def test_a_plain_function_is_an_observer():
     lengths = []
-    branch = continue_branch(
-        cusp(), [-1.5], MU, "a", ContinuationOptions(limits=LIMITS), observers=lambda b: lengths.append(len(b))
-    )
+    branch = on_cusp(observers=lambda b: lengths.append(len(b)))
     assert lengths == list(range(2, len(branch) + 1))
 
 
 def test_file_holds_everything(tmp_path):
     path = tmp_path / "b.h5"
     system = stuart_landau()
-    branch = continue_branch(
-        system,
-        [0, 0],
-        {"mu": -0.5, "w": 2.0, "c": 0.7},
-        "mu",
-        ContinuationOptions(eigenvalues=2, limits={"mu": (-1, 1)}),
-    )
+    branch = follow(system, [0, 0], {"mu": -0.5, "w": 2.0, "c": 0.7}, "mu", (-1, 1))
     branch.save(path)
     again = Branch.load(path)
     assert not path.with_name("b.h5.partial").exists()
     for name in ("kind", "size", "names", "extra_names", "fixed", "reason", "next_step"):
         assert getattr(again, name) == getattr(branch, name)
     for one, two in zip(branch.points, again.points, strict=True):
-        assert (one.step, one.iterations, one.residual, one.unstable) == (
-            two.step,
-            two.iterations,
-            two.residual,
-            two.unstable,
-        )
+        for name in ("step", "iterations", "residual", "unstable"):
+            assert getattr(one, name) == getattr(two, name)
         assert one.tests == two.tests and np.array_equal(one.eigenvalues, two.eigenvalues)
     assert np.array_equal(again.states, branch.states)
     assert np.array_equal(again.values("fold"), branch.values("fold"))
@@ -247,8 +236,8 @@ continue_branch(cusp(), [-1.5], {MU}, "a", ContinuationOptions(limits={LIMITS}, 
     assert ended.returncode == -signal.SIGKILL, ended.stderr
     left = Branch.load(path)
     assert len(left) == 10 and left.reason.kind is Reason.RUNNING
-    options = ContinuationOptions(limits=LIMITS, parameter_scales={"a": 1.0})
-    whole, longer = continue_branch(cusp(), [-1.5], MU, "a", options), resume(cusp(), left, options)
+    whole = on_cusp(parameter_scales={"a": 1.0})
+    longer = resume(cusp(), left, ContinuationOptions(limits=LIMITS, parameter_scales={"a": 1.0}))
     assert len(longer) == len(whole)
     assert np.allclose(longer.values(), whole.values(), rtol=0, atol=1e-9)
 
@@ -270,7 +259,7 @@ def test_an_error_of_the_model_keeps_the_branch(tmp_path):
 
 def test_an_event_that_is_not_a_number_is_no_crossing():
     event = Event("root", lambda u, mu: np.sqrt(mu["a"]) if mu["a"] >= 0 else np.nan)
-    branch = continue_branch(cusp(), [-1.5], MU, "a", ContinuationOptions(limits=LIMITS), [event])
+    branch = on_cusp([event])
     assert not branch.of_kind("root", located=False) and len(branch) > 10
 
 
@@ -302,7 +291,7 @@ def test_plot_draws_stability_and_special_points():
 def test_units_of_the_state_do_not_matter(unit):
     """Both folds with the default options, and the same points but for rounding."""
     system = JaxSystem(lambda u, mu: mu["a"] + u / unit - (u / unit) ** 3, 1)
-    plain = continue_branch(cusp(), [-1.5], MU, "a", ContinuationOptions(limits=LIMITS))
+    plain = on_cusp()
     branch = continue_branch(system, [-1.5 * unit], {"a": -2.0}, "a", ContinuationOptions(limits=LIMITS))
     assert np.allclose([s.mu["a"] for s in branch.special], [2 / np.sqrt(27), -2 / np.sqrt(27)], rtol=1e-8)
     assert np.allclose(branch.values(), plain.values(), rtol=0, atol=1e-6)
