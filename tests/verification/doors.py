@@ -3,18 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import cache
 
 import numpy as np
 
 from dbvfiv.case.parameters import Mu
 from dbvfiv.errors import CaseError, NotValidError, SolveError
-from dbvfiv.model.equilibria import SteadyOptions
 from dbvfiv.model.state import SteadyState
-from dbvfiv.motion.control import RunOptions
-from dbvfiv.motion.start import steady_positions
-from dbvfiv.motion.stepper import StepOptions
 from dbvfiv.observer import Observer
 from dbvfiv.studies.case import Case, load_case
 from dbvfiv.studies.modes.search import ModesOptions, run_modes
@@ -22,9 +18,7 @@ from dbvfiv.studies.onset.search import OnsetOptions, run_onset
 from dbvfiv.studies.session import Session
 from dbvfiv.studies.stability.verdict import UNDECIDED, Verdict
 from dbvfiv.studies.stability.walk import StabilityWalk
-from dbvfiv.studies.transient.run import Runner
 from tests.studies.map.axes import run_map
-from tests.verification.test_transient_modes import ringing
 
 #: Case files.
 VALVES = (
@@ -157,27 +151,3 @@ def _walk(case: Case, model, here: Mu, state: SteadyState) -> StabilityWalk:
     walk = StabilityWalk(case, model=model)
     walk.give(here, state.q)
     return walk
-
-
-def rates_in_time(case: Case, frequency: float, push: float = 1e-8) -> tuple[complex, complex]:
-    """Eigenvalue (1/s) of the mode that a small kick (m) follows, and that of the ringing in time after it, with the
-    error of the steps removed.
-    """
-    rings, period = [], 1.0 / frequency
-    kick = {"transient.start": "kick", "transient.kick_opening": push}
-    for count in (50, 100):
-        step = period / count
-        session = Session(case.replace(kick | {"transient.step": step, "transient.duration": 1.25 * period}))
-        options = replace(RunOptions.of(session.model.case), step=StepOptions(tolerance=1e-8, floor=1e-13))
-        run = Runner(session.model, options).start()
-        assert not run.failures
-        away = run.history["lip_displacement"] - _steady_lip(session.model, case.drive.pressure)
-        rings.append(ringing(away / push, step))
-    first, second = (complex(r.real, abs(r.imag)) for r in rings)
-    return run.progress.eigenvalue, second + (second - first) / 3.0
-
-
-def _steady_lip(model, pressure: float) -> float:
-    """Displacement of the middle of the lip in the steady state, m."""
-    q = steady_positions(model, pressure, SteadyOptions.of(model.case))
-    return float(q[model.shell.dofs.index[model.mesh.rows[0, 0], 1]])

@@ -16,6 +16,7 @@ import pytest
 import dbvfiv
 from dbvfiv.case.parameters import Mu
 from dbvfiv.model.dynamics import linearise
+from dbvfiv.model.equilibria import SteadyOptions
 from dbvfiv.motion.control import RunOptions
 from dbvfiv.motion.start import on_mode, steady_fluid, steady_positions
 from dbvfiv.motion.stepper import StepOptions
@@ -57,25 +58,30 @@ def three_routes(
         "damping.beta": BETA,
     } | (further or {})
     valve = dbvfiv.load(thesis_case(), changes)
-    model = valve.model
-    full = next(m for m in valve.modes(count=8).modes if m.frequency > 0)
-    eigenvalue = complex(full.growth_rate, 2 * np.pi * full.frequency)
+    model, full = valve.model, leading_oscillation(valve)
     q = steady_positions(model, pressure)
     walk, place = StabilityWalk(valve.case, model=model), Mu.of(valve.case)
     walk.give(place, q)
     # the reduced-order model is made beside the state itself
     column = walk.column([place.at(beta=share * BETA) for share in (0.9, 0.95, 1.05, 1.1)])
-    reduced = column.model.nearest(place, eigenvalue)
+    reduced = column.model.nearest(place, full.eigenvalue)
     rings, limit = rung_in_time(valve, full.frequency, steps, periods)
-    return {"full": eigenvalue, "reduced": complex(reduced), "in time": rings, "limit": limit}
+    return {"full": full.eigenvalue, "reduced": complex(reduced), "in time": rings, "limit": limit}
 
 
-def rung_in_time(valve, frequency: float, steps, periods: float = 1.25) -> tuple[list[complex], complex]:
+def leading_oscillation(valve):
+    """The mode that a kick of a valve follows."""
+    return [mode for mode in valve.modes(count=8).modes if mode.frequency > 0][valve.case.transient.kick_mode - 1]
+
+
+def rung_in_time(
+    valve, frequency: float, steps=(50, 100), periods: float = 1.25, examine=lambda run: None
+) -> tuple[list[complex], complex]:
     """Eigenvalues of a valve's ringing after a push of its lip by `PUSH` along the mode of a frequency, Hz, for numbers
     of steps a period; and in the limit of small steps, from the last two.
     """
-    model, rings = valve.model, []
-    q, lip = steady_positions(model, valve.case.drive.pressure), model.shell.dofs.index[model.mesh.rows[0, 0], 1]
+    model, rings, lip = valve.model, [], valve.model.shell.dofs.index[valve.model.mesh.centre_line[0], 1]
+    q = steady_positions(model, valve.case.drive.pressure, SteadyOptions.of(valve.case))
     for count in steps:
         step = 1 / frequency / count
         keys = {"transient.step": step, "transient.duration": periods * count * step}
@@ -83,6 +89,7 @@ def rung_in_time(valve, frequency: float, steps, periods: float = 1.25) -> tuple
         options = replace(RunOptions.of(model.case), step=StepOptions(tolerance=1e-8, floor=1e-13))
         run = Runner(model, options).start()
         assert not run.failures
+        examine(run)
         rings.append(ringing((run.history["lip_displacement"] - q[lip]) / PUSH, step))
     first, second = rings[-2:]
     return rings, second + (second - first) / ((steps[-1] / steps[-2]) ** 2 - 1)
@@ -132,14 +139,8 @@ def table(rows: list) -> str:
 def test_three_routes(law, pressure, density, sign):
     found = three_routes(law, pressure, density)
     full = found["full"]
-    print(
-        f"\n{law} {pressure:g} {density:g}: full {full:.5f} reduced {found['reduced']:.5f} in time "
-        f"{found['in time']} limit {found['limit']:.5f}"
-    )
+    check_three_routes(found, f"{law} {pressure:g} {density:g}")
     assert np.sign(full.real) == sign
-    assert abs(found["reduced"] - full) < 1e-6 * abs(full)
-    growth, frequency = errors(found["limit"], full)
-    assert growth < 0.01 and frequency < 0.005
     # what the step leaves falls as its square
     off = [abs(complex(r.real, abs(r.imag)) - full) for r in found["in time"]]
     assert off[1] < 0.3 * off[0]
@@ -154,7 +155,7 @@ def test_three_routes_with_the_default_mesh():
     check_three_routes(found, "averaged mass, parabolic inertia")
     changes = {"mesh.around": 8, "mesh.along": 12, "damping.alpha": 0.0, "damping.beta": BETA}
     valve = dbvfiv.load(thesis_case(), changes | {"fluid.density": density, "drive.pressure": pressure})
-    consistent = next(m for m in valve.modes(count=8).modes if m.frequency > 0)
+    consistent = leading_oscillation(valve)
     assert abs(found["full"].imag) / (2 * np.pi) < 0.99 * consistent.frequency
 
 
