@@ -19,7 +19,6 @@ from dbvfiv.motion.stepper import StepOptions
 from dbvfiv.studies.case import thesis_case
 from dbvfiv.studies.transient.run import Runner
 from eigen import SearchOptions, TransferBasis, certified_spectrum
-from tests.verification.test_line_modes import random_installation
 from tests.verification.test_transient_modes import QUASI, STORAGE, check_three_routes, three_routes
 
 SMALL = {"mesh.around": 8, "mesh.along": 12}
@@ -118,6 +117,23 @@ def test_seventy_modes_of_a_line_are_listed_and_counted(elements):
     waves = np.sort(spectrum.frequency[spectrum.frequency > 20.0])
     assert abs(np.median(np.diff(waves)) - 3.0) < 0.1 and waves[-1] > 190.0
     assert spectrum.applications < 1500 and found.count.evaluations < 4000
+
+
+def random_installation(rng) -> dict:
+    """Keys of a line that someone may have."""
+    friction = rng.choice(["friction", "roughness", "none"])
+    keys = {
+        "upstream.length": float(10 ** rng.uniform(-1, 3)),
+        "upstream.loss": float(rng.choice([0.0, rng.uniform(0, 20)])),
+        "drive.at": str(rng.choice(["reservoir", "line"])),
+    }
+    if rng.random() < 0.6:
+        keys["upstream.diameter"] = float(rng.uniform(0.15, 0.6))
+    if friction == "friction":
+        keys["upstream.friction"] = float(rng.uniform(0.005, 0.08))
+    elif friction == "roughness":
+        keys["upstream.roughness"] = float(10 ** rng.uniform(-6, -3))
+    return keys
 
 
 def installations(number: int, seed: int, states: int = 3) -> list[str]:

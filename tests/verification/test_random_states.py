@@ -35,27 +35,25 @@ class Examined:
 
 def examined(around: int, along: int, number: int, seed: int, pressures: int) -> list[Examined]:
     states = linearised_states(around, along, random_pressures(pressures, seed))
-    workspace, bases, out = Workspace(), {}, []
-    for state in random_states(states, number, seed):
-        pencil = state.pencil
-        if state.linear.inlet not in bases:  # it depends on the state of the structure alone
-            bases[state.linear.inlet] = TransferBasis(pencil, workspace=workspace)
-        basis = bases[state.linear.inlet]
-        lowest = basis.structural_frequencies
-        search = select_search(SearchOptions(), state.mu, lambda n, known=lowest: known[:n], COUNT)
-        found = certified_spectrum(pencil, COUNT, search.options, basis=basis, workspace=workspace)
-        out.append(Examined(state, found))
-    return out
+    return searched(random_states(states, number, seed), {})
 
 
 def examined_relaxing(around: int, along: int, number: int, seed: int, pressures: int, mesh=FORMER) -> list[Examined]:
     """Random states of viscoelastic walls of stable rubbers, each with a basis of its own."""
     changes = {"damping.model": "loss factor", "materials.constants": "stable", **mesh}
     states = linearised_states(around, along, random_pressures(pressures, seed), **changes)
+    return searched(relaxing_states(states, number, seed))
+
+
+def searched(states, known: dict[float, TransferBasis] | None = None) -> list[Examined]:
+    """`known` bases by pressure serve all states of one, where a basis depends on the state of the structure alone."""
     workspace, out = Workspace(), []
-    for state in relaxing_states(states, number, seed):
-        pencil = state.pencil
-        basis = TransferBasis(pencil, workspace=workspace)
+    for state in states:
+        pencil, basis = state.pencil, None if known is None else known.get(state.linear.inlet)
+        if basis is None:
+            basis = TransferBasis(pencil, workspace=workspace)
+            if known is not None:
+                known[state.linear.inlet] = basis
         lowest = basis.structural_frequencies
         search = select_search(SearchOptions(), state.mu, lambda n, known=lowest: known[:n], COUNT)
         found = certified_spectrum(pencil, COUNT, search.options, basis=basis, workspace=workspace)
