@@ -8,9 +8,11 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.sparse.linalg import eigsh
 
 from dbvfiv.materials import IsotropicElastic, OrthotropicPly, published_rubber
 from dbvfiv.shell import Layer, Section, Shell, ShellMesh
+from dbvfiv.shell.pressure import pressure_force, pressure_stiffness
 from eigen.factor import DirectFactor
 
 
@@ -130,6 +132,28 @@ def random_unknowns(shell: Shell, seed: int, stretch: float, turn: float) -> np.
     return shell.dofs.restrict(random_state(shell.mesh, seed, stretch, turn))
 
 
+def quarter_ring(elements: int, radius: float, width: float) -> tuple[Grid, list, np.ndarray]:
+    """Quarter of a ring about z from y = 0 to x = 0, the planes that it ends on, and its free unknowns (nn, 5) where
+    nothing moves along the axis, along which the first frame vector lies.
+    """
+    turn = 0.5 * np.pi
+    patch = grid(elements, 1, lambda u, v: (radius * np.cos(turn * u), radius * np.sin(turn * u), width * v))
+    front, back = patch.index[0], patch.index[-1]
+    patch.nodes[front, 1] = 0.0
+    patch.nodes[back, 0] = 0.0
+    free = np.ones((len(patch.nodes), 5), bool)
+    free[:, [2, 3]] = False  # plane strain
+    free[front, 1], free[back, 0] = False, False
+    free[np.concatenate([front, back]), 4] = False  # no turn of the director out of the symmetry planes
+    return patch, [(front, 1), (back, 0)], free
+
+
+def lowest_frequencies(shell: Shell, stiffness: np.ndarray, mass: np.ndarray, count: int, below: float = 0.0):
+    """Lowest frequencies (count,), Hz, by values on a shell's pattern; squares of angular ones are above `below`."""
+    stiffness, mass = (shell.dofs.matrix(values).tocsc() for values in (stiffness, mass))
+    return np.sqrt(np.sort(eigsh(stiffness, count, mass, sigma=below, return_eigenvectors=False))) / (2 * np.pi)
+
+
 @dataclass(frozen=True)
 class Equilibrium:
     """A point of a static load path: load factor, free unknowns and Newton iterations."""
@@ -142,6 +166,20 @@ class Equilibrium:
 def dead_load(force: np.ndarray):
     """Load of a fixed force vector (n,) times the factor."""
     return lambda q, factor: (factor * force, None)
+
+
+def pressure_load(shell: Shell, pressure: float = 1.0):
+    """Load of a pressure on the inside that follows the wall, times the factor."""
+    mesh, loaded = shell.mesh, np.ones(shell.mesh.element_count)
+
+    def load(q, factor):
+        nodal, inside = shell.dofs.expand(q), np.full(mesh.node_count, factor * pressure)
+        force, slope = np.zeros_like(nodal), np.zeros(len(shell.dofs.pattern[1]))
+        pressure_force(mesh.quads, mesh.nodes, nodal, inside, loaded, force)
+        pressure_stiffness(mesh.quads, mesh.nodes, nodal, inside, loaded, shell.dofs.slots, 1.0, slope)
+        return shell.dofs.restrict(force), slope
+
+    return load
 
 
 def solve_path(

@@ -1,4 +1,4 @@
-"""Critical parameters of small pencils by bracketing, for the verification tests."""
+"""Critical parameters of small pencils by bracketing, and zeros of analytic functions, for the verification tests."""
 
 import numpy as np
 from scipy.optimize import brentq
@@ -38,3 +38,15 @@ def coalescence(pencil_at, low, high):
     assert abs(modes.eigenvalues[0].imag - omega) < 1e-3 * omega
     assert modes.eigenvalues[0].real > 0
     return root, omega
+
+
+def root(function, start: complex) -> complex:
+    """Zero of an analytic function by the secant method."""
+    a, b = start * (1 + 1e-6), start
+    fa, fb = function(a), function(b)
+    for _ in range(60):
+        if abs(b - a) <= 1e-14 * abs(b) or fa == fb:
+            return b
+        a, b, fa = b, b - fb * (b - a) / (fb - fa), fb
+        fb = function(b)
+    raise AssertionError(f"no root near {start}")

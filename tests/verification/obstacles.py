@@ -142,8 +142,8 @@ def pinched_cylinder(element: str, n: int, distort=regular) -> float:
     return -solved(shell, load)[patch.index[0, 0], 2] / 1.82488e-5
 
 
-def hemisphere(element: str, n: int, distort=regular) -> float:
-    """Quarter of a hemisphere with an 18 degree hole, R 10, h 0.04, under forces 1 in and out at the equator."""
+def quarter_hemisphere(element: str, n: int, distort=regular) -> tuple[Shell, Grid]:
+    """Quarter of a hemisphere with an 18 degree hole, R 10, h 0.04, between the planes y = 0 and x = 0."""
 
     def place(u, v):
         u, v = distort(u, v)
@@ -155,9 +155,14 @@ def hemisphere(element: str, n: int, distort=regular) -> float:
     free = all_free(patch)
     free[np.ix_(front, [1, 4])] = False
     free[np.ix_(back, [0, 4])] = False
-    free[patch.index[0, 0], 2] = False
+    free[patch.index[0, 0], 2] = False  # one height, against the rigid motion that is left
     section = isotropic_section(6.825e7, 0.3, 0.04)
-    shell = build(patch, section, free, element, h=0.04, directors=patch.nodes / 10.0)
+    return build(patch, section, free, element, h=0.04, directors=patch.nodes / 10.0), patch
+
+
+def hemisphere(element: str, n: int, distort=regular) -> float:
+    """The quarter under forces 1 in and out at the equator."""
+    shell, patch = quarter_hemisphere(element, n, distort)
     load = np.zeros((len(patch.nodes), 5))
     load[patch.index[0, 0], 0], load[patch.index[-1, 0], 1] = 1.0, -1.0
     return solved(shell, load)[patch.index[0, 0], 0] / 0.0930

@@ -24,12 +24,8 @@ from dbvfiv.model import ValveModel
 from dbvfiv.studies.case import thesis_case
 from eigen.factor import DirectFactor
 from tests.verification import layered_solid
+from tests.verification.test_modal_valve import ISOTROPIC
 
-#: One material for the whole wall (App. B).
-ISOTROPIC = {
-    "materials.named": {"one": {"kind": "isotropic", "youngs_modulus": 6e6, "poisson_ratio": 0.49, "density": 1300.0}},
-    "layers": [{"material": "one", "thickness": 0.01}],
-}
 #: Corner and mid-edge nodes of a hexahedron in the grid of half elements.
 _NODES = np.array(
     [(0, 0, 0), (2, 0, 0), (2, 2, 0), (0, 2, 0), (0, 0, 2), (2, 0, 2), (2, 2, 2), (0, 2, 2)]

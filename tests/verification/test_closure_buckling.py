@@ -31,12 +31,9 @@ def _ring(elements: int, radius: float = RADIUS) -> ShellOnPlane:
     mesh = ShellMesh.build(patch.nodes, patch.quads, WALL, planes=planes)
     assert mesh.directors[0] == pytest.approx([0, 1, 0])  # outwards, so that the pressure of sign -1 acts from outside
     free = np.ones((mesh.node_count, 5), bool)
-    free[:, 2] = False
-    free[:, 3] = False  # the first rotation turns the director along the axis
-    free[patch.index[0], 0] = False
-    free[patch.index[0], 4] = False
-    free[patch.index[-1], 1] = False
-    free[patch.index[-1], 4] = False
+    free[:, [2, 3]] = False  # the first rotation turns the director along the axis
+    free[np.ix_(patch.index[0], [0, 4])] = False
+    free[np.ix_(patch.index[-1], [1, 4])] = False
     return ShellOnPlane(Shell(mesh, isotropic_section(E, NU, WALL), free))
 
 
@@ -103,10 +100,8 @@ def _arch(elements: int = 24, radius=0.5, angle=0.5, wall=0.01) -> ShellOnPlane:
     patch = grid(elements, 1, place)
     mesh = ShellMesh.build(patch.nodes, patch.quads, wall, planes=[(patch.index[0], 0)])
     free = np.ones((mesh.node_count, 5), bool)
-    free[:, 2] = False
-    free[:, 3] = False
-    free[patch.index[0], 0] = False
-    free[patch.index[0], 4] = False
+    free[:, [2, 3]] = False
+    free[np.ix_(patch.index[0], [0, 4])] = False
     free[patch.index[-1]] = False
     return ShellOnPlane(Shell(mesh, isotropic_section(E, NU, wall), free))
 

@@ -31,12 +31,9 @@ def _strip(elements: int, half=0.5, h=4e-3, gap=1e-3, depth=0.7e-3, penalty=1e9)
     mesh = ShellMesh.build(patch.nodes, patch.quads, h, material_axis=(1.0, 0.0, 0.0))
     assert mesh.directors[0] == pytest.approx([0, 1, 0])
     free = np.ones((mesh.node_count, 5), bool)
-    free[:, 2] = False
-    free[:, 4] = False  # the first rotation turns the director along the strip
-    free[patch.index[0], 1] = False
-    free[patch.index[0], 3] = False
-    free[patch.index[-1], 0] = False
-    free[patch.index[-1], 3] = False
+    free[:, [2, 4]] = False  # the first rotation turns the director along the strip
+    free[np.ix_(patch.index[0], [1, 3])] = False
+    free[np.ix_(patch.index[-1], [0, 3])] = False
     shell = Shell(mesh, isotropic_section(E, 0.0, h), free)
     contact = PlaneContact(shell, np.arange(mesh.node_count), depth, tributary_area(shell), ContactLaw(penalty))
     return ShellOnPlane(shell, contact)
@@ -91,12 +88,9 @@ def _ring(elements: int, radius=0.1, h=1e-3, squeeze=0.0, penalty=1e8) -> ShellO
     outward = np.einsum("ni,ni->n", mesh.directors, mesh.nodes - [0, radius + 0.5 * h, 0])
     side = np.sign(outward[len(outward) // 2])
     free = np.ones((mesh.node_count, 5), bool)
-    free[:, 2] = False
-    free[:, 3] = False  # the first rotation turns the director along the axis
-    free[patch.index[0], 0] = False
-    free[patch.index[0], 4] = False
-    free[patch.index[-1], 1] = False
-    free[patch.index[-1], 4] = False
+    free[:, [2, 3]] = False  # the first rotation turns the director along the axis
+    free[np.ix_(patch.index[0], [0, 4])] = False
+    free[np.ix_(patch.index[-1], [1, 4])] = False
     shell = Shell(mesh, isotropic_section(E, 0.0, h), free)
     contact = PlaneContact(
         shell, np.arange(mesh.node_count), -side * 0.5 * h, tributary_area(shell), ContactLaw(penalty)

@@ -12,42 +12,27 @@ import pytest
 import scipy.linalg as sl
 
 from dbvfiv.shell import Shell, ShellMesh
-from dbvfiv.shell.pressure import pressure_force, pressure_stiffness
-from tests.shell.structures import grid, isotropic_section, observed_order, richardson
+from tests.shell.structures import isotropic_section, observed_order, pressure_load, quarter_ring, richardson
 
 RADIUS, H, WIDTH, E = 1.0, 0.01, 0.1, 1e9
 UNIT = E * H**3 / 12 / RADIUS**3  # EI/R^3 per unit width
 
 
 def ring(elements: int) -> Shell:
-    turn = 0.5 * np.pi
-    patch = grid(elements, 1, lambda u, v: (RADIUS * np.cos(turn * u), RADIUS * np.sin(turn * u), WIDTH * v))
-    front, back = patch.index[0], patch.index[-1]
-    patch.nodes[front, 1] = 0.0
-    patch.nodes[back, 0] = 0.0
-    free = np.ones((len(patch.nodes), 5), bool)
-    free[:, [2, 3]] = False  # plane strain; the first frame vector is the axis
-    free[front, 1], free[back, 0] = False, False
-    free[np.concatenate([front, back]), 4] = False  # no turn of the director out of the symmetry planes
-    mesh = ShellMesh.build(patch.nodes, patch.quads, H, planes=[(front, 1), (back, 0)])
+    patch, planes, free = quarter_ring(elements, RADIUS, WIDTH)
+    mesh = ShellMesh.build(patch.nodes, patch.quads, H, planes=planes)
     return Shell(mesh, isotropic_section(E, 0.0, H), free)
 
 
 def linearised(shell: Shell, follower: bool):
     """Stiffness at rest and its derivative with respect to the outside pressure on the equilibrium path."""
-    mesh = shell.mesh
-    nodal, one, loaded = np.zeros((mesh.node_count, 5)), np.ones(mesh.node_count), np.ones(mesh.element_count)
-    force = np.zeros_like(nodal)
-    pressure_force(mesh.quads, mesh.nodes, nodal, one, loaded, force)
-    force = -shell.dofs.restrict(force)
-    small = 1e-3 * UNIT
-    stiffness = shell.dofs.matrix(shell.force_and_tangent(np.zeros(shell.size))[1]).toarray()
-    q = small * np.linalg.solve(stiffness, force)
+    rest, small = np.zeros(shell.size), 1e-3 * UNIT
+    inside, turned = pressure_load(shell)(rest, 1.0)
+    stiffness = shell.dofs.matrix(shell.force_and_tangent(rest)[1]).toarray()
+    q = -small * np.linalg.solve(stiffness, inside)
     slope = (shell.dofs.matrix(shell.force_and_tangent(q)[1]).toarray() - stiffness) / small
     if follower:
-        data = np.zeros(len(shell.dofs.pattern[1]))
-        pressure_stiffness(mesh.quads, mesh.nodes, nodal, one, loaded, shell.dofs.slots, 1.0, data)
-        slope += shell.dofs.matrix(data).toarray()  # outside pressure: minus the force, minus once more in K
+        slope += shell.dofs.matrix(turned).toarray()  # outside pressure: minus the force, minus once more in K
     return stiffness, slope
 
 

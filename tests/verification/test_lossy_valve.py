@@ -23,6 +23,7 @@ from dbvfiv.fit.cards import damping_of
 from dbvfiv.model import LinearisedState, ValveModel, linearise
 from dbvfiv.studies.case import thesis_case
 from eigen import SearchOptions, leading_modes, lowest_frequencies
+from tests.verification.critical import root
 
 MODES = 8
 MODULUS = 6e6
@@ -49,18 +50,6 @@ def resonances(state: LinearisedState) -> tuple[np.ndarray, np.ndarray, np.ndarr
     order = np.argsort(modes.frequency)
     assert len(modes) == MODES and np.abs(modes.growth_rate).max() < 1e-6
     return 2 * np.pi * modes.frequency[order], modes.q[:, order]
-
-
-def root(function, start: complex) -> complex:
-    """Zero of an analytic function by the secant method."""
-    a, b = start * (1 + 1e-6), start
-    fa, fb = function(a), function(b)
-    for _ in range(60):
-        if abs(b - a) <= 1e-14 * abs(b) or fa == fb:
-            return b
-        a, b, fa = b, b - fb * (b - a) / (fb - fa), fb
-        fb = function(b)
-    raise AssertionError(f"no root near {start}")
 
 
 @pytest.fixture(scope="module")

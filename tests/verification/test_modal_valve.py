@@ -10,33 +10,29 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from scipy.sparse.linalg import eigsh
 
 from dbvfiv.model import ValveModel
 from dbvfiv.studies.case import thesis_case
+from tests.shell.structures import lowest_frequencies
 
 REFERENCE = np.array([13.51, 18.63, 24.04, 30.90])
+#: One material for the whole wall (App. B).
+ISOTROPIC = {
+    "materials.named": {"one": {"kind": "isotropic", "youngs_modulus": 6e6, "poisson_ratio": 0.49, "density": 1300.0}},
+    "layers": [{"material": "one", "thickness": 0.01}],
+}
 
 
 def frequencies(around, along, shear_correction, count=len(REFERENCE), mass="averaged", rows="lip") -> np.ndarray:
     """Lowest frequencies (count,), Hz, on around x along elements."""
-    changes = {
-        "materials.named": {
-            "one": {"kind": "isotropic", "youngs_modulus": 6e6, "poisson_ratio": 0.49, "density": 1300.0}
-        },
-        "layers": [{"material": "one", "thickness": 0.01}],
-        "shell.shear_correction_rubber": shear_correction,
-        "shell.mass": mass,
-        "mesh.rows": rows,
-        "mesh.around": around,
-        "mesh.along": along,
-    }
-    model = ValveModel(thesis_case(changes))
-    dofs = model.shell.dofs
-    stiffness = dofs.matrix(model.shell.force_and_tangent(model.rest())[1]).tocsc()
-    mass = dofs.matrix(model.mass(model.rest())).tocsc()
-    values = eigsh(stiffness, count, mass, sigma=0, return_eigenvectors=False)
-    return np.sqrt(np.sort(values)) / (2 * np.pi)
+    changes = ISOTROPIC | {"shell.shear_correction_rubber": shear_correction, "shell.mass": mass, "mesh.rows": rows}
+    return frequencies_at_rest(ValveModel(thesis_case(changes | {"mesh.around": around, "mesh.along": along})), count)
+
+
+def frequencies_at_rest(model: ValveModel, count: int) -> np.ndarray:
+    """Lowest frequencies (count,), Hz, of a model in vacuo."""
+    stiffness, mass = model.shell.force_and_tangent(model.rest())[1], model.mass(model.rest())
+    return lowest_frequencies(model.shell, stiffness, mass, count)
 
 
 @pytest.mark.parametrize("shear_correction", [5 / 6, 1.0])

@@ -19,6 +19,7 @@ from dbvfiv.shell import Layer, Section, Shell, ShellMesh
 from dbvfiv.studies.case import thesis_case
 from eigen import CoupledPencil, Relaxation, SearchOptions, leading_modes
 from tests.shell.structures import rectangle
+from tests.verification.critical import root
 
 SERIES = Prony((0.12, 0.15, 0.1), (4e-4, 4e-3, 4e-2))
 LENGTH, WIDTH = 0.2, 0.02
@@ -58,18 +59,6 @@ def oscillating(values: np.ndarray, count: int) -> np.ndarray:
 def dense_modes(pencil: CoupledPencil, count: int) -> np.ndarray:
     """By the first-order form."""
     return oscillating(scipy.linalg.eig(*pencil.first_order(), right=False), count)
-
-
-def root(function, start: complex) -> complex:
-    """Zero of an analytic function by the secant method."""
-    a, b = start * (1 + 1e-6), start
-    fa, fb = function(a), function(b)
-    for _ in range(60):
-        a, b, fa = b, b - fb * (b - a) / (fb - fa), fb
-        fb = function(b)
-        if abs(b - a) <= 1e-14 * abs(b):
-            return b
-    raise AssertionError(f"no root near {start}")
 
 
 def test_every_mode_of_a_cantilever_of_one_layer_has_the_complex_modulus():

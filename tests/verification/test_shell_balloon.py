@@ -10,8 +10,7 @@ import pytest
 from dbvfiv.materials import MooneyRivlin
 from dbvfiv.shell import Layer, Section, Shell, ShellMesh
 from dbvfiv.shell.mesh import nodal_directors, tangent_frames
-from dbvfiv.shell.pressure import pressure_force, pressure_stiffness
-from tests.shell.structures import richardson, solve_path
+from tests.shell.structures import pressure_load, richardson, solve_path
 
 H = 0.002  # over the radius of 1: bending and thickness play no part to four digits
 RUBBER = MooneyRivlin(4e5, 1e5, 0.0, 1000.0)  # C01/C10 = 0.25: no pressure maximum
@@ -62,19 +61,8 @@ def octant(n: int, element: str = "MITC4+EAS") -> Shell:
 
 def blow(shell: Shell, pressures) -> np.ndarray:
     """Mean stretch of the radius at each pressure."""
-    mesh = shell.mesh
-    loaded = np.ones(mesh.element_count)
-
-    def load(q, factor):
-        nodal = shell.dofs.expand(q)
-        p = np.full(mesh.node_count, factor)
-        force, data = np.zeros_like(nodal), np.zeros(len(shell.dofs.pattern[1]))
-        pressure_force(mesh.quads, mesh.nodes, nodal, p, loaded, force)
-        pressure_stiffness(mesh.quads, mesh.nodes, nodal, p, loaded, shell.dofs.slots, 1.0, data)
-        return shell.dofs.restrict(force), data
-
-    path = solve_path(shell, load, pressures, smallest=1e-6 * max(pressures))
-    return np.array([np.linalg.norm(mesh.nodes + shell.dofs.expand(e.q)[:, :3], axis=1).mean() for e in path])
+    path = solve_path(shell, pressure_load(shell), pressures, smallest=1e-6 * max(pressures))
+    return np.array([np.linalg.norm(shell.mesh.nodes + shell.dofs.expand(e.q)[:, :3], axis=1).mean() for e in path])
 
 
 @pytest.fixture(scope="module")

@@ -13,86 +13,43 @@ from scipy.integrate import solve_bvp
 
 from dbvfiv.shell import Shell, ShellMesh
 from tests.shell.structures import dead_load, grid, isotropic_section, observed_order, rectangle, richardson, solve_path
+from tests.verification.obstacles import quarter_hemisphere
 
-# P/Pmax, tip displacements -u and w on 16 x 1 elements
-END_SHEAR = np.array(
-    [
-        [0.05, 0.026, 0.663],
-        [0.1, 0.103, 1.309],
-        [0.15, 0.224, 1.922],
-        [0.2, 0.381, 2.493],
-        [0.25, 0.563, 3.015],
-        [0.3, 0.763, 3.488],
-        [0.35, 0.971, 3.912],
-        [0.4, 1.184, 4.292],
-        [0.45, 1.396, 4.631],
-        [0.5, 1.604, 4.933],
-        [0.55, 1.807, 5.202],
-        [0.6, 2.002, 5.444],
-        [0.65, 2.19, 5.66],
-        [0.7, 2.37, 5.855],
-        [0.75, 2.541, 6.031],
-        [0.8, 2.705, 6.19],
-        [0.85, 2.861, 6.335],
-        [0.9, 3.01, 6.467],
-        [0.95, 3.151, 6.588],
-        [1.0, 3.286, 6.698],
-    ]
+
+def table(text: str, columns: int) -> np.ndarray:
+    """Rows of a printed table, several on a line."""
+    return np.array(text.split(), float).reshape(-1, columns)
+
+
+#: P/Pmax, tip displacements -u and w on 16 x 1 elements.
+END_SHEAR = table(
+    """
+    0.05 0.026 0.663  0.1 0.103 1.309  0.15 0.224 1.922  0.2 0.381 2.493  0.25 0.563 3.015
+    0.3 0.763 3.488  0.35 0.971 3.912  0.4 1.184 4.292  0.45 1.396 4.631  0.5 1.604 4.933
+    0.55 1.807 5.202  0.6 2.002 5.444  0.65 2.19 5.66  0.7 2.37 5.855  0.75 2.541 6.031
+    0.8 2.705 6.19  0.85 2.861 6.335  0.9 3.01 6.467  0.95 3.151 6.588  1.0 3.286 6.698
+    """,
+    3,
 )
-# P/Pmax, displacement under the outward and the inward force
-HEMISPHERE = np.array(
-    [
-        [0.05, 0.855, 0.955],
-        [0.1, 1.499, 1.84],
-        [0.15, 1.969, 2.604],
-        [0.2, 2.321, 3.261],
-        [0.25, 2.596, 3.833],
-        [0.3, 2.819, 4.339],
-        [0.35, 3.002, 4.79],
-        [0.4, 3.158, 5.196],
-        [0.45, 3.291, 5.565],
-        [0.5, 3.406, 5.902],
-        [0.55, 3.508, 6.212],
-        [0.6, 3.598, 6.497],
-        [0.65, 3.678, 6.761],
-        [0.7, 3.75, 7.006],
-        [0.75, 3.816, 7.234],
-        [0.8, 3.875, 7.448],
-        [0.85, 3.929, 7.647],
-        [0.9, 3.979, 7.835],
-        [0.95, 4.025, 8.011],
-        [1, 4.067, 8.178],
-    ]
+#: P/Pmax, displacement under the outward and the inward force.
+HEMISPHERE = table(
+    """
+    0.05 0.855 0.955  0.1 1.499 1.84  0.15 1.969 2.604  0.2 2.321 3.261  0.25 2.596 3.833
+    0.3 2.819 4.339  0.35 3.002 4.79  0.4 3.158 5.196  0.45 3.291 5.565  0.5 3.406 5.902
+    0.55 3.508 6.212  0.6 3.598 6.497  0.65 3.678 6.761  0.7 3.75 7.006  0.75 3.816 7.234
+    0.8 3.875 7.448  0.85 3.929 7.647  0.9 3.979 7.835  0.95 4.025 8.011  1 4.067 8.178
+    """,
+    3,
 )
-# P/Pmax, deflection of the crown
-SEMICYLINDER = np.array(
-    [
-        [0.05, 5.421],
-        [0.1, 16.1],
-        [0.125, 22.195],
-        [0.15, 27.657],
-        [0.175, 32.7],
-        [0.2, 37.582],
-        [0.225, 42.633],
-        [0.25, 48.537],
-        [0.275, 56.355],
-        [0.3, 66.41],
-        [0.325, 79.81],
-        [0.35, 94.669],
-        [0.4, 113.704],
-        [0.45, 124.751],
-        [0.5, 132.653],
-        [0.55, 138.92],
-        [0.6, 144.185],
-        [0.65, 148.77],
-        [0.7, 152.863],
-        [0.75, 156.584],
-        [0.8, 160.015],
-        [0.85, 163.211],
-        [0.9, 166.2],
-        [0.95, 168.973],
-        [1, 171.505],
-    ]
+#: P/Pmax, deflection of the crown.
+SEMICYLINDER = table(
+    """
+    0.05 5.421  0.1 16.1  0.125 22.195  0.15 27.657  0.175 32.7  0.2 37.582  0.225 42.633
+    0.25 48.537  0.275 56.355  0.3 66.41  0.325 79.81  0.35 94.669  0.4 113.704  0.45 124.751
+    0.5 132.653  0.55 138.92  0.6 144.185  0.65 148.77  0.7 152.863  0.75 156.584  0.8 160.015
+    0.85 163.211  0.9 166.2  0.95 168.973  1 171.505
+    """,
+    2,
 )
 
 
@@ -236,25 +193,7 @@ def test_roll_up_in_space_to_just_below_half_a_turn():
 
 def hemisphere(n: int, factors) -> np.ndarray:
     """Displacements under the outward and inward force on n by n elements of the quarter."""
-    polar = np.radians(18.0)
-
-    def place(u, v):
-        height = (0.5 * np.pi - polar) * v
-        return (
-            10 * np.cos(height) * np.cos(0.5 * np.pi * u),
-            10 * np.cos(height) * np.sin(0.5 * np.pi * u),
-            10 * np.sin(height),
-        )
-
-    patch = grid(n, n, place)
-    front, back = patch.index[0], patch.index[-1]  # planes y = 0 and x = 0
-    free = np.ones((len(patch.nodes), 5), bool)
-    free[np.ix_(front, [1, 4])] = False
-    free[np.ix_(back, [0, 4])] = False
-    free[patch.index[0, 0], 2] = False  # one height, against the rigid motion that is left
-    directors = patch.nodes / 10.0
-    mesh = ShellMesh.build(patch.nodes, patch.quads, 0.04, directors=directors)
-    shell = Shell(mesh, isotropic_section(6.825e7, 0.3, 0.04), free)
+    shell, patch = quarter_hemisphere("MITC4+EAS", n)
     force = np.zeros((len(patch.nodes), 5))
     force[patch.index[0, 0], 0] = 200.0
     force[patch.index[-1, 0], 1] = -200.0

@@ -9,23 +9,15 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from scipy.sparse.linalg import eigsh
 
 from dbvfiv.model.equilibria import find_equilibrium
 from tests.verification.solid_wall import FoldedWallError, SolidWall, valve_model
+from tests.verification.test_modal_valve import frequencies_at_rest
 
 pytestmark = pytest.mark.slow
 #: Factor of the thickness, elements through the wall, and how near frequencies and lips must be.
 CASES = [(0.85, 2, 0.02, 0.05), (0.5, 1, 0.013, 0.03), (0.1, 1, 0.006, 0.002)]
 UNIFORM = {"drive.kind": "uniform"}
-
-
-def shell_frequencies(model, count):
-    """Lowest frequencies of a shell at rest in vacuo, Hz."""
-    dofs = model.shell.dofs
-    stiffness = dofs.matrix(model.shell.force_and_tangent(model.rest())[1]).tocsc()
-    mass = dofs.matrix(model.mass(model.rest())).tocsc()
-    return np.sqrt(np.sort(eigsh(stiffness, count, mass, sigma=0, return_eigenvectors=False))) / (2 * np.pi)
 
 
 def test_no_solid_has_the_full_wall():
@@ -37,7 +29,7 @@ def test_no_solid_has_the_full_wall():
 @pytest.mark.parametrize(("factor", "through", "near", "_"), CASES)
 def test_frequencies(factor, through, near, _):
     """The solid has 24 x 24 elements with mid-edge nodes; the shell 28 x 96, for the short waves of the thin wall."""
-    shell = shell_frequencies(valve_model(28, 96, factor), 4)
+    shell = frequencies_at_rest(valve_model(28, 96, factor), 4)
     solid = SolidWall(valve_model(48, 48, factor), through).frequencies(4)
     print(f"\n{factor:g} of the thickness: shell {np.round(shell, 3)}  solid {np.round(solid, 3)} Hz")
     assert shell == pytest.approx(solid, rel=near)

@@ -27,8 +27,8 @@ import numpy as np
 import pytest
 
 from dbvfiv.shell import Shell, ShellMesh
-from dbvfiv.shell.pressure import OuterFace, pressure_force, pressure_stiffness
-from tests.shell.structures import grid, isotropic_section, solve_path
+from dbvfiv.shell.pressure import OuterFace
+from tests.shell.structures import isotropic_section, pressure_load, quarter_ring, solve_path
 
 RADIUS, STRIP, WIDTH, E, NU = 1.0, 1 / 3, 0.05, 6e6, 0.3
 AROUND, LAYERS = 1200, 8
@@ -126,35 +126,24 @@ def _grid(ring: Ring):
 
 def shell_ring(ring: Ring, elements: int, metric: str = "first-order", face: bool = False) -> dict[str, float]:
     """The same of the shell, loaded on the middle of its wall or on its inner face."""
-    turn = 0.5 * np.pi
-    patch = grid(elements, 1, lambda u, v: (RADIUS * np.cos(turn * u), RADIUS * np.sin(turn * u), WIDTH * v))
-    front, back = patch.index[0], patch.index[-1]
-    patch.nodes[front, 1] = 0.0
-    patch.nodes[back, 0] = 0.0
-    free = np.ones((len(patch.nodes), 5), bool)
-    free[:, [2, 3]] = False  # plane strain; the first frame vector is the axis
-    free[front, 1], free[back, 0] = False, False
-    free[np.concatenate([front, back]), 4] = False
+    patch, planes, free = quarter_ring(elements, RADIUS, WIDTH)
     centre = patch.nodes[patch.quads].mean(axis=1)
-    thickness = np.where(np.arctan2(centre[:, 1], centre[:, 0]) < STRIP * turn, ring.strip, ring.rest)
-    mesh = ShellMesh.build(patch.nodes, patch.quads, thickness, planes=[(front, 1), (back, 0)])
+    thickness = np.where(np.arctan2(centre[:, 1], centre[:, 0]) < STRIP * 0.5 * np.pi, ring.strip, ring.rest)
+    mesh = ShellMesh.build(patch.nodes, patch.quads, thickness, planes=planes)
     shell = Shell(mesh, isotropic_section(E, NU, ring.thick), free, metric)
-    loaded = np.ones(mesh.element_count)
-    inner = OuterFace(shell)
+    inner, on_middle = OuterFace(shell), pressure_load(shell, ring.pressure)
     inner.half_wall = -inner.half_wall
 
     def load(q, factor):
         """The slope is that of the load on the middle, near enough for Newton's method."""
-        nodal, p = shell.dofs.expand(q), np.full(mesh.node_count, factor * ring.pressure)
-        out, slope = np.zeros_like(nodal), np.zeros(len(shell.dofs.pattern[1]))
-        pressure_force(mesh.quads, mesh.nodes, nodal, p, loaded, out)
-        pressure_stiffness(mesh.quads, mesh.nodes, nodal, p, loaded, shell.dofs.slots, 1.0, slope)
-        force = inner.fluxes(nodal).T @ (factor * ring.pressure * loaded) if face else shell.dofs.restrict(out)
+        force, slope = on_middle(q, factor)
+        if face:
+            force = inner.fluxes(shell.dofs.expand(q)).T @ np.full(mesh.element_count, factor * ring.pressure)
         return force, slope
 
     q = solve_path(shell, load, [0.25, 0.5, 0.75, 1.0])[-1].q
     nodal = shell.dofs.expand(q)
-    found = {"strip": nodal[front[0], 0], "rest": nodal[back[0], 1]}
+    found = {"strip": nodal[patch.index[0, 0], 0], "rest": nodal[patch.index[-1, 0], 1]}
     hoop = shell.strains(q)[:, :, :, 1].mean(axis=1)  # Green-Lagrange, at the layer points
     zeta = shell.section.points[:, 0]
     for place, element in (("strip", 0), ("rest", len(patch.quads) - 1)):

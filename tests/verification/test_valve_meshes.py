@@ -10,13 +10,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from scipy.optimize import brentq
-from scipy.sparse.linalg import eigsh
 
 from dbvfiv.case.parameters import Mu
 from dbvfiv.model import ValveModel, linearise
 from dbvfiv.model.equilibria import LoadPath, SteadyOptions
 from dbvfiv.studies.case import thesis_case
 from eigen import SearchOptions, leading_modes
+from tests.shell.structures import lowest_frequencies
 from tests.verification.test_modal_valve import frequencies
 
 MESHES = ((14, 24), (28, 48), (42, 72), (56, 96))
@@ -154,9 +154,7 @@ def in_vacuo(around: int, along: int, mass: str) -> np.ndarray:
     keys = {"mesh.around": around, "mesh.along": along, "shell.mass": mass}
     model = ValveModel(thesis_case(keys))
     q = LoadPath(model, SteadyOptions.of(model.case)).go_to(FLOWS[0]).q
-    stiffness, inertia = (model.shell.dofs.matrix(v).tocsc() for v in (model.structure(q)[1], model.mass(q)))
-    values = eigsh(stiffness, 5, inertia, sigma=-1000.0, return_eigenvectors=False)
-    return np.sqrt(np.sort(values)) / (2 * np.pi)
+    return lowest_frequencies(model.shell, model.structure(q)[1], model.mass(q), 5, below=-1000.0)
 
 
 #: By mesh and mass, Hz; see `test_layered_valve_in_vacuo`.
