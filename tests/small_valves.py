@@ -8,8 +8,14 @@ from dbvfiv.model import ValveModel
 from dbvfiv.motion.start import steady_positions
 from dbvfiv.studies.case import THESIS, thesis_case
 
-#: The thesis's settings for a command without a case file.
-THESIS_SET = tuple(f"--set={key}={value}" for key, value in THESIS.items())
+
+def settings(keys, base=THESIS) -> tuple[str, ...]:
+    """Options of a command for keys, and by default for the thesis's settings, for a command without a case file."""
+    told = {key: str(value).lower() if isinstance(value, bool) else value for key, value in (base | keys).items()}
+    return tuple(f"--set={key}={value}" for key, value in told.items())
+
+
+THESIS_SET = settings({})
 #: Rows and columns at even distances; with the element of earlier versions too.
 EVEN = MappingProxyType({"mesh.rows": "uniform", "mesh.columns": "uniform"})
 FORMER = MappingProxyType({"mesh.element": "MITC4", **EVEN})

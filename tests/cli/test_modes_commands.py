@@ -8,7 +8,7 @@ import pytest
 
 import dbvfiv
 from tests.child import start
-from tests.small_valves import THESIS_SET
+from tests.small_valves import THESIS_SET, settings
 
 COARSE = (*THESIS_SET, "--set", "mesh.around=8", "--set", "mesh.along=16", "--set", "damping.alpha=0")
 
@@ -30,16 +30,8 @@ def test_modes_json(command_line):
 
 
 def test_set_and_options_say_the_same(command_line):
-    by_set = (
-        "--set",
-        "drive.pressure=6 kPa",
-        "--set",
-        "fluid.density=10",
-        "--set",
-        "modes.count=2",
-        "--set",
-        "modes.in_vacuo=true",
-    )
+    keys = {"drive.pressure": "6 kPa", "fluid.density": 10, "modes.count": 2, "modes.in_vacuo": True}
+    by_set = settings(keys, {})
     by_option = ("-p", "6e3 Pa", "--density", "10 kg/m^3", "-n", 2, "--in-vacuo")
     one, other = (json.loads(command_line("modes", *COARSE, *given, "--json").out) for given in (by_set, by_option))
     assert one == other and one["state"]["in_vacuo"]

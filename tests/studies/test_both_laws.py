@@ -8,22 +8,18 @@ import pytest
 
 import dbvfiv
 from dbvfiv.case import CaseError
-from dbvfiv.studies.case import THESIS, thesis_case
 from dbvfiv.studies.onset.study import disagreements
 from dbvfiv.studies.stability.dimensions import compare_ranges, compare_states
+from tests.small_valves import SMALL, load_small, settings
 
-SMALL = {"mesh.around": 6, "mesh.along": 8, "damping.alpha": 0.0, "drive.pressure": "6 kPa", "fluid.density": 60.0}
+STATE = {"damping.alpha": 0.0, "drive.pressure": "6 kPa", "fluid.density": 60.0}
 BOTH = {"modes.continuity": "both", "onset.continuity": "both", "onset.coarse_mesh": 0, "onset.normal_form": False}
-OPTIONS = [f"--set={key}={value}" for key, value in (THESIS | SMALL).items()]
-
-
-def load(**changes):
-    return dbvfiv.load(thesis_case(), SMALL | {key.replace("__", "."): value for key, value in changes.items()})
+OPTIONS = settings(SMALL | STATE)
 
 
 def test_modes_under_both_laws_are_those_of_each(command_line):
     document = json.loads(command_line("modes", *OPTIONS, "--law", "both", "--count=4", "--json").out)
-    alone = {law: load().modes(continuity=law, count=4) for law in ("quasi-steady", "storage")}
+    alone = {law: load_small(STATE).modes(continuity=law, count=4) for law in ("quasi-steady", "storage")}
     other = document["other_law"]
     assert document["state"]["continuity"] == "quasi-steady" and other["continuity"] == "storage"
     for found, law in ((document, "quasi-steady"), (other, "storage")):
@@ -57,8 +53,9 @@ def test_one_law_in_place_of_the_cases(command_line):
 
 @pytest.mark.slow
 def test_onsets_under_both_laws_are_those_of_each():
-    found = load(**{key.replace(".", "__"): value for key, value in BOTH.items()}).onset("density=5:300:6:log")
-    other = load(onset__coarse_mesh=0, onset__normal_form=False).onset("density=5:300:6:log", continuity="storage")
+    found = load_small(STATE, BOTH).onset("density=5:300:6:log")
+    alone = load_small(STATE, {"onset.coarse_mesh": 0, "onset.normal_form": False})
+    other = alone.onset("density=5:300:6:log", continuity="storage")
     assert found.other_law["points"][0]["value"] == pytest.approx(other.points[0]["value"], rel=1e-8)
     ((low, high, law),) = found.disagreements
     assert law == "storage"
@@ -70,17 +67,17 @@ def test_onsets_under_both_laws_are_those_of_each():
 @pytest.mark.parametrize(
     "study, keys, words",
     [
-        ("modes", {"modes__in_vacuo": True}, "in_vacuo leaves the fluid out"),
-        ("modes", {"fluid__unsteady": False}, "fluid.unsteady is false"),
-        ("modes", {"drive__kind": "uniform"}, "drive.kind is 'uniform'"),
-        ("onset", {"onset__over": "storage"}, "onset.over moves the flow model itself"),
-        ("onset", {"fluid__unsteady": False}, "fluid.unsteady is false"),
-        ("modes", {"fluid__sound_speed": 343, "fluid__continuity": "storage"}, "compressed .* stores mass"),
+        ("modes", {"modes.in_vacuo": True}, "in_vacuo leaves the fluid out"),
+        ("modes", {"fluid.unsteady": False}, "fluid.unsteady is false"),
+        ("modes", {"drive.kind": "uniform"}, "drive.kind is 'uniform'"),
+        ("onset", {"onset.over": "storage"}, "onset.over moves the flow model itself"),
+        ("onset", {"fluid.unsteady": False}, "fluid.unsteady is false"),
+        ("modes", {"fluid.sound_speed": 343, "fluid.continuity": "storage"}, "compressed .* stores mass"),
     ],
 )
 def test_where_no_law_is_at_work_there_are_not_two(study, keys, words):
     with pytest.raises(CaseError, match=rf"{study}\.continuity is given as 'both', but .*{words}"):
-        getattr(load(**keys | {f"{study}__continuity": "both"}), study)()
+        getattr(load_small(STATE, keys, {f"{study}.continuity": "both"}), study)()
 
 
 def test_a_law_that_is_none(command_line, one_sentence):

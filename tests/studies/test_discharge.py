@@ -11,19 +11,14 @@ import dbvfiv
 from dbvfiv.case import CaseError
 from dbvfiv.case.measured import DISCHARGE, read_measured
 from dbvfiv.case.quantity import GRAVITY
-from dbvfiv.studies.case import THESIS, thesis_case
+from dbvfiv.studies.case import thesis_case
 from dbvfiv.studies.measured import FLOW, MeasuredCurve
 from dbvfiv.studies.steady.figures import draw_together
 from dbvfiv.studies.steady.study import flow_at
-from tests.small_valves import make_valve
+from tests.small_valves import SMALL, load_small, make_valve, settings
 
-SMALL = {"mesh.around": 6, "mesh.along": 8}
-OPTIONS = [f"--set={key}={value}" for key, value in (THESIS | SMALL).items()]
+OPTIONS = settings(SMALL)
 PRESSURES = ["2 kPa", "6 kPa", "12 kPa", "18 kPa"]
-
-
-def load(**changes):
-    return dbvfiv.load(thesis_case(), SMALL | {key.replace("__", "."): value for key, value in changes.items()})
 
 
 def results(valve, pressures=PRESSURES):
@@ -38,7 +33,7 @@ def rest_area() -> float:
 @pytest.mark.parametrize("back", [0.0, 3e3])
 @pytest.mark.parametrize("ratio", [2.0, 5.0])
 def test_the_valve_is_cracked_where_its_passage_has_grown_as_stated(ratio, back):
-    valve = load(steady__cracking_area=ratio, downstream__pressure=back)
+    valve = load_small({"steady.cracking_area": ratio, "downstream.pressure": back})
     found = results(valve, [back + 6e3, back + 2e3]).cracking
     state = valve.steady(pressure=back + found.pressure)
     assert state.outlet_area == pytest.approx(ratio * rest_area(), rel=1e-3)
@@ -53,7 +48,7 @@ def test_how_far_the_valve_was_found_open_does_not_move_its_cracking_head():
 
 
 def test_a_valve_that_stays_nearly_shut_is_not_cracked():
-    found = results(load(), [10.0])
+    found = results(load_small(), [10.0])
     assert found.cracking.pressure is None and found.summary()["cracking"]["pressure"] is None
     assert "Cracking: not up to 0.01 kPa" in "\n".join(found.lines())
 
@@ -120,7 +115,7 @@ def test_bad_measured_points(tmp_path, text, words):
     with pytest.raises(CaseError, match=rf"steady\.measured is given as .*, wh.*{words}"):
         thesis_case([f"steady.measured={file}"])
     with pytest.raises(CaseError, match=rf"steady\.measured is given as .*, wh.*{words}"):
-        load(steady__measured=str(file)).steady([6e3])
+        load_small({"steady.measured": str(file)}).steady([6e3])
 
 
 def test_a_missing_file_of_points():
@@ -129,7 +124,7 @@ def test_a_missing_file_of_points():
 
 
 def test_measured_points_beside_computed_ones(tmp_path, command_line):
-    curve = {state.pressure: state.mass_flow for state in results(load()).states}
+    curve = {state.pressure: state.mass_flow for state in results(load_small()).states}
     file, kept = tmp_path / "points.csv", tmp_path / "run.h5"
     rows = [f"{p}, {1.1 * q}" for p, q in list(curve.items())[1:]]
     file.write_text("\n".join(["pressure [Pa], flow [kg/s]", *rows, "9e3, 20", "90e3, 150"]))
@@ -140,7 +135,7 @@ def test_measured_points_beside_computed_ones(tmp_path, command_line):
     result = dbvfiv.load_result(kept)
     found = result.measured.discharge
     assert found.difference[:3] == pytest.approx(1 / 1.1 - 1, rel=1e-6)
-    exact = load().steady(pressure=9e3).mass_flow
+    exact = load_small().steady(pressure=9e3).mass_flow
     assert found.computed[3] == pytest.approx(exact, rel=0.02)
     assert np.isnan(found.computed[4]) and result.summary()["measured"][4]["difference"] is None
     labels = [text.get_text() for text in result.figures(["head-discharge"])["head-discharge"].axes[0].legend_.texts]
@@ -148,7 +143,7 @@ def test_measured_points_beside_computed_ones(tmp_path, command_line):
 
 
 def test_measured_points_at_one_pressure():
-    states = results(load(), ["6 kPa"]).states
+    states = results(load_small(), ["6 kPa"]).states
 
     def against(pressure):
         pressure = np.array(pressure)
@@ -172,7 +167,8 @@ def test_a_sealed_bill_has_no_operating_point():
 
 
 def test_line_and_valve_cross_at_the_operating_point():
-    found = results(load(upstream__length=50.0, upstream__loss=20.0, upstream__friction=0.02), ["6 kPa", "18 kPa"])
+    line = {"upstream.length": 50.0, "upstream.loss": 20.0, "upstream.friction": 0.02}
+    found = results(load_small(line), ["6 kPa", "18 kPa"])
     (axes,) = found.figures(["operating-point"])["operating-point"].axes
     curves = {line.get_label(): line.get_xydata() for line in axes.lines}
     valve = curves["valve and what is behind it"]
@@ -187,9 +183,9 @@ def test_line_and_valve_cross_at_the_operating_point():
 def runs(tmp_path_factory):
     folder = tmp_path_factory.mktemp("runs")
     kept = []
-    for name, changes in {"free": {}, "pipe": {"downstream__pipe_diameter": 0.305}, "coarse": {}}.items():
+    for name, changes in {"free": {}, "pipe": {"downstream.pipe_diameter": 0.305}, "coarse": {}}.items():
         pressures = ["4 kPa", "15 kPa"] if name == "coarse" else PRESSURES
-        session = load(**changes).session.replace({"steady.pressures": pressures})
+        session = load_small(changes).session.replace({"steady.pressures": pressures})
         kept.append(session.perform("steady", folder / f"{name}.h5").path)
     return kept
 
@@ -219,11 +215,11 @@ def test_axes_hold_the_widest_of_several_runs(runs):
 
 
 def test_what_cannot_be_compared(runs, command_line, one_sentence, tmp_path):
-    other = load(drive__pressure="6 kPa").modes(count=2, output=tmp_path / "modes.h5").path
+    other = load_small({"drive.pressure": "6 kPa"}).modes(count=2, output=tmp_path / "modes.h5").path
     for files, words in (((runs[0], other), "kind 'modes'"), ((other, runs[0]), "transient, steady and closure runs")):
         outcome = command_line("compare", *files, "-o", tmp_path / "no.png")
         assert outcome.status == 2 and one_sentence(outcome.err) and words in outcome.err
-    still = load(drive__kind="uniform").session.replace({"steady.pressures": ["1 kPa"]})
+    still = load_small({"drive.kind": "uniform"}).session.replace({"steady.pressures": ["1 kPa"]})
     path = still.perform("steady", tmp_path / "still.h5").path
     outcome = command_line("compare", runs[0], path, "-o", tmp_path / "no.png")
     assert outcome.status == 2 and one_sentence(outcome.err) and "without flow" in outcome.err

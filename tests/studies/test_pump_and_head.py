@@ -7,29 +7,20 @@ import pytest
 from scipy.interpolate import PchipInterpolator
 from scipy.optimize import brentq
 
-import dbvfiv
 from dbvfiv.case import CaseError
 from dbvfiv.case.quantity import GRAVITY
 from dbvfiv.errors import SolveError
-from dbvfiv.studies.case import THESIS, thesis_case
+from dbvfiv.studies.case import thesis_case
+from tests.small_valves import SMALL, load_small, settings
 
-SMALL = {
-    "mesh.around": 6,
-    "mesh.along": 8,
-    "upstream.length": 20.0,
-    "upstream.diameter": 0.3,
-    "upstream.friction": 0.02,
-}
+LINE = {"upstream.length": 20.0, "upstream.diameter": 0.3, "upstream.friction": 0.02}
 DAMPED = {"damping.alpha": 0.0, "damping.beta": 1e-3}
 ROWS = [[0, 3.0], [0.03, 2.6], [0.06, 1.8], [0.1, 0.3]]
 PUMP = {"upstream.pump": ROWS}
 
 
 def load(*keys):
-    changes = SMALL | DAMPED
-    for some in keys:
-        changes = changes | some
-    return dbvfiv.load(thesis_case(), changes)
+    return load_small(LINE, DAMPED, *keys)
 
 
 @pytest.fixture(scope="module")
@@ -57,8 +48,8 @@ def test_a_list_of_pressures_is_what_was_asked_for(operating):
 
 def test_the_command_line_gives_the_operating_point(command_line, operating, tmp_path):
     (tmp_path / "pump.csv").write_text("flow [L/s], head [m]\n0, 3\n30, 2.6\n60, 1.8\n100, 0.3\n")
-    options = [f"--set={key}={value}" for key, value in (THESIS | SMALL | DAMPED).items()]
-    out = command_line("steady", *options, f"--set=upstream.pump={tmp_path / 'pump.csv'}").out
+    pump = {"upstream.pump": tmp_path / "pump.csv"}
+    out = command_line("steady", *settings(SMALL | LINE | DAMPED | pump)).out
     assert f"{operating.pressure / 1e3:.6g}" in out
 
 

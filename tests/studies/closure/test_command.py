@@ -7,9 +7,9 @@ import json
 import pytest
 
 from dbvfiv.studies.session import load_result
-from tests.small_valves import THESIS_SET
+from tests.small_valves import settings
 
-COARSE = (*THESIS_SET, "--set", "mesh.around=6", "--set", "mesh.along=10", "--set", "closure.max_step=5 kPa")
+COARSE = settings({"mesh.around": 6, "mesh.along": 10, "closure.max_step": "5 kPa"})
 
 
 def test_one_json_document(command_line):
@@ -36,18 +36,8 @@ def test_both_supports_are_compared(command_line, tmp_path):
 
 @pytest.mark.slow
 def test_a_wall_that_snaps_is_told_in_a_sentence(command_line, one_sentence):
-    done = command_line(
-        "closure",
-        *COARSE,
-        "--set",
-        "valve.thickness_factor=0.25",
-        "--set",
-        "closure.arclength=false",
-        "--set",
-        "closure.max_step=0.5 kPa",
-        "-p",
-        "28 kPa",
-    )
+    thin = {"valve.thickness_factor": 0.25, "closure.arclength": False, "closure.max_step": "0.5 kPa"}
+    done = command_line("closure", *COARSE, *settings(thin, {}), "-p", "28 kPa")
     assert done.status == 1
     last = done.err.strip().splitlines()[-1]
     assert one_sentence(last) and "were reached" in last

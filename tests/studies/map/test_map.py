@@ -1,5 +1,6 @@
 """Stability maps on a coarse mesh: order of columns, certificates, gaps, resume, lost workers."""
 
+import json
 import os
 import signal
 from dataclasses import replace
@@ -7,7 +8,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from dbvfiv.cli import run
 from dbvfiv.errors import SolveError
 from dbvfiv.model import ValveModel
 from dbvfiv.model.equilibria import LoadPath, find_equilibrium
@@ -20,7 +20,7 @@ from dbvfiv.studies.map.study import MapResult, keep_column, tables_of
 from dbvfiv.studies.modes.search import run_modes
 from dbvfiv.studies.session import load_result
 from eigen import SingularShiftError, unstable_count
-from tests.small_valves import SMALL, THESIS_SET
+from tests.small_valves import SMALL, settings
 
 from .axes import AXES, run_map
 
@@ -103,9 +103,6 @@ def test_two_structural_axes(coarse_case):
 
 
 def test_a_missing_state_is_a_marked_gap(case, monkeypatch):
-    from dbvfiv.errors import SolveError
-    from dbvfiv.model.equilibria import LoadPath
-
     honest = LoadPath.go_to
 
     def go_to(self, target):
@@ -121,25 +118,19 @@ def test_a_missing_state_is_a_marked_gap(case, monkeypatch):
     assert np.isfinite(result.grid("growth_rate")[0][:, [0, 1, 3, 4, 5]]).all()
 
 
-def test_json_and_figures(case, tmp_path, capsys):
-    arguments = [
-        f"--set={key}={str(value).lower() if isinstance(value, bool) else value}" for key, value in AXES.items()
-    ]
-    mesh = [*THESIS_SET, "--set=mesh.around=8", "--set=mesh.along=16", "--set=damping.alpha=0"]
-    assert (
-        run(["map", *arguments, *mesh, "--x", "pressure=3 kPa:8 kPa:3", "--json", "--plots", str(tmp_path / "figures")])
-        == 0
-    )
-    import json
-
-    document = json.loads(capsys.readouterr().out)
+def test_json_and_figures(command_line, tmp_path):
+    options = settings(AXES | {"mesh.around": 8, "mesh.along": 16, "damping.alpha": 0})
+    shown = "--json", "--plots", tmp_path / "figures"
+    outcome = command_line("map", *options, "--x", "pressure=3 kPa:8 kPa:3", *shown)
+    assert outcome.status == 0, outcome.err
+    document = json.loads(outcome.out)
     assert np.shape(document["growth_rate"]) == (10, 3) == np.shape(document["unstable_count"])
     assert document["x"]["parameter"] == "pressure" and document["onset_curves"]
     assert {p.name for p in (tmp_path / "figures").iterdir()} == {"stability-map.png", "leading-frequency.png"}
 
 
 def test_the_command_says_what_is_fixed(command_line, one_sentence, tmp_path):
-    mesh = [*THESIS_SET, "--set=mesh.around=6", "--set=mesh.along=10", "--set=map.checks=0", "--set=map.curve=false"]
+    mesh = settings({"mesh.around": 6, "mesh.along": 10, "map.checks": 0, "map.curve": False})
     axes = ["--x", "density=1:100:3:log", "--y", "beta=0.001:0.004:3"]
     path = tmp_path / "map.h5"
     outcome = command_line("map", *mesh, *axes, "-p", "4 kPa", "-o", path)

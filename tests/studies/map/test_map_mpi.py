@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from dbvfiv.studies.case import THESIS
 from dbvfiv.studies.session import load_result
+from tests.small_valves import settings
 from tests.studies.map.axes import run_map
 from tests.studies.work import run_under_mpi
 
@@ -21,11 +21,7 @@ MESH = {"mesh.around": 8, "mesh.along": 16, "damping.alpha": 0.0, "damping.beta"
 @pytest.mark.slow
 def test_two_mpi_processes_find_the_same_map(coarse_case, tmp_path):
     path = tmp_path / "map.h5"
-    changes = [
-        f"--set={key}={str(value).lower() if isinstance(value, bool) else value}"
-        for key, value in (THESIS | SETTINGS | MESH).items()
-    ]
-    done = run_under_mpi(2, "dbvfiv", "map", *changes, "-o", str(path))
+    done = run_under_mpi(2, "dbvfiv", "map", *settings(SETTINGS | MESH), "-o", str(path))
     assert done.returncode == 0, done.stderr
     shared, alone = load_result(path), run_map(coarse_case.replace(SETTINGS | MESH))
     assert shared.complete and len(shared.columns) == 4

@@ -6,15 +6,10 @@ import pytest
 
 from dbvfiv.cli import run
 from dbvfiv.studies.session import load_result
-from tests.small_valves import THESIS_SET
+from tests.small_valves import settings
 
-SETTINGS = [
-    "--set=mesh.around=8",
-    "--set=mesh.along=16",
-    "--set=damping.alpha=0",
-    "--set=onset.normal_form=false",
-    "--set=onset.coarse_mesh=0",
-]
+PLAIN = {"onset.normal_form": False, "onset.coarse_mesh": 0}
+SETTINGS = settings({"mesh.around": 8, "mesh.along": 16, "damping.alpha": 0} | PLAIN, {})
 
 
 @pytest.fixture(scope="module")
@@ -26,20 +21,8 @@ def outcome(tmp_path_factory):
 
     out = io.StringIO()
     with contextlib.redirect_stdout(out):
-        status = run(
-            [
-                "onset",
-                "--over",
-                "density=1:1000:15:log",
-                "--set=drive.pressure=6 kPa",
-                *SETTINGS,
-                "--json",
-                "-o",
-                str(path),
-                "--plots",
-                str(folder),
-            ]
-        )
+        kept = "--json", "-o", str(path), "--plots", str(folder)
+        status = run(["onset", "--over", "density=1:1000:15:log", "--set=drive.pressure=6 kPa", *SETTINGS, *kept])
     return status, json.loads(out.getvalue()), path
 
 
@@ -75,9 +58,8 @@ def test_figure(outcome):
 
 
 def test_the_command_says_what_is_fixed(command_line, one_sentence, outcome):
-    asked = ["onset", "--over", "alpha=0:40:3", "--set=onset.normal_form=false", "--set=onset.coarse_mesh=0"]
-    mesh = [*THESIS_SET, "--set=mesh.around=6", "--set=mesh.along=10"]
-    done = command_line(*asked, *mesh, "-p", "4 kPa", "--density", 10)
+    options = settings({"mesh.around": 6, "mesh.along": 10} | PLAIN)
+    done = command_line("onset", "--over", "alpha=0:40:3", *options, "-p", "4 kPa", "--density", 10)
     assert done.status == 0, done.err
     assert done.out.startswith("At 4 kPa static, 10 kg/m³, quasi-steady, β = 0.003 s:")
     _, document, path = outcome

@@ -7,8 +7,9 @@ import pytest
 
 import dbvfiv
 from dbvfiv.errors import CaseError
-from dbvfiv.studies.case import THESIS, thesis_case
+from dbvfiv.studies.case import thesis_case
 from tests.observers import Stop
+from tests.small_valves import settings
 
 CHANGES = {"mesh.around": 8, "mesh.along": 14, "damping.alpha": 0, "fluid.density": 10, "drive.pressure": 6e3}
 NAMES = ["pressure", "beta", "layer 3 angle", "alpha"]
@@ -71,16 +72,16 @@ def test_an_interrupted_run_goes_on_with_the_same_digits(valve, found, tmp_path)
 
 def test_command(command_line, found, one_sentence):
     given = {key: value for key, value in CHANGES.items() if key[:5] not in ("drive", "fluid")}
-    settings = [f"--set={key}={value}" for key, value in (THESIS | given).items()]
+    options = settings(given)
     asked = [word for name in NAMES for word in ("--of", name)]
-    outcome = command_line("sensitivity", *settings, "-p", "6 kPa", "--density", 10, *asked, "--json")
+    outcome = command_line("sensitivity", *options, "-p", "6 kPa", "--density", 10, *asked, "--json")
     assert outcome.status == 0, outcome.err
     document = json.loads(outcome.out)
     assert document["mode"]["growth_rate"] == found.growth_rate
     rows = {row["parameter"]: row for row in document["sensitivities"]}
     assert set(rows) == set(NAMES) and rows["layer 3 angle"]["unit"] == "deg"
     assert rows["beta"]["growth_rate_per_percent"] == pytest.approx(0.003 / 100 * rows["beta"]["growth_rate"])
-    outcome = command_line("sensitivity", *settings, "--of", "colour")
+    outcome = command_line("sensitivity", *options, "--of", "colour")
     assert outcome.status == 2 and "'colour'" in outcome.err and one_sentence(outcome.err)
 
 

@@ -5,18 +5,14 @@ import json
 import numpy as np
 import pytest
 
-from tests.small_valves import THESIS_SET
+from tests.small_valves import SMALL, settings
 
-SMALL = [
-    w
-    for key in ("mesh.around=6", "mesh.along=8", "transient.duration=0.02", "transient.save_every=0.005")
-    for w in ("--set", key)
-] + [*THESIS_SET]
+SHORT = settings(SMALL | {"transient.duration": 0.02, "transient.save_every": 0.005})
 
 
 def test_transient_and_what_reads_it(command_line, tmp_path):
     path, figures = tmp_path / "run.h5", tmp_path / "figures"
-    outcome = command_line("transient", *SMALL, "-o", path, "--plots", figures, "--json")
+    outcome = command_line("transient", *SHORT, "-o", path, "--plots", figures, "--json")
     assert outcome.status == 0, outcome.err
     document = json.loads(outcome.out)
     for key in ("verdict", "amplitude", "frequency", "mean", "cycles_observed", "periodicity_error", "steps", "time"):
@@ -26,14 +22,8 @@ def test_transient_and_what_reads_it(command_line, tmp_path):
         assert key in document["lip_displacement"] or key in ("steps", "time")
     assert document["steps"] == 20 and document["time"] == pytest.approx(0.02)
     drawn = {p.name for p in figures.iterdir()}
-    assert {
-        "history.png",
-        "phase-portrait.png",
-        "spectrum.png",
-        "centre-line-cycle.png",
-        "energies.png",
-        "lip-wave.png",
-    } <= drawn
+    names = ("history", "phase-portrait", "spectrum", "centre-line-cycle", "energies", "lip-wave")
+    assert {f"{name}.png" for name in names} <= drawn
     assert command_line("info", path).status == 0
     outcome = command_line("resume", path, "--duration", "25 ms", "--json")
     assert json.loads(outcome.out)["steps"] == 25
@@ -45,7 +35,7 @@ def test_transient_and_what_reads_it(command_line, tmp_path):
 
 @pytest.mark.slow
 def test_animation(command_line, tmp_path):
-    assert command_line("transient", *SMALL, "--plots", tmp_path, "--animate", tmp_path / "run.gif").status == 0
+    assert command_line("transient", *SHORT, "--plots", tmp_path, "--animate", tmp_path / "run.gif").status == 0
     assert (tmp_path / "run.gif").read_bytes()[:3] == b"GIF"
 
 

@@ -18,7 +18,7 @@ from dbvfiv.motion.control import RunOptions
 from dbvfiv.record.files import Header
 from dbvfiv.record.mesh import MeshData
 from dbvfiv.record.record import GrowingRecord, Journal, StoredRecord
-from dbvfiv.studies.case import THESIS, Case
+from dbvfiv.studies.case import Case
 from dbvfiv.studies.session import load_result
 from dbvfiv.studies.transient import history
 from dbvfiv.studies.transient.history import (
@@ -36,6 +36,7 @@ from dbvfiv.studies.transient.history import (
 )
 from dbvfiv.studies.transient.run import Runner
 from tests.observers import Stop
+from tests.small_valves import SMALL, settings
 
 from .runs import SHORT, transient
 
@@ -282,21 +283,11 @@ def test_killed_with_signal_9_at_any_moment(tmp_path, valve):
     """The file can be read and resumed whenever its writer dies, and loses no more than the steps since the last
     restart point.
     """
-    changes = [
-        "mesh.around=6",
-        "mesh.along=8",
-        "transient.duration=0.3",
-        "transient.step=5e-4",
-        "transient.save_every=0.002",
-        "transient.restart_every=7",
-    ]
-    case = valve(
-        {"transient.duration": 0.3, "transient.step": 5e-4, "transient.save_every": 0.002, "transient.restart_every": 7}
-    )
+    changes = {"transient.duration": 0.3, "transient.step": 5e-4}
+    changes |= {"transient.save_every": 0.002, "transient.restart_every": 7}
+    case, path = valve(changes), tmp_path / "killed.h5"
     whole = transient(case)
-    path = tmp_path / "killed.h5"
-    changes += [f"{key}={value}" for key, value in THESIS.items()]
-    command = [sys.executable, "-m", "dbvfiv", "transient", "-o", str(path), *(f"--set={c}" for c in changes)]
+    command = [sys.executable, "-m", "dbvfiv", "transient", "-o", str(path), *settings(SMALL | changes)]
     rng = np.random.default_rng(0)
     found = []
     for wait in [0.0, 0.02, *rng.uniform(0.1, 6.0, 5)]:
