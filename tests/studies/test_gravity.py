@@ -7,18 +7,17 @@ import pytest
 
 import dbvfiv
 from continuation.normal_form import Motion
-from dbvfiv.case.parameters import Mu
 from dbvfiv.case.quantity import GRAVITY
 from dbvfiv.errors import SolveError
 from dbvfiv.model.classes import linearise_class
 from dbvfiv.model.equilibria import find_equilibrium, rest_state
 from dbvfiv.model.forms import ValveForms
 from dbvfiv.model.symmetry import SYMMETRIES
-from dbvfiv.studies.case import THESIS, thesis_case
+from dbvfiv.studies.case import thesis_case
 from dbvfiv.studies.stability.place import is_surrounding
-from dbvfiv.studies.stability.walk import StabilityWalk
 from tests.model.test_residual_forms import check, difference
-from tests.small_valves import SMALL, load_small, make_valve
+from tests.small_valves import SMALL, load_small, make_valve, settings
+from tests.studies.along import check_map, check_sensitivity, check_sweep, check_walk
 from tests.verification.test_transient_modes import check_three_routes, three_routes
 
 DOWN, UP = {"gravity.direction": "-z"}, {"gravity.direction": "+z"}
@@ -110,24 +109,11 @@ def test_classes_of_motion_hold_the_weight():
 @pytest.mark.slow
 def test_studies_over_the_density_follow_the_steady_state():
     keys = DOWN | {"drive.pressure": "6 kPa", "damping.alpha": 0.0}
-    case = load_small(keys).case
-    assert not is_surrounding(case, "density") and is_surrounding(load_small().case, "density")
-    swept = load_small(keys).sweep("density=10:400:3:log")
-    assert swept.certified and len(swept.points) == 3
-    walk, place = StabilityWalk(case), Mu.of(case)
-    for number, density in ((0, 10.0), (2, 400.0)):
-        valve = load_small(keys, {"fluid.density": density})
-        there = place.at(density=density)
-        assert walk.equilibrium(there) == pytest.approx(valve.steady(pressure="6 kPa").q, rel=1e-6, abs=1e-9)
-        leading = valve.modes(count=4).modes[0]
-        assert walk.spectrum(there, 4).eigenvalues[0].real == pytest.approx(leading.growth_rate, rel=1e-6)
-        growth = max(b.growth_rate[number] for b in swept.branches if np.isfinite(b.growth_rate[number]))
-        assert growth == pytest.approx(leading.growth_rate, rel=1e-6)
-    (found,) = load_small(keys).steady(pressure="6 kPa").sensitivity("density").sensitivities
-    low, high = (
-        load_small(keys, {"fluid.density": 1000.0 + step}).modes(count=4).modes[0].growth_rate for step in (-1.0, 1.0)
-    )
-    assert found.growth_rate == pytest.approx((high - low) / 2.0, rel=1e-3)
+    assert not is_surrounding(load_small(keys).case, "density") and is_surrounding(load_small().case, "density")
+    swept = check_sweep((keys,), "density=10:400:3:log", "fluid.density", (0, 2))
+    assert len(swept.points) == 3
+    check_walk((keys,), swept, "fluid.density", (0, 2))
+    check_sensitivity((keys,), "density", "fluid.density", 1.0)
 
 
 LOSSES = {"damping.model": "loss factor", "materials.constants": "stable"}
@@ -148,15 +134,10 @@ def test_normal_forms_hold_the_weight(keys):
 @pytest.mark.slow
 def test_a_map_over_the_density():
     axes = {"map.x": "pressure=3 kPa:6 kPa:2:log", "map.y": "density=10:1000:3:log"}
-    found = load_small(DOWN, {"damping.alpha": 0.0}, axes).map()
-    assert not found.failures and found.grid("certified").all()
-    (growth,) = found.grid("growth_rate")
-    keys = {"fluid.density": 10.0, "drive.pressure": 3e3, "damping.alpha": 0.0}
-    assert growth[0, 0] == pytest.approx(load_small(DOWN, keys).modes(count=4).modes[0].growth_rate, rel=1e-6)
+    check_map((DOWN, {"damping.alpha": 0.0}), axes, {(0, 0): {"fluid.density": 10.0, "drive.pressure": 3e3}})
 
 
 @pytest.mark.slow
 def test_back_pressure_says_that_nothing_weighs(command_line):
-    keys = SMALL | DOWN | {"closure.pressures": "[100]"}
-    out = command_line("closure", *(f"--set={key}={value}" for key, value in (THESIS | keys).items()))
+    out = command_line("closure", *settings(SMALL | DOWN | {"closure.pressures": "[100]"}))
     assert out.status == 0 and "Gravity has no part" in out.out + out.err

@@ -8,12 +8,10 @@ import numpy as np
 import pytest
 
 from dbvfiv.case import CaseError
-from dbvfiv.case.parameters import Mu
 from dbvfiv.case.quantity import GRAVITY
-from dbvfiv.studies.case import THESIS
 from dbvfiv.studies.stability.place import is_surrounding
-from dbvfiv.studies.stability.walk import StabilityWalk
-from tests.small_valves import FORMER, SMALL, load_small
+from tests.small_valves import FORMER, SMALL, load_small, settings
+from tests.studies.along import check_map, check_neutral, check_sensitivity, check_sweep, check_walk
 
 LINE = {"upstream.length": 20.0, "upstream.diameter": "300 mm", "upstream.loss": 1.5}
 FRICTION = LINE | {"upstream.friction": 0.02}
@@ -55,19 +53,17 @@ def test_equilibria_do_not_depend_on_density(pipe, pressure):
 
 
 def test_printed_pressures_say_where_they_are(command_line):
-    options = [f"--set={key}={value}" for key, value in (THESIS | SMALL | FRICTION).items()]
+    options = settings(SMALL | FRICTION)
     out = command_line("steady", *options, "-p", "18 kPa").out
     assert "reservoir" in out and "at the flange" in out and "line loss" in out and "Supply" in out
     out = command_line("steady", *options, "--set=drive.at=line", "-p", "18 kPa").out
     assert "far end" in out
-    out = command_line(
-        "steady", *(f"--set={key}={value}" for key, value in (THESIS | SMALL).items()), "-p", "18 kPa"
-    ).out
+    out = command_line("steady", *settings(SMALL), "-p", "18 kPa").out
     assert "reservoir" not in out and "line loss" not in out
 
 
 def test_verdicts_name_the_continuity_law(command_line):
-    options = [f"--set={key}={value}" for key, value in (THESIS | SMALL | LIGHT | LINE).items()]
+    options = settings(SMALL | LIGHT | LINE)
     for law in ("quasi-steady", "storage"):
         out = command_line("modes", *options, f"--set=fluid.continuity={law}").out
         assert f"Flutters under {law} continuity: " in out or f"Stable under {law} continuity: " in out
@@ -77,28 +73,15 @@ def test_verdicts_name_the_continuity_law(command_line):
 @pytest.mark.slow
 @pytest.mark.parametrize("name", KEYS)
 def test_modes_over_the_length_are_those_of_each_length(name):
-    found = load_small(CASES[name]).sweep(f"{name}=1:50:5:log")
-    assert found.certified
-    for i, value in enumerate(found.values):
-        leading = load_small(CASES[name], {KEYS[name]: float(value)}).modes(count=4).modes[0]
-        growth = max(b.growth_rate[i] for b in found.branches if np.isfinite(b.growth_rate[i]))
-        assert growth == pytest.approx(leading.growth_rate, rel=1e-6)
+    check_sweep((CASES[name],), f"{name}=1:50:5:log", KEYS[name])
 
 
 def test_friction_moves_the_steady_state_with_the_length():
-    swept = load_small(LIGHT, FRICTION).sweep("pipe_length=2:80:3:log")
-    assert swept.certified and len(swept.points) == 3
-    case = load_small(LIGHT, FRICTION).case
-    assert not is_surrounding(case, "pipe_length") and is_surrounding(load_small(LIGHT, LINE).case, "pipe_length")
-    walk, place = StabilityWalk(case), Mu.of(case)
-    for number, length in ((0, 2.0), (2, 80.0)):
-        valve = load_small(LIGHT, FRICTION, {"upstream.length": length})
-        there = place.at(pipe_length=length)
-        state = valve.steady(pressure="6 kPa")
-        assert walk.equilibrium(there) == pytest.approx(state.q, rel=1e-6, abs=1e-9)
-        leading = valve.modes(count=4).modes[0]
-        assert walk.spectrum(there, 4).eigenvalues[0].real == pytest.approx(leading.growth_rate, rel=1e-6)
-        assert swept.branches[0].growth_rate[number] == pytest.approx(leading.growth_rate, rel=1e-6)
+    moved, kept = (load_small(LIGHT, keys).case for keys in (FRICTION, LINE))
+    assert not is_surrounding(moved, "pipe_length") and is_surrounding(kept, "pipe_length")
+    swept = check_sweep((LIGHT, FRICTION), "pipe_length=2:80:3:log", "upstream.length", (0, 2))
+    assert len(swept.points) == 3
+    check_walk((LIGHT, FRICTION), swept, "upstream.length", (0, 2))
 
 
 @pytest.mark.slow
@@ -112,8 +95,7 @@ def test_onset_over_the_length_whether_or_not_the_steady_state_is_found_anew():
     assert one["confirmed"] and other["confirmed"] and one["criticality"] == other["criticality"] is not None
     assert one["value"] == pytest.approx(other["value"], rel=1e-5)
     assert one["crossing_speed"] == pytest.approx(other["crossing_speed"], rel=1e-3)
-    modes = load_small(LINE, keys, {"upstream.length": one["value"]}).modes(count=4).modes
-    assert min(abs(mode.growth_rate) for mode in modes) < 1e-5
+    check_neutral((LINE, keys), "upstream.length", one["value"], 1e-5)
 
 
 @pytest.mark.parametrize(
@@ -127,22 +109,13 @@ def test_onset_over_the_length_whether_or_not_the_steady_state_is_found_anew():
     ],
 )
 def test_map_over_the_length(name, x, y, last):
-    found = load_small(CASES[name], {"map.x": x, "map.y": f"{name}={y}"}).map()
-    assert not found.failures and found.grid("certified").all()
-    (growth,) = found.grid("growth_rate")
-    leading = load_small(CASES[name], last).modes(count=4).modes[0]
-    assert growth[-1, -1] == pytest.approx(leading.growth_rate, rel=1e-6)
+    check_map((CASES[name],), {"map.x": x, "map.y": f"{name}={y}"}, {(-1, -1): last})
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name, more", [("pipe_length", {}), ("pipe_length", FRICTION), ("tail_length", {})])
 def test_sensitivity_to_the_length(name, more):
-    keys, key = CASES[name] | more, KEYS[name]
-    (found,) = load_small(keys).steady(pressure=keys["drive.pressure"]).sensitivity(name).sensitivities
-    low, high = (
-        load_small(keys, {key: keys[key] + step}).modes(count=4).modes[0].growth_rate for step in (-0.02, 0.02)
-    )
-    assert found.growth_rate == pytest.approx((high - low) / 0.04, rel=1e-3)
+    check_sensitivity((CASES[name], more), name, KEYS[name], 0.02)
 
 
 @pytest.mark.parametrize("name, key", [("pipe_length", "upstream.length"), ("tail_length", "downstream.pipe_diameter")])

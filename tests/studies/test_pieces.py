@@ -7,11 +7,12 @@ import pytest
 
 import dbvfiv
 from dbvfiv.case import CaseError
-from dbvfiv.studies.case import thesis_case
 from dbvfiv.studies.stability.derivatives import parameters_of
+from tests.small_valves import load_small
+from tests.studies.along import check_sweep
 from tests.verification.test_transient_modes import check_three_routes, three_routes
 
-SMALL = {"mesh.around": 6, "mesh.along": 8, "drive.pressure": 6e3, "damping.alpha": 0.0, "fluid.density": 100.0}
+STATE = {"drive.pressure": 6e3, "damping.alpha": 0.0, "fluid.density": 100.0}
 PIPE = {"diameter": "250 mm", "friction": 0.02}
 ONE = {f"upstream.{name}": value for name, value in PIPE.items()} | {"upstream.length": 12.0, "upstream.loss": 2.0}
 TWO = {"upstream.pieces": [{"length": 6.0, "loss": 1.0, **PIPE}] * 2}
@@ -24,13 +25,6 @@ MIXED = {
 }
 
 
-def load(*keys):
-    changes = dict(SMALL)
-    for some in keys:
-        changes |= some
-    return dbvfiv.load(thesis_case(), changes)
-
-
 def with_waves(keys):
     """The same pipe or pipes with waves of 700 m/s in them."""
     if "upstream.pieces" in keys:
@@ -39,12 +33,11 @@ def with_waves(keys):
     return keys | {"upstream.wave_speed": 700.0, "upstream.elements": 4}
 
 
-@pytest.mark.parametrize(
-    "elastic",
-    [pytest.param(False, marks=pytest.mark.slow, id="rigid"), pytest.param(True, marks=pytest.mark.slow, id="elastic")],
-)
+@pytest.mark.slow
+@pytest.mark.parametrize("elastic", [False, True], ids=["rigid", "elastic"])
 def test_two_equal_pieces_are_one_pipe(elastic):
-    one, two = (load(with_waves(keys) if elastic else keys, {"steady.cracking_area": 2.0}) for keys in (ONE, TWO))
+    lines = [with_waves(keys) if elastic else keys for keys in (ONE, TWO)]
+    one, two = (load_small(STATE, keys, {"steady.cracking_area": 2.0}) for keys in lines)
     states = [valve.steady(pressure=6e3) for valve in (one, two)]
     for name in ("mass_flow", "line_loss", "flange_pressure", "lip_opening"):
         assert getattr(states[1], name) == pytest.approx(getattr(states[0], name), rel=1e-8)
@@ -52,9 +45,7 @@ def test_two_equal_pieces_are_one_pipe(elastic):
     modes = [[complex(m.growth_rate, m.frequency) for m in valve.modes(count=6).modes] for valve in (one, two)]
     assert modes[1] == pytest.approx(modes[0], rel=1e-8)
     run = {"transient.start": "kick", "transient.step": 5e-4, "transient.duration": 0.01}
-    first, second = (
-        load(with_waves(keys) if elastic else keys, run).transient().history["lip_displacement"] for keys in (ONE, TWO)
-    )
+    first, second = (load_small(STATE, keys, run).transient().history["lip_displacement"] for keys in lines)
     swing = np.ptp(first)
     assert swing > 0 and np.abs(second - first).max() < 1e-8 * np.abs(first).max()
 
@@ -67,17 +58,14 @@ def test_three_routes_behind_pipes_of_each_kind():
 @pytest.mark.slow
 def test_over_the_density_waves_keep_their_speeds():
     """Studies over the density reduce the line at unit density."""
-    found = load(MIXED).sweep("density=20:100:3:log")
-    assert found.certified
-    leading = load(MIXED).modes(count=4).modes[0]
-    assert max(b.growth_rate[-1] for b in found.branches) == pytest.approx(leading.growth_rate, rel=1e-6)
+    check_sweep((STATE, MIXED), "density=20:100:3:log", "fluid.density", (-1,))
 
 
 @pytest.mark.parametrize("name", ["pipe_length", "wave_speed"])
 def test_no_one_pipe_to_change(name):
     with pytest.raises(CaseError, match=f"no one {name} to change.*3 pieces"):
-        load(MIXED).onset(f"{name}=1:50:5:log" if name == "pipe_length" else f"{name}=100:1000:5:log")
-    assert name not in parameters_of(load(MIXED).model)
+        load_small(STATE, MIXED).onset(f"{name}=1:50:5:log" if name == "pipe_length" else f"{name}=100:1000:5:log")
+    assert name not in parameters_of(load_small(STATE, MIXED).model)
 
 
 def test_pieces_from_a_file(tmp_path, command_line):
