@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import contextmanager
 from dataclasses import dataclass
 
 import pytest
@@ -54,6 +55,19 @@ def is_one_sentence(text: str) -> bool:
 def one_sentence():
     """The check that an error message is one sentence."""
     return is_one_sentence
+
+
+@pytest.fixture
+def refused():
+    """Block that ends in an error whose message is one sentence, and matches."""
+
+    @contextmanager
+    def block(error, match=None):
+        with pytest.raises(error, match=match) as caught:
+            yield caught
+        assert is_one_sentence(str(caught.value)), caught.value
+
+    return block
 
 
 COARSE = {"mesh.around": 8, "mesh.along": 16}

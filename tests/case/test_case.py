@@ -262,11 +262,10 @@ def test_pressures_of_steady(tmp_path, text, overrides, expected):
 
 
 @pytest.mark.parametrize("name", ["a" * 5000, "nowhere.h5", "bad\x00name"])
-def test_a_start_file_that_cannot_be(name, one_sentence):
+def test_a_start_file_that_cannot_be(name, refused):
     """A name longer than the system allows ended in a traceback."""
-    with pytest.raises(CaseError, match="transient.start_file is given as .* which does not exist") as caught:
+    with refused(CaseError, match="transient.start_file is given as .* which does not exist"):
         make_case(Case, {"transient": {"start": "state", "start_file": name}})
-    assert one_sentence(str(caught.value))
 
 
 def test_every_study_brings_its_section_and_the_physics_does_without():

@@ -78,11 +78,11 @@ def test_wall_holds_the_rubber(coarse_run):
     assert wall.volume == pytest.approx(cell_area * mean, rel=0.03)
 
 
-def test_shut_passage_is_a_sentence(coarse_run, one_sentence):
+def test_shut_passage_is_a_sentence(coarse_run, refused):
     mesh = coarse_run.mesh
-    with pytest.raises(CaseError) as caught:
+    with refused(CaseError) as caught:
         WallFaces.of(mesh, np.zeros((len(mesh.nodes), 5)))  # the saddle's thicker wall meets itself at rest
-    assert one_sentence(str(caught.value)) and "no open passage" in str(caught.value)
+    assert "no open passage" in str(caught.value)
 
 
 @given(st.integers(5, 30), st.floats(0.3, 3.0), st.floats(0.01, 0.4), st.integers(0, 4), st.integers(0, 2**32 - 1))
@@ -138,11 +138,11 @@ def test_step_holds_the_same_shapes(coarse_run, tmp_path, name):
             assert gmsh.model.occ.getMass(*found[0]) / 1e9 == pytest.approx(triangles.volume, rel=0.02)
 
 
-def test_missing_gmsh_is_a_sentence(monkeypatch, coarse_run, tmp_path, one_sentence):
+def test_missing_gmsh_is_a_sentence(monkeypatch, coarse_run, tmp_path, refused):
     monkeypatch.setitem(__import__("sys").modules, "gmsh", None)
-    with pytest.raises(CaseError) as caught:
+    with refused(CaseError) as caught:
         coarse_run.states[-1].export_shapes(tmp_path, "step")
-    assert one_sentence(str(caught.value)) and "pip install gmsh" in str(caught.value)
+    assert "pip install gmsh" in str(caught.value)
 
 
 def test_command(command_line, coarse_run, tmp_path, one_sentence):

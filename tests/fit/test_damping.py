@@ -111,15 +111,14 @@ def test_a_series_is_taken_as_it_is():
     assert found.strengths == (0.1, 0.2) and found.times == (0.01, 0.5)
 
 
-def test_series_that_miss_are_told_and_those_that_say_nothing_refused(one_sentence):
+def test_series_that_miss_are_told_and_those_that_say_nothing_refused(one_sentence, refused):
     """Two branches cannot damp that much over 2.3 decades; four do so roughly."""
     rough = damping_of(case_of(loss_factor=2), "CR")
     assert rough.fit.largest_error > 0.2 and one_sentence(rough.note) and "27%" in rough.note
     assert f"Note: {rough.note}" in describe_damping(case_of(loss_factor=2)).lines()
     assert damping_of(case_of(loss_factor=0.5), "CR").note is None
-    with pytest.raises(CaseError, match="series of 2 branches misses it by 100% rms") as refused:
+    with refused(CaseError, match="series of 2 branches misses it by 100% rms"):
         damping_of(case_of(loss_factor=2).replace({"damping.branches": 2}), "CR")
-    assert one_sentence(str(refused.value))
 
 
 @pytest.mark.parametrize(
@@ -208,12 +207,11 @@ BAD_TABLES = {
 
 
 @pytest.mark.parametrize("text, words", BAD_TABLES.values(), ids=BAD_TABLES.keys())
-def test_a_bad_table_is_refused_in_a_sentence(tmp_path, one_sentence, text, words):
+def test_a_bad_table_is_refused_in_a_sentence(tmp_path, text, words, refused):
     (tmp_path / "t.csv").write_text(text)
-    with pytest.raises(CaseError, match=words) as refused:
+    with refused(CaseError, match=words) as caught:
         relaxation_from_case(case_of(loss_data=str(tmp_path / "t.csv")), "CR")
-    assert one_sentence(str(refused.value)), refused.value
-    assert str(refused.value).startswith("materials.CR.loss_data cannot be used: ") and "t.csv" in str(refused.value)
+    assert str(caught.value).startswith("materials.CR.loss_data cannot be used: ") and "t.csv" in str(caught.value)
 
 
 CELL = st.one_of(
@@ -267,18 +265,16 @@ def test_random_tables_that_cover_the_band_give_series(tmp_path, values, inner):
         ("frequency [Hz], modulus [Pa]\n1, 3\n2, 2\n", "no column time"),
     ],
 )
-def test_a_bad_relaxation_table_is_refused_in_a_sentence(tmp_path, one_sentence, text, words):
+def test_a_bad_relaxation_table_is_refused_in_a_sentence(tmp_path, text, words, refused):
     (tmp_path / "r.csv").write_text(text)
-    with pytest.raises(CaseError, match=words) as refused:
+    with refused(CaseError, match=words):
         relaxation_from_case(case_of(relaxation_data=str(tmp_path / "r.csv")), "CR")
-    assert one_sentence(str(refused.value)), refused.value
 
 
-def test_files_that_are_gone_are_told(tmp_path, one_sentence):
+def test_files_that_are_gone_are_told(tmp_path, refused):
     gone = thesis_case().from_dict(case_of(loss_data=str(tmp_path / "gone.csv")).to_dict())
-    with pytest.raises(CaseError, match="gone.csv cannot be read") as refused:
+    with refused(CaseError, match="gone.csv cannot be read"):
         relaxation_from_case(gone, "CR")
-    assert one_sentence(str(refused.value))
     with pytest.raises(CaseError, match="'teflon' is no material"):
         relaxation_from_case(case_of(loss_factor=0.1), "teflon")
 
@@ -338,10 +334,9 @@ def test_frequencies_outside_the_band_are_told(one_sentence):
 
 
 @pytest.mark.parametrize("given", ["5", "5,5", "5,x", "5,40,50", "-1,5", "5 s,40 s", "5,inf", ""])
-def test_two_frequencies_are_asked_for(given, one_sentence):
-    with pytest.raises(CaseError, match="--at is given as") as refused:
+def test_two_frequencies_are_asked_for(given, refused):
+    with refused(CaseError, match="--at is given as"):
         read_frequencies(given)
-    assert one_sentence(str(refused.value))
 
 
 def test_frequencies_with_units():

@@ -217,12 +217,11 @@ IMPOSSIBLE = {
 
 
 @pytest.mark.parametrize("name", IMPOSSIBLE)
-def test_impossible_sections(name, tmp_path, one_sentence):
+def test_impossible_sections(name, tmp_path, refused):
     text, words = IMPOSSIBLE[name]
     (tmp_path / "points.csv").write_text(text)
-    with pytest.raises(CaseError, match=words) as caught:
+    with refused(CaseError, match=words):
         dbvfiv.load(None, {"valve.key_points": str(tmp_path / "points.csv")}).session.mesh
-    assert one_sentence(str(caught.value))
 
 
 def test_the_command_writes_a_table(tmp_path, command_line):

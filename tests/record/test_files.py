@@ -177,16 +177,15 @@ def _damage(path, kind):
 @pytest.mark.parametrize(
     "kind", ["text", "empty", "cut", "foreign", "newer", "unknown", "no states", "no case", "bad case"]
 )
-def test_broken_files_are_one_sentence(tmp_path, coarse_run, one_sentence, kind):
+def test_broken_files_are_one_sentence(tmp_path, coarse_run, kind, refused):
     path = tmp_path / "r.h5"
     path.write_bytes(coarse_run.path.read_bytes())
     _damage(path, kind)
-    with pytest.raises(CaseError) as caught:
+    with refused(CaseError):
         dbvfiv.load_result(path)
-    assert one_sentence(str(caught.value)), str(caught.value)
 
 
-def test_a_file_of_a_metric_that_is_no_more(tmp_path, coarse_run, one_sentence):
+def test_a_file_of_a_metric_that_is_no_more(tmp_path, coarse_run, refused):
     path = tmp_path / "r.h5"
     path.write_bytes(coarse_run.path.read_bytes())
     with h5py.File(path, "r+") as file:
@@ -194,25 +193,22 @@ def test_a_file_of_a_metric_that_is_no_more(tmp_path, coarse_run, one_sentence):
         case["shell"]["metric"] = "true"
         del file["case/json"]
         file["case/json"] = json.dumps(case)
-    with pytest.raises(CaseError, match='shell.metric .*"first-order" or "shifted"') as caught:
+    with refused(CaseError, match='shell.metric .*"first-order" or "shifted"'):
         dbvfiv.load_result(path)
-    assert one_sentence(str(caught.value))
 
 
-def test_missing_files_and_folders(tmp_path, one_sentence):
+def test_missing_files_and_folders(tmp_path, refused):
     for path in (tmp_path, tmp_path / "none.h5"):
-        with pytest.raises(CaseError) as caught:
+        with refused(CaseError):
             dbvfiv.load_result(path)
-        assert one_sentence(str(caught.value))
 
 
-def test_only_results_are_overwritten(tmp_path, coarse_run, one_sentence):
+def test_only_results_are_overwritten(tmp_path, coarse_run, refused):
     precious = tmp_path / "precious.toml"
     precious.write_text("[drive]\n")
     for path in (precious, tmp_path):
-        with pytest.raises(CaseError) as caught:
+        with refused(CaseError):
             coarse_run.save(path)
-        assert one_sentence(str(caught.value))
     assert precious.read_text() == "[drive]\n"
     for _ in range(2):
         coarse_run.save(tmp_path / "r.h5")

@@ -28,16 +28,15 @@ def test_load_takes_a_file_and_changes(tmp_path):
     assert valve.replace({"fluid.density": "1.2 kg/m^3"}).case.fluid.density == 1.2
 
 
-def test_failures_are_raised(coarse_valve, one_sentence):
+def test_failures_are_raised(coarse_valve, refused):
     with pytest.raises(SolveError) as caught:
         coarse_valve.replace({"steady.max_iterations": 2, "steady.min_step": 0.3}).steady(pressure=100)
     assert "No equilibrium" in str(caught.value)
     for pressure in (-1, float("nan"), "3 mm", [], True, None.__class__):
         with pytest.raises((CaseError, TypeError)):
             coarse_valve.steady(pressure=pressure)
-    with pytest.raises(CaseError) as caught:
+    with refused(CaseError):
         dbvfiv.load(thesis_case(), {"shell.metric": "true"})
-    assert one_sentence(str(caught.value))
 
 
 def test_nothing_else_is_offered():

@@ -125,10 +125,10 @@ def test_changes_as_people_write_them(tmp_path, changes, key, value):
         ({"steady.pressures": "1 kPa"}, "steady.pressures"),
     ],
 )
-def test_changes_that_are_none(changes, words, one_sentence):
-    with pytest.raises(CaseError) as caught:
+def test_changes_that_are_none(changes, words, refused):
+    with refused(CaseError) as caught:
         dbvfiv.load(thesis_case(), changes)
-    assert one_sentence(str(caught.value)) and words in str(caught.value)
+    assert words in str(caught.value)
 
 
 def test_no_damping_and_no_pressure(valve, tmp_path, command_line):

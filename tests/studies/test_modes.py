@@ -226,19 +226,18 @@ def test_a_uniform_pressure_has_no_fluid(state):
     assert np.isnan(found.modes[0].pressure).all() and found.stable is True
 
 
-def test_refusals(model, state, one_sentence):
-    with pytest.raises(SolveError) as caught:
+def test_refusals(model, state, refused):
+    with refused(SolveError) as caught:
         run_modes(model, replace(state, converged=False), LIGHT)
-    assert one_sentence(str(caught.value)) and "has not converged" in str(caught.value)
-    with pytest.raises(SolveError) as caught:
+    assert "has not converged" in str(caught.value)
+    with refused(SolveError) as caught:
         run_modes(model, replace(state, q=1.01 * state.q), LIGHT)
-    assert one_sentence(str(caught.value)) and "no equilibrium of this model" in str(caught.value)
+    assert "no equilibrium of this model" in str(caught.value)
     with pytest.raises(SolveError) as caught:
         run_modes(model, replace(state, q=state.q[:-1]), LIGHT)
     assert "another mesh" in str(caught.value)
-    with pytest.raises(CaseError) as caught:
+    with refused(CaseError):
         run_modes(model, rest_state(model), LIGHT)
-    assert one_sentence(str(caught.value))
 
 
 @pytest.mark.slow

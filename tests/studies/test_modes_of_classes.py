@@ -119,10 +119,9 @@ def test_every_class_has_its_figures(four):
     assert "in class SA" in drawers["winding-SA"]().axes[0].get_title(loc="left")
 
 
-def test_both_laws_are_for_the_symmetric_class(coarse_valve, one_sentence):
-    with pytest.raises(CaseError) as caught:
+def test_both_laws_are_for_the_symmetric_class(coarse_valve, refused):
+    with refused(CaseError):
         dbvfiv.load(coarse_valve.case.replace({"modes.continuity": "both"})).modes("6 kPa", symmetry="all")
-    assert one_sentence(str(caught.value))
 
 
 @pytest.mark.parametrize("name", ["SA", "AS", "AA"])

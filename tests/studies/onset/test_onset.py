@@ -142,7 +142,7 @@ def test_nothing_is_claimed_beside_a_value_without_a_certificate(coarse_case, mo
 @pytest.mark.parametrize(
     "parameter, words", [("strain", "no layer is one of the built-in rubbers"), ("angle", "ply|angle")]
 )
-def test_what_a_case_does_not_have_is_no_parameter(one_sentence, parameter, words):
+def test_what_a_case_does_not_have_is_no_parameter(parameter, words, refused):
     """Before, every state of such a scan was the same."""
     own = {"kind": "neo-hookean", "shear_modulus": "1 MPa", "density": 1200}
     case = thesis_case({"materials.own": own, "layers": [{"material": "own", "thickness": 0.01}]})
@@ -150,9 +150,8 @@ def test_what_a_case_does_not_have_is_no_parameter(one_sentence, parameter, word
         lambda: Session(case.replace({"onset.over": parameter})).perform("onset"),
         lambda: run_map(case.replace({"map.x": USUAL[parameter], "map.y": "density=1:10:2"})),
     ):
-        with pytest.raises(CaseError, match=words) as caught:
+        with refused(CaseError, match=words):
             ask()
-        assert one_sentence(str(caught.value))
 
 
 @pytest.mark.parametrize(
