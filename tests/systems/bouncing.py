@@ -1,4 +1,4 @@
-"""Linear systems whose unknowns hit planes, for the stepper: masses, bars and beams."""
+"""Linear systems whose unknowns hit planes, for the stepper: masses and bars; `beam` has the matrices of beams."""
 
 from __future__ import annotations
 
@@ -119,22 +119,3 @@ def bar(elements: int, length: float = 1.0, modulus: float = 1.0, density: float
     ends[[0, -1]] = 0.5
     stiffness = sp.diags([2.0 * ends, -np.ones(elements), -np.ones(elements)], [0, 1, -1]) * (modulus / size)
     return sp.diags(density * size * ends), stiffness
-
-
-def cantilever(elements: int, length: float = 1.0, bending: float = 1.0, mass: float = 1.0):
-    """Mass and stiffness (2n, 2n) of a beam clamped at its start: deflection and slope of each other node."""
-    h = length / elements
-    k = bending / h**3 * np.array(
-        [[12, 6 * h, -12, 6 * h], [6 * h, 4 * h * h, -6 * h, 2 * h * h], [-12, -6 * h, 12, -6 * h],
-         [6 * h, 2 * h * h, -6 * h, 4 * h * h]]
-    )  # fmt: skip
-    m = mass * h / 420 * np.array(
-        [[156, 22 * h, 54, -13 * h], [22 * h, 4 * h * h, 13 * h, -3 * h * h], [54, 13 * h, 156, -22 * h],
-         [-13 * h, -3 * h * h, -22 * h, 4 * h * h]]
-    )  # fmt: skip
-    whole = np.zeros((2, 2 * elements + 2, 2 * elements + 2))
-    for e in range(elements):
-        part = slice(2 * e, 2 * e + 4)
-        whole[0, part, part] += m
-        whole[1, part, part] += k
-    return whole[0, 2:, 2:], whole[1, 2:, 2:]
