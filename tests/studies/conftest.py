@@ -33,15 +33,15 @@ def walk(coarse_case):
 
 
 @pytest.fixture(scope="session")
-def coarse_model():
+def model():
     """The 12-inch valve of the thesis on 8 x 16 elements."""
     return ValveModel(thesis_case({"mesh.around": 8, "mesh.along": 16}))
 
 
 @pytest.fixture(scope="session")
-def opened(coarse_model):
+def state(model):
     """Its steady state at 6 kPa."""
-    return LoadPath(coarse_model).go_to(6e3)
+    return LoadPath(model).go_to(6e3)
 
 
 @pytest.fixture

@@ -27,16 +27,6 @@ WATER = Mu(density=1000.0, alpha=5.0, beta=0.003)
 
 
 @pytest.fixture(scope="module")
-def model(coarse_model):
-    return coarse_model
-
-
-@pytest.fixture(scope="module")
-def state(opened):
-    return opened
-
-
-@pytest.fixture(scope="module")
 def flutter(model, state):
     return run_modes(model, state, LIGHT)
 
@@ -238,16 +228,3 @@ def test_refusals(model, state, refused):
     assert "another mesh" in str(caught.value)
     with refused(CaseError):
         run_modes(model, rest_state(model), LIGHT)
-
-
-@pytest.mark.slow
-def test_the_flutter_of_the_reference_mesh():
-    """28 x 48, 6 kPa, 10 kg/m3: about +27 1/s at 36.3 Hz, the next near -24 1/s at 16.8 Hz; a few per cent between two
-    models.
-    """
-    model = ValveModel(thesis_case())
-    found = run_modes(model, LoadPath(model).go_to(6e3), LIGHT)
-    first, second = found.eigenvalues[:2]
-    assert first.real == pytest.approx(27, abs=3) and first.imag / (2 * np.pi) == pytest.approx(36.3, rel=0.03)
-    assert second.real == pytest.approx(-24, abs=3) and second.imag / (2 * np.pi) == pytest.approx(16.8, rel=0.05)
-    assert found.certificate.agrees and found.spectrum.residual.max() < 1e-8

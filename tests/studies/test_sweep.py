@@ -22,16 +22,6 @@ LIGHT = Mu(density=10.0, alpha=0.0, beta=0.003)
 DENSITY = "density=1:1000:13:log"
 
 
-@pytest.fixture(scope="module")
-def model(coarse_model):
-    return coarse_model
-
-
-@pytest.fixture(scope="module")
-def state(opened):
-    return opened
-
-
 def sweep(model, over, state=None, observer=None, **keys):
     """Sweep of a light fluid from a state that is known."""
     light = {"fluid.density": 10.0, "damping.alpha": 0.0, "damping.beta": 0.003, "drive.pressure": 6e3}
