@@ -94,30 +94,6 @@ def rows_of(table):
     return list(zip(table.columns["pressure"], table.columns["mass_flow"]))
 
 
-@pytest.mark.parametrize(
-    "text, words",
-    [
-        ("", "no rows"),
-        ("pressure [kPa], flow [L/s]\n", "no rows below its first line"),
-        ("18, 47.88\n", "columns are not told; the first line must name"),
-        ("pressure [kPa], pressure [Pa]\n1, 2\n", "columns are not told"),
-        ("pressure [kPa], flow [m/s]\n1, 2\n", "columns are not told"),
-        ("pressure [kPa], flow [L/s], x [mm]\n1, 2, 3\n", "columns are not told"),
-        ("pressure [kPa], flow [L/s]\n18\n", "line 2 is not a pressure or head and a flow"),
-        ("pressure [kPa], flow [L/s]\n18, many\n", "line 2 holds 'many', which is not a number"),
-        ("pressure [kPa], flow [L/s]\n18, -3\n", "line 2 holds '-3', and numbers must be finite and not negative"),
-        ("pressure [kPa], flow [L/s]\n18, nan\n", "line 2 holds 'nan'"),
-    ],
-)
-def test_bad_measured_points(tmp_path, text, words):
-    file = tmp_path / "points.csv"
-    file.write_text(text)
-    with pytest.raises(CaseError, match=rf"steady\.measured is given as .*, wh.*{words}"):
-        thesis_case([f"steady.measured={file}"])
-    with pytest.raises(CaseError, match=rf"steady\.measured is given as .*, wh.*{words}"):
-        load_small({"steady.measured": str(file)}).steady([6e3])
-
-
 def test_a_missing_file_of_points():
     with pytest.raises(CaseError, match=r"steady\.measured.*which does not exist"):
         thesis_case(["steady.measured=nowhere.csv"])

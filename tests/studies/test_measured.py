@@ -17,10 +17,7 @@ from dbvfiv.studies.case import Case, thesis_case
 from dbvfiv.studies.closure import study as closure
 from dbvfiv.studies.measured import cut, distances
 from dbvfiv.studies.steady import study as steady
-
-SMALL = {"mesh.around": 6, "mesh.along": 8}
-OPTIONS = [f"--set={key}={value}" for key, value in SMALL.items()]
-
+from tests.small_valves import SMALL, load_small
 
 # -- tables
 # ----
@@ -60,6 +57,19 @@ def test_tables_in_any_units(tmp_path, text, holds, columns):
 
 
 BAD = {
+    "nothing": ("", "no rows"),
+    "a first line alone": ("pressure [kPa], flow [L/s]\n", "no rows below its first line"),
+    "numbers alone": ("18, 47.88\n", "columns are not told; the first line must name"),
+    "two pressures": ("pressure [kPa], pressure [Pa]\n1, 2\n", "columns are not told"),
+    "a flow in m/s": ("pressure [kPa], flow [m/s]\n1, 2\n", "columns are not told"),
+    "x beside a flow": ("pressure [kPa], flow [L/s], x [mm]\n1, 2, 3\n", "columns are not told"),
+    "a row too short": ("pressure [kPa], flow [L/s]\n18\n", "line 2 is not a pressure or head and a flow"),
+    "a word": ("pressure [kPa], flow [L/s]\n18, many\n", "line 2 holds 'many', which is not a number"),
+    "a flow that runs back": (
+        "pressure [kPa], flow [L/s]\n18, -3\n",
+        "line 2 holds '-3', and numbers must be finite and not negative",
+    ),
+    "no number": ("pressure [kPa], flow [L/s]\n18, nan\n", "line 2 holds 'nan'"),
     "x in kPa": ("pressure [kPa], x [kPa], y [mm]\n1, 2, 3\n", "column x is in 'kPa', which is no unit of a length"),
     "tap in mm": (
         "pressure [kPa], z [mm], tap [mm]\n1, 2, 3\n",
@@ -92,6 +102,8 @@ def test_a_bad_table_is_refused_in_one_sentence(tmp_path, command_line, one_sent
     file.write_text(text)
     with pytest.raises(CaseError, match=rf"steady\.measured is given as .*, wh.*{words}"):
         thesis_case([f"steady.measured={file}"])
+    with pytest.raises(CaseError, match=rf"steady\.measured is given as .*, wh.*{words}"):
+        load_small({"steady.measured": str(file)}).steady([6e3])
     done = command_line("case", f"--set=steady.measured={file}")
     assert done.status == 2 and one_sentence(done.err), done.err
 

@@ -125,19 +125,6 @@ def test_run_keeps_the_order_asked_for(model):
     path = LoadPath(model)
     points = [summarise(path.go_to(pressure)) for pressure in pressures]
     assert points[0]["mass_flow"] < points[1]["mass_flow"]
-    wanted = {
-        "pressure",
-        "mass_flow",
-        "outlet_area",
-        "outlet_velocity",
-        "max_displacement",
-        "max_displacement_position",
-        "lip_opening",
-        "converged",
-        "iterations",
-        "residual",
-    }
-    assert wanted <= set(points[0])
 
 
 def test_folded_wall_is_told():
