@@ -351,7 +351,7 @@ def reversible_head(speed, velocity):
 
 
 def _of_channel(name: str) -> property:
-    """What a law around a channel has of it."""
+    """Attribute that a law around a channel takes from it."""
     return property(lambda law: getattr(law.channel, name))
 
 

@@ -567,5 +567,5 @@ class MemoryTerm:
         return out
 
     def _each(self, function, samples: np.ndarray) -> np.ndarray:
-        """What a function of the positions is at the samples of something real or complex, linear in that."""
+        """Values of a function of the positions at samples, real or complex, in which it is linear."""
         return by_parts(lambda part: np.stack([function(q, one) for q, one in zip(self.q, part)]), samples)

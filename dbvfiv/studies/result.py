@@ -155,7 +155,7 @@ class StudyResult:
         return self._missed(len(self.failures)) if self.failures else None
 
     def _missed(self, lost: int) -> str:
-        """That clause, of a number of failures."""
+        """Clause on what was not reached, of a number of failures."""
         return "Not everything was reached"
 
     # -- files and pictures ----
