@@ -33,6 +33,11 @@ def listed(words: Iterable[str]) -> str:
     return f"{', '.join(found[:-1])} and {found[-1]}" if len(found) > 1 else "".join(found)
 
 
+def clause(text: str) -> str:
+    """Text as a sentence can quote it: printable, on one line, without a full stop that would look like its end."""
+    return " ".join("".join(c if c.isprintable() else " " for c in text).split()).replace(". ", "., ")
+
+
 def json_value(value: Any) -> Any:
     """A value as JSON has it: arrays become lists, numbers that are not finite null."""
     if hasattr(value, "tolist"):  # numpy and JAX arrays and scalars

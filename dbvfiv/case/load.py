@@ -20,6 +20,7 @@ from pydantic import ValidationError
 from pydantic.fields import FieldInfo
 
 from ..errors import CaseError
+from ..texts import clause
 from .describe import allowed_words, element_model, quantity_of, synonym
 from .materials import KINDS, Materials
 from .section import BrokenRule, Section
@@ -213,9 +214,8 @@ def _show(value: Any) -> str:
 
 
 def _clean(text: str) -> str:
-    """Printable, short, and without a full stop that would look like the end of the sentence."""
-    text = "".join(c if c.isprintable() else " " for c in text)
-    text = " ".join(text.split()).replace(". ", "., ")
+    """A clause that is short."""
+    text = clause(text)
     return text if len(text) <= 60 else text[:57] + "..."
 
 

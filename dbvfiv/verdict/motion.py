@@ -511,7 +511,8 @@ def _without_lines(fitted: Fit, series: Series, mains: tuple[Line, ...]) -> Moti
     noise = float(values.std())
     facts = {"lines": mains, "start": series.start, "noise": noise}
     bands = np.array([band.mean() for band in np.array_split(power[2:], min(16, max(2, len(power) // 16)))])
-    filled = bands.sum() ** 2 / (len(bands) * (bands**2).sum()) if bands.min() > 0 else 0.0
+    bands = bands / bands.max() if bands.min() > 0 else bands  # squares of large values overflow
+    filled = bands.mean() ** 2 / (bands**2).mean() if bands.min() > 0 else 0.0
     parts = np.array([part.std() for part in np.array_split(values, 4)])
     if filled < FILLED or parts.max() > 1.5 * parts.min():
         return Motion("irregular", "It moves without a line.", **facts)

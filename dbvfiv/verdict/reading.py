@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import CaseError
+from ..texts import clause
 from .judge import JudgeOptions, Verdict, judge
 from .motion import judge_record
 from .series import Series, in_steps, spectrum
@@ -135,7 +136,7 @@ def judge_file(
     try:
         signals = _signals_of(read_table(file), reading)
     except ValueError as error:
-        raise CaseError(f"{str(file)!r} cannot be read as a time series: {error}.") from None
+        raise CaseError(f"{str(file)!r} cannot be read as a time series: {clause(str(error))}.") from None
     except OSError as error:
         raise CaseError(f"{str(file)!r} cannot be read ({error.strerror or error}).") from None
     return judge_signals(file, signals, reading, options, closed_below)
@@ -206,7 +207,9 @@ def _judged(file: Path, signal: Signal, options: JudgeOptions, closed_below: flo
     if len(signal.time) < 2:
         number = "no samples" if not len(signal.time) else "a single sample"
         after = "" if reading.since is None else f" from {reading.since:g} s on"
-        raise CaseError(f"Column {signal.name!r} of {str(file)!r} has {number}{after}, and two are needed at least.")
+        raise CaseError(
+            f"Column {clause(signal.name)!r} of {str(file)!r} has {number}{after}, and two are needed at least."
+        )
     try:
         given = signal.time, signal.values, options
         if signal.measured:
@@ -215,7 +218,7 @@ def _judged(file: Path, signal: Signal, options: JudgeOptions, closed_below: flo
     except ValueError as error:
         text = str(error).rstrip(".")
         raise CaseError(
-            f"Column {signal.name!r} of {str(file)!r} cannot be judged: {text[0].lower()}{text[1:]}."
+            f"Column {clause(signal.name)!r} of {str(file)!r} cannot be judged: {text[0].lower()}{text[1:]}."
         ) from None
 
 

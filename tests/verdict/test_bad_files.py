@@ -5,6 +5,8 @@ import json
 import numpy as np
 import pytest
 
+pytestmark = pytest.mark.filterwarnings("error::RuntimeWarning")  # numpy's would be printed beside the verdict
+
 HEADS = (
     "time,p",
     "t [ms];p [kPa]",
