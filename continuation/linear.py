@@ -227,6 +227,7 @@ class Bordered:
         with np.errstate(all="ignore"):
             v, w = inner.solve(b), inner.solve_transpose(c)
             delta, delta_star = corner - c @ v, corner - w @ b
+        self._delta = delta
         #: Product, solve, column, row, solutions with both and Schur complements by both, of the matrix and of its
         #: transpose.
         self._plain = inner.matvec, inner.solve, b, c, v, w, delta, delta_star
@@ -238,7 +239,7 @@ class Bordered:
     @property
     def complement_sign(self) -> float:
         """Sign of ``d - c' A^-1 b``: of the determinant, over that of ``A`` (real matrices)."""
-        return float(np.sign(self._plain[-2]))
+        return float(np.sign(self._delta))
 
     def matvec(self, z):
         return self._apply(self._plain, z)

@@ -86,6 +86,11 @@ class FollowingSection(Section):
         """Keys that were not given and follow from others."""
         return self._following
 
+    @property
+    def as_given(self) -> FollowingSection:
+        """The table with its numbers as the case gives them."""
+        return self
+
     def _follows(self, name: str) -> bool:
         """True for a key that was not given; a table is checked again when it becomes part of a case."""
         return getattr(self, name) is None or name in self._following
@@ -98,7 +103,7 @@ class FollowingSection(Section):
     @model_serializer(mode="wrap")
     def _leave_what_follows(self, handler: Any) -> dict[str, Any]:
         """Numbers as given, without those that follow, so that they follow anew after a change."""
-        given = handler(getattr(self, "as_given", self))
+        given = handler(self.as_given)
         return {name: None if name in self._following else value for name, value in given.items()}
 
 

@@ -311,13 +311,14 @@ def check_writable(path: str | Path) -> None:
     """
     path = as_path(path, "A result file")
     try:
-        if path.exists() and not path.is_dir():
-            descriptor = os.open(path, os.O_RDWR)
-            try:
-                _lock(descriptor, path)  # first: what is being written is a result, however it reads at this instant
-            finally:
-                os.close(descriptor)
         if not path.is_dir():
+            if path.exists():
+                # first: a file that is being written is a result, however it reads at this instant
+                descriptor = os.open(path, os.O_RDWR)
+                try:
+                    _lock(descriptor, path)
+                finally:
+                    os.close(descriptor)
             _check_folder(path.absolute().parent)
     except OSError as error:
         raise unwritable(path, error) from None

@@ -123,12 +123,18 @@ class Workers:
 
     def give(self, start: Callable[..., Any], *data: Any, here: Any = None) -> None:
         """Context of the tasks that are shared from now on."""
-        self._context, self._file, self._here = pickle.dumps((start, data)), None, here
+        self._file, self._here = None, here
+        self._context = None if self._works_alone else pickle.dumps((start, data))
 
     @property
     def is_here(self) -> bool:
         """True where this process does all the work itself."""
         return self.count == 1 and mpi_size() == 1
+
+    @property
+    def _works_alone(self) -> bool:
+        """True where this process does the tasks with a context of its own."""
+        return self.is_here and self._here is not None
 
     def share(self, tasks: Iterable[Hashable], ask: Callable[[Any], Any]) -> Iterator[tuple[Any, Any]]:
         """Tasks with their results as they are finished: in any order, in their own where this process does them.
@@ -150,7 +156,7 @@ class Workers:
         CaseError
             If a scheduler does not answer.
         """
-        if self.is_here and self._here is not None:
+        if self._works_alone:
             for task in tasks:
                 work = ask(task)
                 yield task, work.function(self._here, *work.arguments) if isinstance(work, Work) else work

@@ -1,4 +1,4 @@
-"""What a linearised flow law answers."""
+"""Answers of linearised flow laws."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What studies over a parameter say, held against valves that are given each of its values."""
+"""Checks of studies over a parameter against valves that are given each of its values."""
 
 from __future__ import annotations
 
