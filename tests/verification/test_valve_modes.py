@@ -1,4 +1,6 @@
-"""Coupled eigenvalues of the 12-inch valve: known point, insensitivity to how they were sought, mesh."""
+"""Coupled eigenvalues of the 12-inch valve: known point, two independent counts, insensitivity to how they were sought,
+mesh.
+"""
 
 import numpy as np
 import pytest
@@ -7,7 +9,9 @@ from dbvfiv.case.parameters import Mu
 from dbvfiv.model import ValveModel, linearise
 from dbvfiv.model.equilibria import LoadPath, SteadyOptions
 from dbvfiv.studies.case import thesis_case
-from eigen import SearchOptions, leading_modes
+from eigen import SearchOptions, Workspace, leading_modes
+from eigen.basis import TransferBasis
+from eigen.certificate import certified_spectrum
 
 pytestmark = pytest.mark.slow
 LIGHT = Mu(density=10.0, alpha=0.0, beta=0.003)
@@ -68,6 +72,39 @@ def test_water_is_damped_from_2_to_50_kpa():
             )
             assert found.status == "complete"
             assert found.growth_rate[0] < 0
+
+
+def test_two_counts_agree_at_200_random_states():
+    """Pressure, density, damping and continuity drawn at random; spectrum and argument principle must find the same
+    number.
+    """
+    rng = np.random.default_rng(20)
+    model = model_of(14, 24)
+    pressures = np.sort(np.exp(rng.uniform(np.log(200.0), np.log(50e3), 20)))
+    unstable, missed = 0, []
+    for lin in linearised(model, pressures):
+        workspace = Workspace()
+        basis = TransferBasis(lin.pencil(LIGHT))
+        for _ in range(10):
+            conditions = Mu(
+                density=10 ** rng.uniform(-0.5, 3.2),
+                alpha=rng.choice([0.0, rng.uniform(0, 10)]),
+                beta=10 ** rng.uniform(-4, -2),
+            )
+            storage = float(rng.integers(2))
+            both = certified_spectrum(
+                lin.pencil(conditions.at(storage=storage)),
+                6,
+                options(conditions.beta),
+                workspace=workspace,
+                basis=basis,
+            )
+            unstable += both.unstable_count > 0
+            if not both.agrees:
+                missed.append((lin.inlet, conditions, storage, both.statement))
+    print(f"\n200 states, {unstable} of them unstable, {len(missed)} disagreements")
+    assert not missed
+    assert 20 < unstable < 180
 
 
 def test_mesh_convergence_of_the_leading_mode():
