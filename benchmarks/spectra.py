@@ -195,7 +195,12 @@ def density_sweep():
     walk = StabilityWalk(model.case, model=model)
     walk.give(place, find_equilibrium(model, 6e3).q)
     places = [place.at(density=float(density)) for density in densities]
-    spent, result = seconds(lambda: walk.column(places, 6, edges=True, count=6))
+
+    def column():
+        found = walk.column(places, 6, edges=True, count=6)
+        return found, found.cells
+
+    spent, (result, _) = seconds(column)
     yield Row(
         "100-point density sweep over one such solve",
         spent / single,

@@ -4,8 +4,9 @@ serves.
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Sequence
+from collections.abc import Callable, Hashable, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -108,10 +109,23 @@ class ReducedColumn:
 
 @dataclass(frozen=True)
 class Column:
-    """Cells of one state, with the reduced operator that they come from if there is one."""
+    """Cells of one state, found when they are asked for, with the reduced operator that they come from if there is
+    one.
+    """
 
-    cells: tuple[Cell, ...]
+    find: Callable[[], Sequence[Cell]]
     model: ReducedColumn | None = None
+
+    @cached_property
+    def cells(self) -> tuple[Cell, ...]:
+        """The cells, each with its count.
+
+        Raises
+        ------
+        SingularShiftError
+            If a full operator has no usable shift.
+        """
+        return tuple(self.find())
 
     @property
     def error(self) -> float:
@@ -177,16 +191,16 @@ class ColumnSolver:
         Raises
         ------
         SingularShiftError
-            If the stiffness is singular, or a full operator has no usable shift.
+            If the stiffness is singular.
         """
         points = list(points)
         if not family.forces.shape[1]:
-            return Column(tuple(self._uncoupled(family, points)))
+            return Column(lambda: self._uncoupled(family, points))
         reduction = self.reduction(family)
         if len(points) < 3:
-            return Column(tuple(self._directly(reduction, points, spectra)))
+            return Column(lambda: self._directly(reduction, points, spectra))
         model = ReducedColumn(self, reduction, *_accurate(reduction, points, snapshots, count))
-        return Column(tuple(self.cells(model, points, edges)), model)
+        return Column(lambda: self.cells(model, points, edges), model)
 
     def cells(self, model: ReducedColumn, points: Sequence[Hashable], edges: bool = False) -> list[Cell]:
         """Cells on a reduced model, counted on its first stage; those without a certificate directly."""

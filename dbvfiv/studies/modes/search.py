@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -568,7 +569,7 @@ def critical_damping_factor(walk: StabilityWalk, place: Mu, verdict: Verdict) ->
         return np.nan
     factors = LOWER if verdict.outcome == STABLE else HIGHER
     factors = factors[own * factors <= PARAMETERS[name].high]
-    line = ParameterLine(walk, place, name, own * factors, snapshots=len(factors), edges=True)
+    line = ParameterLine(walk, place, name, own * factors)
     if not line.is_reduced:
         return np.nan
 
@@ -577,8 +578,7 @@ def critical_damping_factor(walk: StabilityWalk, place: Mu, verdict: Verdict) ->
         return values[oscillates(values)]
 
     scan = Scan(flutter)
-    found = [scan.at(value) for value in line.values]
-    for near, far in zip(found, found[1:]):
+    for near, far in pairwise(map(scan.at, line.values)):
         if not (len(near.eigenvalues) and len(far.eigenvalues)):
             break
         if (near.pairs > 0) != (far.pairs > 0):

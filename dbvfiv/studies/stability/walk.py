@@ -498,8 +498,13 @@ class StabilityWalk:
         with name_state_in_failures(places[0].pressure):
             points = [places[i] for i in sound]
             column = self.built(places[0]).solver.solve(family, points, snapshots, edges, spectra, count)
-        cells = dict(zip(sound, column.cells))
-        return replace(column, cells=tuple(cells.get(i, Cell()) for i in range(len(places))))
+
+        def cells() -> list[Cell]:
+            with name_state_in_failures(places[0].pressure):
+                found = dict(zip(sound, column.cells))
+            return [found.get(i, Cell()) for i in range(len(places))]
+
+        return replace(column, find=cells)
 
     def cell(self, place: Mu, spectrum: Spectrum | None = None) -> Cell:
         """Cell of one place with the full operator, whose leading modes may be known.
