@@ -37,7 +37,7 @@ def report(
         typer.Option(
             "--without",
             metavar="PART",
-            help="Leave out steady, heads, pipe, onset, law, mesh, levels or closure; may be repeated.",
+            help="Leave out steady, heads, pipe, onset, law, mesh, levels, closure, chance or cycle; may be repeated.",
         ),
     ] = None,
     cycle: Annotated[

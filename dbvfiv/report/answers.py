@@ -86,7 +86,7 @@ def opens(found: Gathered) -> Answer:
 def _mesh_of_flow(found: Gathered, state) -> Iterable[str]:
     other = found.state(state.pressure, "mesh-steady")
     if other is None:
-        return (_not_there(found, "mesh", "mesh"),)
+        return (_not_there(found, "mesh-steady", "mesh"),)
     return (
         f"second mesh ({_mesh(found)}): opening {_apart(other.lip_opening, state.lip_opening)}, flow "
         f"{_apart(other.volume_flow, state.volume_flow)}",
@@ -111,6 +111,12 @@ def chatters(found: Gathered) -> Answer:
     unknown = [p for p in found.heads if p not in verdicts or verdicts[p].stable is None]
     if found.case.drive.kind != "flow":
         return Answer(question, UNKNOWN, "No fluid flows: drive.kind is 'uniform'.")
+    reasons: dict[str, list[float]] = {}
+    for p in unknown:
+        reasons.setdefault(verdicts[p].reason if p in verdicts else _missing_head(found, p), []).append(p)
+    open_heads = [
+        f"No certain verdict at {listed(units.pressure(p, 3) for p in at)}: {why}" for why, at in reasons.items()
+    ]
     if bad:
         worst = verdicts[max(bad, key=lambda p: verdicts[p].growth_rate)]
         kind = "flutters" if worst.outcome == "flutters" else "diverges, without oscillating,"
@@ -118,26 +124,20 @@ def chatters(found: Gathered) -> Answer:
         swings = [verdicts[p].frequency for p in bad if verdicts[p].frequency > 0]
         ends = dict.fromkeys(digits(end(swings)) for end in (min, max)) if swings else ()
         text += f", at {' to '.join(ends)} Hz" if ends else ""
-        return Answer(question, YES, f"{text}. {_onsets(found)}".strip(), _factor(verdicts), _sure(found, verdicts))
+        text = " ".join(filter(None, (f"{text}.", _onsets(found), *open_heads)))
+        return Answer(question, YES, text, _factor(found), _sure(found, verdicts))
     if unknown:
-        reasons: dict[str, list[float]] = {}
-        for p in unknown:
-            why = verdicts[p].reason if p in verdicts else _missing_head(found, p)
-            reasons.setdefault(why, []).append(p)
-        said = (
-            f"No certain verdict at {listed(units.pressure(p, 3) for p in at)}: {why}" for why, at in reasons.items()
-        )
-        return Answer(question, UNKNOWN, " ".join(said), _factor(verdicts))
+        return Answer(question, UNKNOWN, " ".join(open_heads), _factor(found))
     least = min(verdicts.values(), key=lambda v: v.damping_ratio)
     text = (
         f"Stable at all {len(verdicts)} heads in every symmetry class; the least damped mode has a damping ratio of "
         f"{digits(100 * least.damping_ratio, 2)} %, at {units.pressure(found.worst, 3)}."
     )
-    return Answer(question, NO, text, _factor(verdicts), _sure(found, verdicts))
+    return Answer(question, NO, text, _factor(found), _sure(found, verdicts))
 
 
 def _missing_head(found: Gathered, pressure: float) -> str:
-    return found.missing.get(f"heads-{found.heads.index(pressure) + 1}", "It was not examined.")
+    return found.why(f"heads-{found.heads.index(pressure) + 1}")
 
 
 def _onsets(found: Gathered) -> str:
@@ -147,20 +147,29 @@ def _onsets(found: Gathered) -> str:
     units, said = found.case.units, []
     for point in (p for p in onset.points if p["edge"]):
         sure = "" if not point["uncertainty"] else f" ± {units.pressure(point['uncertainty'], 1)} (second mesh)"
+        if point["uncertainty"] is None and onset.case.onset.coarse_mesh:
+            sure = " (the second mesh has no onset like it)"
         word = "begins" if point["gains"] else "ends"
         said.append(f"{word} at {units.pressure(point['value'], 3)}{sure}, {digits(point['frequency'])} Hz")
     return f"Chatter {listed(said)}." if said else ""
 
 
-def _factor(verdicts: dict) -> str:
-    """Margin in damping: the factor on the damping of the wall at which the verdict changes, at the worst head."""
-    factors = [v.critical_damping_factor for v in verdicts.values() if np.isfinite(v.critical_damping_factor)]
-    if any(v.stable is False for v in verdicts.values()):
-        return f"quiet with {digits(max(factors), 2)} times the damping" if factors else "no damping in reach quiets it"
+def _factor(found: Gathered) -> str:
+    """Margin in damping: the factor on the damping of the wall at which the verdict changes, at the worst head; empty
+    where a head has no verdict.
+    """
+    verdicts = [result.verdict for result in found.modes.values()]
+    unstable = [v.critical_damping_factor for v in verdicts if v.stable is False]
+    if unstable:
+        quiet = f"quiet with {digits(max(unstable), 2)} times the damping"
+        return quiet if np.isfinite(unstable).all() else "no damping in reach quiets it"
+    if len(verdicts) < len(found.heads) or any(v.stable is None for v in verdicts):
+        return ""
+    factors = [v.critical_damping_factor for v in verdicts if np.isfinite(v.critical_damping_factor)]
     return (
         f"chatter begins at {digits(max(factors), 2)} times the damping"
         if factors
-        else "lips stable down to 0.05 times the damping"
+        else "stable down to 0.05 times the damping"
     )
 
 
@@ -170,7 +179,7 @@ def _sure(found: Gathered, verdicts: dict) -> tuple[str, ...]:
     own = verdicts[worst]
     other = found.get("mesh-modes")
     if other is None:
-        said.append(_not_there(found, "mesh", "mesh"))
+        said.append(_not_there(found, "mesh-modes", "mesh"))
     else:
         theirs, ours = (digits(100 * found.damping_ratio, 2) for found in (other.verdict, own))
         said.append(f"second mesh ({_mesh(found)}): {_verdict(other.verdict)}, damping ratio {theirs} against {ours} %")
@@ -303,7 +312,7 @@ def _margin(result) -> str:
 def _closure_mesh(found: Gathered) -> tuple[str, ...]:
     other = found.get("mesh-closure")
     if other is None or other.safety is None:
-        return (_not_there(found, "mesh", "mesh"),)
+        return (_not_there(found, "mesh-closure", "mesh"),)
     told = rated_verdict(other)
     seal = f"{_seal(told)}, leak {digits(told['leak'] * 3.6e6, 2)} L/h, " if told and told["sealed"] is not None else ""
     return (f"second mesh ({_mesh(found)}): {seal}{_margin(other)}",)
@@ -351,8 +360,8 @@ def _mesh(found: Gathered) -> str:
     return f"{mesh['mesh.around']} x {mesh['mesh.along']}"
 
 
-def _not_there(found: Gathered, part: str, word: str) -> str:
-    return f"{word}: not examined ({found.why(part)})"
+def _not_there(found: Gathered, name: str, word: str) -> str:
+    return f"{word}: not examined ({found.why(name)})"
 
 
 def _by_level(found: Gathered, kind: str) -> list[str]:

@@ -60,24 +60,24 @@ def vibration_figure(found: Gathered) -> Figure:
         ratio.plot(at, value, look[0], color=look[1], ms=8 if verdict.stable is False else 6)
     ratio.axhspan(min(0.0, np.nanmin(damping, initial=0.0)) - 0.5, 0.0, color=DANGER, lw=0)
     ratio.set_ylabel(_LEAST_DAMPED)
-    _factors(found, factor, head, [v.critical_damping_factor for v in verdicts.values()])
+    _factors(found, factor, head, verdicts.values())
     for axes in (ratio, factor):
         axes.set_xlabel("Head, kPa" if found.case.units.heads else "Inlet pressure, kPa")
         axes.set_xlim(left=0)
     return figure
 
 
-def _factors(found: Gathered, axes, head, factors) -> None:
-    """Neutral curve over head and damping; without one the lowest factor that was looked at."""
-    at = np.array(factors)
+def _factors(found: Gathered, axes, head, verdicts) -> None:
+    """Neutral curve over head and damping; at stable heads without one the lowest factor that was looked at."""
+    at, stable = (np.array(x) for x in zip(*((v.critical_damping_factor, v.stable is True) for v in verdicts)))
     known = np.isfinite(at)
     low, high = 0.05, 2.0
     if known.any():
         axes.fill_between(head[known], low, at[known], color=DANGER, lw=0)
         axes.plot(head[known], at[known], "o-", color=UNSTABLE, label="chatter below")
         low, high = min(low, at[known].min() / 1.5), max(high, 1.5 * at[known].max())
-    if not known.all():
-        axes.plot(head[~known], np.full(int((~known).sum()), low), "v", color=STABLE, label="none found down to here")
+    if (none := stable & ~known).any():
+        axes.plot(head[none], np.full(int(none.sum()), low), "v", color=STABLE, label="none found down to here")
     axes.axhline(1.0, color="0.2", lw=1.0, ls="--", label="this case")
     spread = loss_range(found.case)
     if spread is not None:

@@ -104,10 +104,12 @@ class Gathered:
         """A result by the name of its run; None without one."""
         return self.results.get(name)
 
-    def why(self, part: str) -> str:
-        """Why a part has no result, in a sentence."""
-        found = (text for name, text in self.missing.items() if name.partition("-")[0] == part)
-        return next(found, "It was not asked for.")
+    def why(self, name: str) -> str:
+        """Why a run, or all runs of a part, gave nothing, in a sentence."""
+        own = [self.missing[word] for word in (name, *name.split("-")) if word in self.missing]
+        of_part = [text for run, text in self.missing.items() if run.partition("-")[0] == name]
+        failures = self.results[name].failures if name in self.results else ()
+        return next(iter((*own, *of_part, *failures)), "It was not asked for.")
 
     @property
     def modes(self) -> dict[float, Any]:
@@ -252,8 +254,11 @@ def cycle_run(found: Gathered) -> Iterator[Run]:
         return
     begins = min(beside, key=lambda point: abs(point["value"] - here))
     low, high = sorted((here, begins["value"] + 0.1 * (begins["value"] - here)))
+    if begins["gains"]:  # the valve has to be open all the way
+        rest = found.case.rest_pressure
+        low = max(low, rest + 0.5 * (begins["value"] - rest))
     start = "first" if begins["gains"] else "last"
-    keys = {"cycle.over": f"pressure={max(low, 0.5 * here):.9g}:{high:.9g}:4", "cycle.start": start}
+    keys = {"cycle.over": f"pressure={low:.9g}:{high:.9g}:4", "cycle.start": start}
     yield Run("cycle", "cycle", "limit cycle", keys, 200)
 
 

@@ -231,8 +231,8 @@ def heads_part(found: Gathered) -> Part:
     factor = "loss factors" if found.case.damping.relaxes else "stiffness damping"
     sentences = (
         f"Modes about the steady state at each head, in all symmetry classes: {classes}.",
-        f"The factor on the {factor} at which chatter begins is that of motions which open and close the lips; - where "
-        "none between 0.05 and 1 makes the valve chatter.",
+        f"The factor is that on the {factor} at which chatter begins, or ends where the valve chatters, in the first "
+        "and the last of the classes; - where none between 0.05 and 10 makes the difference.",
         *missing,
     )
     caption = (

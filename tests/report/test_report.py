@@ -126,6 +126,40 @@ def test_each_head_without_a_verdict_has_its_own_reason(made, monkeypatch, reaso
     assert (told.answer, told.text) == (UNKNOWN, text)
 
 
+@pytest.mark.parametrize(
+    "verdicts, margin",
+    [
+        ((("stable", 0.3), ("stable", np.nan)), "chatter begins at 0.3 times the damping"),
+        ((("stable", np.nan), ("stable", np.nan)), "stable down to 0.05 times the damping"),
+        ((("stable", 0.3), ("undecided", np.nan)), ""),
+        ((("flutters", 1.4), ("flutters", 1.2)), "quiet with 1.4 times the damping"),
+        ((("flutters", 1.4), ("flutters", np.nan)), "no damping in reach quiets it"),
+        ((("diverges", np.nan), ("stable", 0.3)), "no damping in reach quiets it"),
+        ((("stable", 0.3),), ""),
+    ],
+)
+def test_the_margin_in_damping_is_that_of_all_heads(made, monkeypatch, verdicts, margin):
+    found, _ = made
+    given = [Verdict(name, "", 1.0, 9.0, 0.02, factor, True) for name, factor in verdicts]
+    results = {p: SimpleNamespace(verdict=verdict, warnings=()) for p, verdict in zip(found.heads, given)}
+    monkeypatch.setattr(type(found), "modes", property(lambda _: results))
+    assert next(one for one in answers(found) if "chatter" in one.question).margin == margin
+
+
+@pytest.mark.parametrize(
+    "classes, factor",
+    [
+        ({"SS": ("stable", 0.46), "SA": ("stable", np.nan), "AA": ("stable", 0.6)}, 0.6),
+        ({"SS": ("flutters", 1.3), "SA": ("stable", 0.6)}, 1.3),
+        ({"SS": ("flutters", 1.3), "SA": ("flutters", np.nan)}, np.nan),
+        ({"SS": ("stable", 0.5), "SA": ("undecided", np.nan)}, np.nan),
+    ],
+)
+def test_the_multiple_of_the_damping_is_that_of_all_classes(classes, factor):
+    parts = {name: Verdict(outcome, "", -1.0, 9.0, 0.02, x, True) for name, (outcome, x) in classes.items()}
+    assert Verdict.joined(parts).critical_damping_factor == pytest.approx(factor, nan_ok=True)
+
+
 def test_heads_at_which_a_verdict_is_one_on_the_fit_of_the_rubber_are_named(tmp_path):
     case = load_case(None, [*KEYS, 'report.heads=["2 kPa", "36 kPa"]'])
     found = gather(case, "valve", tmp_path, (*LEFT_OUT, "closure", "law"), quiet=True)

@@ -67,7 +67,7 @@ def run(session: Session, record: GrowingRecord) -> None:
         except NotValidError as error:
             record.note(_REFUSAL, text=str(error))
             return
-        if variant == own_variant(case) and not options.in_vacuo:
+        if variant.continuity == own_variant(case).continuity and not options.in_vacuo:
             record.progress("critical damping factor")
             try:
                 factor = critical_damping_factor(own, here, found.verdict)

@@ -148,15 +148,23 @@ class Verdict:
 
     @classmethod
     def joined(cls, parts: Mapping[str, Verdict]) -> Verdict:
-        """Verdict on all symmetry classes of a state by their names: the worst of them, certain if all are."""
+        """Verdict on all symmetry classes of a state by their names: the worst of them, certain if all are.
+
+        Flutter begins where that of the first class does, and ends where that of the last one does; nothing is known of
+        that where a class is undecided or diverges.
+        """
         if len(parts) == 1:
             return next(iter(parts.values()))
         worst = min(parts, key=lambda name: (OUTCOMES.index(parts[name].outcome), -_or_least(parts[name].growth_rate)))
         ratios = [part.damping_ratio for part in parts.values() if np.isfinite(part.damping_ratio)]
+        unstable = [part.critical_damping_factor for part in parts.values() if not part.stable]
+        factors = unstable or [part.critical_damping_factor for part in parts.values()]
+        known = [factor for factor in factors if np.isfinite(factor)]
         return replace(
             parts[worst],
             reason=" ".join(f"In {name}: {lowered(part.reason)}" for name, part in parts.items()),
             damping_ratio=min(ratios, default=np.nan),
+            critical_damping_factor=np.nan if len(known) < len(unstable) else max(known, default=np.nan),
             certain=all(part.certain for part in parts.values()),
         )
 
