@@ -151,7 +151,7 @@ def divide(joints, breaks, count: int, law=None) -> Division:
 def _share(lengths: np.ndarray, count: int) -> np.ndarray:
     """Elements of each piece in proportion to its length, at least one; twice as many of them divide alike."""
     base = count
-    while base % 2 == 0 and base // 2 >= 24:
+    while base % 2 == 0 and base // 2 >= max(24, len(lengths)):
         base //= 2
     share = base * lengths / lengths.sum()
     counts = np.maximum(1, np.floor(share + 1e-9).astype(int))

@@ -60,7 +60,7 @@ class LinearisedClass(LinearisedState):
         return self.no_flow() | self.fluid_parts(given)
 
     def steady_parts(self) -> dict[str, np.ndarray]:
-        return self.fluid_parts({"density": 1.0})  # the centrifugal force, which depends on the pressure alone
+        return self.fluid_parts({"density": self.model.flow.density})  # the centrifugal force, alike in all densities
 
     def nodal(self, q: np.ndarray) -> np.ndarray:
         return self.shell.dofs.small(q)

@@ -333,7 +333,7 @@ def sealing_for_cracking(case: Case, area_ratio: float, observer: Observer | Non
     raise SolveError(f"No sealing pressure was found with which the bill cracks at a head of {head:.4g} m.{why}")
 
 
-#: Where the search begins: this part of the pump's largest head; and how far it goes up at once.
+#: Where the search begins: this part of the pump's largest head over that behind it; and how far it goes up at once.
 _START, _UP = 1 / 64, 2.0
 #: Relative accuracy of the pressure.
 _TOLERANCE = 1e-12
@@ -362,13 +362,18 @@ def operating_pressure(model: ValveModel, observer: Observer | None = None) -> f
         return pressure - density * GRAVITY * float(pump.curve(known[pressure]))
 
     unit = density * GRAVITY
-    top = unit * float(pump.heads.max())
-    low = _START * top
+    back, top = model.flow.back, unit * float(pump.heads.max())
+    if top <= back:
+        raise SolveError(
+            f"The pump's largest head, {top / unit:.4g} m, does not overcome the {back / unit:.4g} m that stand behind "
+            "it: nothing flows."
+        )
+    low = back + _START * (top - back)
     if beyond(low) > 0:
         raise _outside(known[low], pump, "at the least of its heads that are tried")
     high = low
     while beyond(high) <= 0:
-        low, high = high, min(_UP * high, top)
+        low, high = high, min(back + _UP * (high - back), top)
         if low == top:
             raise _outside(known[low], pump, "at all of its heads")
     pressure = float(brentq(beyond, low, high, xtol=_TOLERANCE * top, rtol=4 * _TOLERANCE))

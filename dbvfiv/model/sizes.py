@@ -51,14 +51,14 @@ class ValveSizes:
         passage = mesh.part.copies * (mesh.rest_area - mesh.wall_deduction)
         lip = mesh.nodes[mesh.rows[0]]
         wall = float(mesh.thickness[0])
-        high, low = lip[:, 1].max(), -lip[:, 1].max() if mesh.part.is_quarter else lip[:, 1].min()
+        width = 2 * np.abs(lip[:, 0]).max() if mesh.part.is_quarter else np.ptp(lip[:, 0])
         pipes = case.upstream.pipes if case.has_line else ()
         bores = [0.25 * np.pi * pipe.diameter**2 if pipe.diameter else passage[-1] for pipe in pipes]
         line = sum(bore * pipe.length for bore, pipe in zip(bores, pipes))
         return cls(
             case.valve.length,
-            float(2 * np.abs(lip[:, 0]).max() + wall),
-            float(high - low + wall),
+            float(width + wall),
+            float(2 * lip[:, 1].max() + wall),
             mesh.part.copies * mass,
             float(passage[0]),
             float(passage[-1]),

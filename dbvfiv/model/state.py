@@ -225,12 +225,12 @@ def parted_width(model: ValveModel, q: np.ndarray) -> tuple[float, float]:
     row, where = model.mesh.rows[0], np.full(len(model.mesh.nodes), -1)
     where[model.contact.nodes] = np.arange(model.contact.count)
     known = where[row] >= 0
-    x = np.abs(model.mesh.nodes[row, 0])
-    width = np.gradient(x) if model.mesh.part.is_quarter else np.abs(np.gradient(model.mesh.nodes[row, 0]))
+    width = np.abs(np.gradient(model.mesh.nodes[row, 0]))
+    width[[0, -1]] *= 0.5  # half an element belongs to a node at an end
     pressed = model.contact.state(model.rest()).touching[where[row]] & known
     parted = pressed & ~model.contact.state(q).touching[where[row]]
     copies = 2.0 if model.mesh.part.is_quarter else 1.0
-    return copies * float(np.abs(width[parted]).sum()), copies * float(np.abs(width[pressed]).sum())
+    return copies * float(width[parted].sum()), copies * float(width[pressed].sum())
 
 
 class LipCentre:

@@ -413,7 +413,8 @@ class ValveModel(PressedShell):
         """Share of the narrowest of sections (m,), m2, that is open: what faces in contact leave carries no flow."""
         narrowest = int(np.argmin(area))
         film = self.parting * float(np.broadcast_to(self._film, area.shape)[narrowest])
-        return float(np.clip(1.0 - film / area[narrowest], 0.0, 1.0))
+        # lips pressed across each other leave a negative section
+        return float(np.clip(1.0 - film / max(area[narrowest], np.finfo(float).tiny), 0.0, 1.0))
 
     def seal(self, area: np.ndarray) -> int | None:
         """Last station, from the outlet on, of sections (m,), m2, that faces in contact shut; None where none is."""

@@ -44,6 +44,14 @@ def test_rows_lie_on_joints_and_steps(rows, along):
         assert is_on(found.positions, STEP) and len(found.missed) == 0
 
 
+@pytest.mark.parametrize("count", [48, 96, 192])
+def test_more_pieces_than_half_the_elements_get_one_each(count):
+    places = np.linspace(0.0, 1.0, 30)[1:-1]
+    found = divide([0.0, 1.0], places, count)
+    assert len(found.positions) == count + 1 and len(found.missed) == 0
+    assert all(is_on(found.positions, place) for place in places)
+
+
 def test_uniform_rows_are_even():
     assert np.diff(rows_of(48, rows="uniform").positions) == pytest.approx(0.56 / 48, rel=1e-9)
 

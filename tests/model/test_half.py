@@ -13,6 +13,7 @@ from dbvfiv.exchange.bodies import WallFaces, shape_of
 from dbvfiv.exchange.files import triangulated
 from dbvfiv.model.classes import linearise_class
 from dbvfiv.model.forms import ValveForms
+from dbvfiv.model.sizes import ValveSizes
 from dbvfiv.model.symmetry import HALF_SYMMETRIES, SYMMETRIES
 from dbvfiv.motion.start import steady_positions
 from dbvfiv.record.mesh import MeshData, WholeValve
@@ -75,6 +76,13 @@ def test_sections_of_a_half_are_twice_those_of_the_quarter(quarter, half):
     for name in ("rest_area", "wall_deduction", "perimeter"):
         assert getattr(half.mesh, name) == pytest.approx(2 * getattr(quarter.mesh, name), rel=1e-14)
     assert np.array_equal(half.mesh.z, quarter.mesh.z)
+
+
+def test_sizes_of_a_half_are_those_of_the_quarter(quarter, half, flat):
+    one, other = ValveSizes.of(quarter), ValveSizes.of(half)
+    assert other.lines() == one.lines() and other.bill_height == pytest.approx(one.bill_height, rel=1e-9)
+    sizes, lip = ValveSizes.of(flat), flat.mesh.nodes[flat.mesh.rows[0]]
+    assert sizes.bill_width == pytest.approx(np.ptp(lip[:, 0]) + flat.mesh.thickness[0])
 
 
 def test_the_steady_state_is_that_of_the_quarter(quarter, half):

@@ -24,6 +24,7 @@ from dbvfiv.model.dynamics import linearise
 from dbvfiv.model.equilibria import LoadPath, SteadyOptions, first_opening, operating_pressure, sealing_for_cracking
 from dbvfiv.model.newton import EquilibriumSolver, NewtonOptions
 from dbvfiv.model.preset import stress_free_shape
+from dbvfiv.model.state import parted_width
 from dbvfiv.model.symmetry import SYMMETRIES
 from dbvfiv.motion.control import RunOptions
 from dbvfiv.motion.start import steady_positions
@@ -466,6 +467,45 @@ def test_a_pump_whose_curve_meets_a_jump_of_the_flow_has_no_operating_point(monk
     monkeypatch.setattr(LoadPath, "go_to", jump)
     with pytest.raises(SolveError, match="at 2000 Pa the valve's flow jumps from 0 to 1.5 L/s"):
         operating_pressure(model)
+
+
+def test_a_pump_is_asked_from_the_pressure_behind_it_on(monkeypatch):
+    """A valve that takes 1 L/s for each kPa over the 5 m behind it: 12 m - 2 m for each L/s meet it in between."""
+    keys = {"upstream.length": 5.0, "upstream.pump": [[0.0, 12.0], [4e-3, 4.0]], "downstream.pressure": "5 m"}
+    model = ValveModel(thesis_case(COARSE | keys))
+    back = model.flow.back
+
+    def go_to(_, pressure):
+        assert pressure > back
+        return SimpleNamespace(volume_flow=1e-6 * (pressure - back))
+
+    monkeypatch.setattr(LoadPath, "go_to", go_to)
+    unit = 1000.0 * GRAVITY
+    assert back == pytest.approx(5.0 * unit)
+    assert operating_pressure(model) == pytest.approx(back + 7.0 * unit / (1.0 + 2e-3 * unit), rel=1e-9)
+    with pytest.raises(SolveError, match="does not overcome"):
+        operating_pressure(ValveModel(model.case.replace({"downstream.pressure": "13 m"})))
+
+
+def test_lips_that_are_pressed_across_each_other_are_shut(model):
+    area = model.rows.areas(model.nodal(model.rest()))
+    assert model.open_share(area + 1e-3) > 0.9
+    for least in (0.0, -1e-6):
+        pressed = np.where(area == area.min(), least, area)
+        assert model.open_share(pressed) == 0.0 and model.seal(pressed) is not None
+
+
+@pytest.mark.parametrize("begin", [0.0, -1.0])
+def test_the_middle_of_the_lips_parts_as_wide_on_a_half_as_on_a_quarter(begin):
+    x = np.linspace(begin, 1.0, 5 if begin == 0.0 else 9)
+    nodes = np.stack([x, 0.0 * x, 0.0 * x], axis=1)
+    touching = {"rest": np.ones(len(x), bool), "now": x != 0.0}
+    contact = SimpleNamespace(
+        nodes=np.arange(len(x)), count=len(x), state=lambda q: SimpleNamespace(touching=touching[q])
+    )
+    mesh = SimpleNamespace(rows=np.arange(len(x))[None], nodes=nodes, part=SimpleNamespace(is_quarter=begin == 0.0))
+    model = SimpleNamespace(mesh=mesh, contact=contact, rest=lambda: "rest")
+    assert parted_width(model, "now") == pytest.approx((0.25, 2.0))
 
 
 @pytest.mark.slow
