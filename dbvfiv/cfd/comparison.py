@@ -43,10 +43,13 @@ class FlowComparison:
     ----------
     case : FlowCase
     fields : FlowFields
+    published : bool
+        Whether the valve is that of the thesis, beside whose losses it is set.
     """
 
     case: FlowCase
     fields: FlowFields
+    published: bool = False
 
     @cached_property
     def back(self) -> float:
@@ -168,7 +171,7 @@ class FlowComparison:
                 "recovery": recovered / head,
                 "loss": ideal - recovered / head,
                 "law_loss": (1.0 - area / (0.25 * np.pi * case.pipe**2)) ** 2,
-                "published_loss": PUBLISHED_LOSS.get(round(state.pressure / 1e3, 3)),
+                "published_loss": PUBLISHED_LOSS.get(round(state.pressure / 1e3, 3)) if self.published else None,
             }
         return found
 
@@ -207,6 +210,8 @@ class FlowComparison:
 
 #: Of the pipe that is drawn, in lengths of the valve: before the flange and behind the lip.
 _BEFORE, _BEHIND = 0.5, 2.0
+#: Begin and end of the pipe in which the jet has given back its head, in lengths of the valve behind the lip.
+_RECOVERED = 1.4, 5.4
 
 
 def draw(found: FlowComparison) -> Iterator[tuple[str, Callable[[], Figure]]]:
@@ -280,7 +285,7 @@ def pressure(found: FlowComparison) -> Figure:
     if "recovery" in s:
         head = 0.5 * case.density * s["jet_velocity"] ** 2 * scale
         ideal = 1.0 - (s["lip_area"] / (0.25 * np.pi * case.pipe**2)) ** 2
-        ends = 1e3 * (flange - lip) + np.array([800.0, 3000.0])
+        ends = 1e3 * (flange - lip) * (1.0 + np.array(_RECOVERED))
         for loss, look, name in (
             (s["law_loss"], {"color": REST, "lw": 4.0, "alpha": 0.6}, "jet that widens as Borda and Carnot have it"),
             (s["published_loss"], {"color": PUBLISHED, "ls": "--"}, "the thesis's recovery"),

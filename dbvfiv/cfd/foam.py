@@ -34,6 +34,8 @@ INTENSITY, EDDIES = 0.03, 0.07
 _C_MU = 0.09
 
 
+#: Iterations at most between fields that are written.
+KEPT = 100
 #: Files of a case as they are, and what is put into two of them.
 _FILES = ("Allrun", "constant/turbulenceProperties", "system/fvSchemes", "system/fvSolution")
 
@@ -41,10 +43,16 @@ _FILES = ("Allrun", "constant/turbulenceProperties", "system/fvSchemes", "system
 def case_files(case: FlowCase) -> dict[str, str]:
     """All files but the mesh, by their places in the case."""
     texts = files("dbvfiv.cfd").joinpath("case")
-    put_in = {"constant/transportProperties": case.viscosity, "system/controlDict": case.iterations}
+    kept = -(-case.iterations // KEPT)  # times that fields are written, the last at the end
+    times = kept * (case.iterations // kept), case.iterations // kept
+    put_in = {"constant/transportProperties": case.viscosity, "system/controlDict": times}
     found = {f"0/{name}": text for name, text in _fields(case).items()}
     found |= {name: texts.joinpath(name).read_text() for name in _FILES}
     return found | {name: texts.joinpath(name).read_text() % value for name, value in put_in.items()}
+
+
+#: Fields of an iteration.
+_FIELDS = ("p", "U", "k", "omega", "nut")
 
 
 def _fields(case: FlowCase) -> dict[str, str]:
@@ -223,6 +231,9 @@ def run_openfoam(folder: str | Path, iterations: int, observer: Observer | None 
             "openfoam' brings it, or run Allrun where it is."
         )
     observer, folder = observer or Observer(), Path(folder).resolve()
+    for time_folder in _times(folder):
+        if not all((time_folder / name).is_file() for name in _FIELDS):
+            shutil.rmtree(time_folder)  # an interruption met it while it was written
     environment = dict(os.environ)
     if "WM_PROJECT_DIR" not in environment and _DEBIAN.exists():
         environment["WM_PROJECT_DIR"] = str(_DEBIAN)
@@ -313,31 +324,39 @@ def read_fields(folder: str | Path, cells: int) -> FlowFields:
         If it left nothing, or fields of another mesh.
     """
     folder = Path(folder)
-    times = sorted((int(p.name) for p in folder.iterdir() if p.name.isdigit() and int(p.name) > 0), reverse=True)
+    times = [int(p.name) for p in _times(folder)]
     if not times:
         raise SolveError(f"No flow was computed in {str(folder)!r} yet.")
     (folder / "case.foam").touch()
     reader = pyvista.POpenFOAMReader(str(folder / "case.foam"))
     reader.case_type = "reconstructed"
     reader.cell_to_point_creation = False
-    reader.set_active_time_value(float(times[0]))
+    reader.set_active_time_value(float(times[-1]))
     data = reader.read()["internalMesh"].cell_data
     pressure, velocity = (np.array(data[name], float) for name in ("p", "U"))
     if len(pressure) != cells:
         raise SolveError(f"The flow in {str(folder)!r} has {len(pressure)} cells and the mesh of this state {cells}.")
-    return FlowFields(pressure, velocity, times[0], _history(folder))
+    return FlowFields(pressure, velocity, times[-1], _history(folder))
+
+
+def _times(folder: Path) -> list[Path]:
+    """Folders of the iterations whose fields were written, ascending."""
+    found = [p for p in folder.iterdir() if p.name.isdigit() and int(p.name) > 0]
+    return sorted(found, key=lambda p: int(p.name))
 
 
 def _history(folder: Path) -> np.ndarray:
     """Inlet pressure over the iterations of all runs in the folder, later ones in place of earlier ones."""
     found: dict[int, float] = {}
     for path in sorted(folder.glob("postProcessing/inletPressure/*/*.dat"), key=lambda p: int(p.parent.name)):
-        found |= {int(row[0]): row[1] for row in np.loadtxt(path, ndmin=2)}
+        rows = (line.split() for line in path.read_text().splitlines() if not line.startswith("#"))
+        found |= {int(row[0]): float(row[1]) for row in rows if len(row) == 2}  # the last may be cut
     return np.array(sorted(found.items())).reshape(-1, 2)
 
 
-#: Holds the inputs of the run, beside the files of OpenFOAM.
+#: Holds the inputs of the run, beside the files of OpenFOAM, once all of them are written; its name until then.
 NOTE = "question.json"
+DRAFT = f"{NOTE}.part"
 #: Of water at 20 degrees, m2/s.
 WATER_VISCOSITY = 1.0e-6
 
@@ -447,8 +466,13 @@ class FlowCase:
                 raise CaseError(
                     f"{str(folder)!r} holds the flow through another shape or on another mesh; name a new one."
                 )
-            if not known and folder.exists() and any(folder.iterdir()):
+            begun = (folder / DRAFT).exists()
+            if not (known or begun) and folder.exists() and any(folder.iterdir()):
                 raise CaseError(f"{str(folder)!r} is not empty and holds no flow of this program; name a new folder.")
+            if not known:
+                mesh = self.cells
+                folder.mkdir(parents=True, exist_ok=True)
+                (folder / DRAFT).write_text(json.dumps(self.inputs, indent=1) + "\n")
             for name, text in case_files(self).items():
                 path = folder / name
                 if known and name.startswith("0/"):
@@ -457,8 +481,8 @@ class FlowCase:
                 path.write_text(text)
             (folder / "Allrun").chmod(0o755)
             if not known:
-                write_mesh(self.cells, folder)
-                (folder / NOTE).write_text(json.dumps(self.inputs, indent=1) + "\n")
+                write_mesh(mesh, folder)
+                (folder / DRAFT).replace(folder / NOTE)
         except OSError as error:
             raise CaseError(f"{str(folder)!r} cannot be written ({error.strerror or error}).") from error
         return not known

@@ -395,11 +395,18 @@ def cfd(
     """
     from ..cfd.comparison import FlowComparison, draw
     from ..cfd.foam import WATER_VISCOSITY, FlowCase, read_fields, run_openfoam
+    from ..studies.steady.figures import is_published
 
     state = _choose_state(file, pressure)
     result = state.results
     if not state.volume_flow > 0:
         raise CaseError(f"Nothing flows in the state at {state.pressure:g} Pa of {str(file)!r}.")
+    if result.case.gravity.is_there:
+        raise CaseError(
+            f"gravity.direction is {result.case.gravity.direction!r}, and the flow in three dimensions has no levels; "
+            "take a state of the case with 'none'.",
+            key="gravity.direction",
+        )
     width = result.case.downstream.pipe_diameter if pipe is None else _read_diameter(pipe)
     density = state.mass_flow / state.volume_flow
     viscosity = result.case.fluid.dynamic_viscosity / density or WATER_VISCOSITY
@@ -410,7 +417,8 @@ def cfd(
         print_json(written) if as_json else print(f"Wrote {folder}: {written['cells']} cells; run Allrun in it.")
         return
     run_openfoam(folder, iterations, Progress(quiet=as_json))
-    found = FlowComparison(case, read_fields(folder, len(case.cells.cells)))
+    published = is_published(result.case)
+    found = FlowComparison(case, read_fields(folder, len(case.cells.cells)), published)
     (folder / "comparison.json").write_text(json.dumps(found.document(), indent=1) + "\n")
     figures = save_figures(dict(draw(found)), plots)
     print_answer(found.document(), found.lines, as_json, (figures, plots), folder)
@@ -490,7 +498,7 @@ def verdict(
     """
     import h5py
 
-    from ..drawing.signal import save_signal
+    from ..drawing.signal import save_signals
     from ..verdict import JudgeOptions
     from ..verdict.reading import Reading, judge_file, judge_signals
 
@@ -502,8 +510,7 @@ def verdict(
         judged = judge_signals(file, _signals_of_run(file, columns), reading, options, closed_below)
     else:
         judged = judge_file(file, reading, options, closed_below)
-    own = [] if plots is None else [(each.signal, each.verdict) for each in judged]
-    figures = [save_signal(plots, signal.name, signal.time, signal.values, told) for signal, told in own]
+    figures = [] if plots is None else save_signals(plots, judged)
     if as_json:
         print_json({"signals": [each.summary() for each in judged]})
         return

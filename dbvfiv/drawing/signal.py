@@ -5,6 +5,8 @@ shows it.
 from __future__ import annotations
 
 import re
+from collections.abc import Iterable
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -12,6 +14,7 @@ from matplotlib.figure import Figure
 
 from ..verdict import Series, Verdict, spectrum
 from ..verdict.lines import envelope
+from ..verdict.reading import JudgedSignal
 from ..verdict.series import smoothed
 from .style import ACCENT, COMPUTED, draw_figures, new_figure, write_figures
 
@@ -95,14 +98,19 @@ def _draw_spectrum(axes, part: Series, verdict: Verdict) -> None:
     axes.set_xlim(0, min(frequency[-1], highest))
 
 
-def save_signal(folder: Path, name: str, time: np.ndarray, values: np.ndarray, verdict: Verdict) -> Path:
-    """Draw a signal into a PNG file of a folder.
+def save_signals(folder: Path, judged: Iterable[JudgedSignal]) -> list[Path]:
+    """Draw signals into PNG files of a folder, each of its name.
 
     Raises
     ------
     CaseError
         If the folder cannot be written.
     """
-    stem = re.sub(r"[^A-Za-z0-9]+", "-", name).strip("-") or "signal"
-    figures = draw_figures({stem: lambda: signal(name, time, values, verdict)}, (), "record")
-    return write_figures(figures, folder)[0]
+    written: list[Path] = []
+    for one in judged:
+        own, taken = re.sub(r"[\W_]+", "-", one.signal.name).strip("-") or "signal", {path.stem for path in written}
+        numbered = (own, *(f"{own}-{number}" for number in range(2, len(taken) + 2)))
+        stem = next(stem for stem in numbered if stem not in taken)
+        shown = partial(signal, one.signal.name, one.signal.time, one.signal.values, one.verdict)
+        written += write_figures(draw_figures({stem: shown}, (), "record"), folder)
+    return written

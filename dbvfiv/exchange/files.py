@@ -12,7 +12,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from scipy.interpolate import PchipInterpolator
 
-from ..drawing.style import kilopascals
 from ..errors import CaseError
 from ..record.mesh import MeshData
 from .bodies import SHAPES, Piece, Shape, WallFaces, shape_of
@@ -199,8 +198,8 @@ FORMATS = ("stl", "step")
 
 
 def state_name(name: str, pressure: float) -> str:
-    """Beginning of the names of a state's files: ``dbv12-36kPa``."""
-    return f"{name}-{kilopascals(pressure).replace(' ', '')}"
+    """Beginning of the names of a state's files: ``dbv12-36kPa``; pressures that differ have names that do."""
+    return f"{name}-{pressure / 1e3:.10g}kPa"
 
 
 def write_shapes(

@@ -1,6 +1,8 @@
 """Runs of OpenFOAM: what is read back from fields that are known, folders, failures, and one run from end to end."""
 
 import json
+import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -117,6 +119,36 @@ def test_a_folder_is_gone_on_with_or_refused(state, tmp_path, refused):
     with refused(CaseError):
         case.write(tmp_path / "taken")
     assert (tmp_path / "taken" / "letter.txt").read_text() == "mine"
+
+
+def test_a_folder_whose_mesh_was_not_made_is_written_anew(state, tmp_path, monkeypatch, refused):
+    case, folder = flow_case(state, 0.3), tmp_path / "flow"
+    failed = flow_case(state, 0.3)
+    monkeypatch.setattr(foam.FlowMesh, "of", lambda domain: 1 / 0)
+    with pytest.raises(ZeroDivisionError):
+        failed.write(folder)
+    monkeypatch.undo()
+    monkeypatch.setattr(foam, "write_mesh", lambda *given: 1 / 0)
+    for _ in range(2):  # ended while it is written, and again
+        with pytest.raises(ZeroDivisionError):
+            case.write(folder)
+    monkeypatch.undo()
+    assert case.write(folder) is True and case.write(folder) is False
+
+
+@pytest.mark.parametrize("iterations, end", [(50, 50), (400, 400), (450, 450), (401, 400)])
+def test_fields_of_the_last_iteration_are_written(state, iterations, end):
+    told = foam.case_files(replace(flow_case(state), iterations=iterations))["system/controlDict"]
+    times, interval = (int(re.search(rf"{name} (\d+);", told)[1]) for name in ("endTime", "writeInterval"))
+    assert times == end and times % interval == 0 and interval <= 100
+
+
+def test_a_state_with_gravity_is_refused(command_line, tmp_path, one_sentence):
+    keys = ["--set=mesh.around=6", "--set=mesh.along=8", "--set=gravity.direction=-z"]
+    path = tmp_path / "up.h5"
+    assert command_line("steady", "-p", "18 kPa", *keys, "-o", path).status == 0
+    done = command_line("cfd", path, "--no-run", "-o", tmp_path / "flow")
+    assert done.status == 2 and one_sentence(done.err) and "gravity.direction" in done.err
 
 
 def test_figures_are_drawn(state):

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from dbvfiv.errors import CaseError
 from dbvfiv.exchange.bodies import SHAPES, WallFaces, shape_of, trim_section
-from dbvfiv.exchange.files import open_gmsh, triangulated, write_step
+from dbvfiv.exchange.files import open_gmsh, state_name, triangulated, write_step
 
 
 @pytest.fixture(scope="module")
@@ -21,6 +21,11 @@ def narrow(coarse_valve):
 
 def faces_of(state):
     return WallFaces.of(state.results.mesh, state.nodal)
+
+
+def test_states_at_pressures_that_differ_have_files_of_their_own():
+    names = [state_name("dbv12", pressure) for pressure in (36e3, 12341.0, 12344.0)]
+    assert names == ["dbv12-36kPa", "dbv12-12.341kPa", "dbv12-12.344kPa"]
 
 
 def slice_area(body, z):

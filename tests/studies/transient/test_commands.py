@@ -70,6 +70,15 @@ def test_verdict_of_csv(command_line, tmp_path):
     assert outcome.out.startswith("drag: decayed")
 
 
+def test_signals_with_names_that_look_alike_in_files_have_their_own(command_line, tmp_path):
+    t = np.linspace(0, 10, 501)
+    file = write(
+        tmp_path / "a.csv", t, np.sin(20 * t), np.cos(20 * t), np.sin(9 * t), header="t,p (in),p_in,Druck \u03c1"
+    )
+    assert command_line("verdict", file, "--plots", tmp_path / "figures").status == 0
+    assert {p.name for p in (tmp_path / "figures").iterdir()} == {"p-in.png", "p-in-2.png", "Druck-\u03c1.png"}
+
+
 def test_verdict_without_times(command_line, tmp_path):
     file = tmp_path / "one.txt"
     np.savetxt(file, np.sin(2 * np.pi * 5 * np.arange(4000) / 500))
