@@ -85,13 +85,14 @@ class AskPanel:
         return shown
 
     def open(self, values: dict[str, float] | None = None) -> None:
-        """Open the valve of the page, unless it is open; values to ask it at."""
+        """Open the valve of the page, unless it is open; values to ask it at, those of the case for what they lack."""
         file = self.page.file
         if file is None:
             self._status.text = "The valve does not fit yet; see Describe."
             return
         if self._task is not None and not self._task.done() and file == self._file:
-            self.go(values or {})
+            if values is not None:
+                self.go({name: row["own"] for name, row in self._rows.items()} | values)
             return
         if self._task is not None:
             self._task.cancel()
@@ -106,9 +107,9 @@ class AskPanel:
         """Move sliders to values, SI, as far as they reach."""
         for name, value in values.items():
             if name in self._boxes:
-                row, (slider, _) = self._rows[name], self._boxes[name]
+                row, (slider, box) = self._rows[name], self._boxes[name]
                 self.values[name] = min(max(value, row["low"]), row["high"])
-                slider.value = self.values[name] / row["scale"]
+                slider.value = box.value = self.values[name] / row["scale"]
 
     async def _follow(self, file: Path, values: dict[str, float]) -> None:
         """Answer moves of the sliders, the last one always, until another valve is opened."""
@@ -147,7 +148,7 @@ class AskPanel:
         for step, worker in (("bounded", predictor), ("confirm", confirmer), ("margin", confirmer)):
             if worker is confirmer and await self._is_moved_before(self._confirming):
                 return
-            question = {} if step == "margin" else {"values": values}
+            question: dict[str, Any] = {"values": values}
             if step == "confirm":
                 question["near"] = await predictor.about(file, "displacements", values=values)
             asked = asyncio.create_task(worker.about(file, step, **question))

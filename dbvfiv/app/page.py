@@ -14,6 +14,7 @@ from typing import Any
 from nicegui import events, ui
 
 from ..case.load import put
+from ..case.quantity import number_or_text
 from ..errors import CaseError
 from ..studies.case import Case
 from .ask import AskPanel
@@ -221,11 +222,14 @@ class Page:
 
     @property
     def file(self) -> Path | None:
-        """File of the case as it is now, for processes; None where it does not fit."""
+        """File of the case as it is now, for processes, another one for other data files beside it; None where the case
+        does not fit.
+        """
         if self.checked.case is None:
             return None
         text = write_sheet(self.data)
-        path = self.home / f"case-{hashlib.sha256(text.encode()).hexdigest()[:16]}.toml"
+        beside = sorted((p.name, p.stat().st_mtime_ns, p.stat().st_size) for p in self.home.glob("*.csv"))
+        path = self.home / f"case-{hashlib.sha256(f'{text}{beside}'.encode()).hexdigest()[:16]}.toml"
         if not path.exists():
             for old in sorted(self.home.glob("case-*.toml"), key=lambda file: file.stat().st_mtime)[:-20]:
                 old.unlink()
@@ -367,7 +371,7 @@ class Page:
         card: dict[str, Any] = {"density": "1150 kg/m^3"}
         card |= {"kind": "fit", "path": test} if test else {"kind": "neo-hookean", "shear_modulus": f"{shore} Shore A"}
         if loss:
-            card["loss_factor"] = float(loss) if re.fullmatch(r"[\d.]+", loss) else loss
+            card["loss_factor"] = number_or_text(loss)
         self._attempt(put, Case, self.data, f"materials.{name}", card)
         self._parts.refresh()
         self.changed()
@@ -390,10 +394,11 @@ class Page:
         if len(self._data_files()) >= FILES:
             self.tell(f"{FILES} data files are kept already.")
             return
-        (self.home / name.replace(" ", "_")).write_bytes(content)
+        kept = f"{Path(name).stem.replace(' ', '_')}.csv"
+        (self.home / kept).write_bytes(content)
         self._parts.refresh()
         self.changed()
-        self.tell(f"{name.replace(' ', '_')} is kept; the case may name it, and Rubbers offers it.")
+        self.tell(f"{kept} is kept; the case may name it, and Rubbers offers it.")
 
     def _save(self) -> None:
         ui.download.content(write_sheet(self.data), f"{self.name}.toml", "application/toml")

@@ -114,6 +114,7 @@ class Worker:
     async def _about(self, case: Path, do: str, **question: Any) -> Any:
         async with self._lock:
             if self.pid is None or self._opened != str(case):
+                self._opened = ""  # whatever comes of it, the valve before is closed
                 self._parameters = await self.ask("open", case=str(case))
                 self._opened = str(case)
         return self._parameters if do == "open" else await self.ask(do, **question)

@@ -39,8 +39,8 @@ def arguments_of(case: Any, title: str) -> list[str]:
     """Arguments of the study of a picture for a case: heads over that downstream up to 1.5 times its own, damping from
     a quarter to three times its own.
     """
-    name = next((n for n in ("loss_factor", "beta", "alpha") if not case.damping.lacks(n)), "density")
-    own = getattr(case.damping, name, case.fluid.density) or 1.0
+    damping = ((name, getattr(case.damping, name)) for name in ("loss_factor", "beta", "alpha"))
+    name, own = next(((name, own) for name, own in damping if own > 0), ("density", case.fluid.density))
     back = max(case.rest_pressure, 0.0)
     low, high = (back + share * (case.drive.pressure - back) for share in (0.15, 1.5))
     heads = {"low": low, "high": high, "kpa_low": 1e-3 * low, "kpa_high": 1e-3 * high}

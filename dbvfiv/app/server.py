@@ -7,6 +7,7 @@ valves, data files and runs. On an address that others reach a password takes th
 from __future__ import annotations
 
 import asyncio
+import hashlib
 import hmac
 import re
 import secrets
@@ -28,7 +29,7 @@ from ..errors import CaseError
 from .page import Page
 from .processes import Runs, Workers
 
-#: Names of the cookies of the token and of the user; the latter is kept for a year, s.
+#: Names of the cookies of the token, with something of the token, and of the user; the latter is kept for a year, s.
 TOKEN, USER, YEAR = "dbvfiv_token", "dbvfiv_user", 365 * 86400
 #: Largest body of a request, bytes; time after a wrong password, s.
 BODY, PENALTY = 20 << 20, 1.0
@@ -64,12 +65,17 @@ class Guard:
     token: str
     password: str = ""
 
+    @property
+    def cookie(self) -> str:
+        """Name of the cookie of the token: cookies know no ports, and two servers may run on one machine."""
+        return f"{TOKEN}_{hashlib.sha256(self.token.encode()).hexdigest()[:8]}"
+
     async def __call__(self, scope: dict[str, Any], receive: Callable, send: Callable) -> None:
         if scope["type"] not in ("http", "websocket"):
             await self.app(scope, receive, send)
             return
         cookies = read_cookies(scope)
-        given = cookies.get(TOKEN) or ""
+        given = cookies.get(self.cookie) or ""
         if hmac.compare_digest(given.encode(), self.token.encode()):
             scope["state"] = scope.get("state") or {}
             scope["state"]["user"] = user = cookies.get(USER, "")
@@ -98,7 +104,7 @@ class Guard:
         if right:
             named = user if re.fullmatch("[0-9a-f]{32}", user) else secrets.token_hex(16)
             rest = "Path=/; HttpOnly; SameSite=Lax"
-            cookies = (f"{TOKEN}={self.token}; {rest}", f"{USER}={named}; Max-Age={YEAR}; {rest}")
+            cookies = (f"{self.cookie}={self.token}; {rest}", f"{USER}={named}; Max-Age={YEAR}; {rest}")
             headers = [(b"location", b"/"), *((b"set-cookie", cookie.encode()) for cookie in cookies)]
             await respond(send, 303, "", headers)
         elif self.password:

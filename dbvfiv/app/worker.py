@@ -102,8 +102,12 @@ class Desk:
         self._last = self._explorer.confirm(**values)
         return self._last.summary()
 
-    def margin(self) -> dict[str, Any]:
-        """The answer confirmed last, with its margin of damping."""
+    def margin(self, values: dict[str, float]) -> dict[str, Any]:
+        """The answer of the full operator with its margin of damping; another page may have asked for another one
+        since it was confirmed.
+        """
+        if self._last is None or self._last.place != self._explorer.place(values):
+            self._last = self._explorer.confirm(**values)
         return self._explorer.with_margin(self._last).summary()
 
     @property

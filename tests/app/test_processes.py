@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import json
 import sys
 from pathlib import Path
@@ -136,7 +137,7 @@ def test_a_worker_says_what_went_wrong_and_answers_on(tmp_path):
         worker.end()
         await until(lambda: worker.pid is None)
         with pytest.raises(CaseError, match="No valve is open"):
-            await worker.ask("margin")
+            await worker.ask("margin", values={})
         assert worker.pid != before
         worker.end()
 
@@ -154,6 +155,29 @@ def test_workers_go_on_with_the_next_valve():
     workers.leave("two")
     assert workers.of(d, "three") is pair
     assert workers.of(c, "one") is other
+
+
+def test_a_valve_that_was_left_is_opened_again(monkeypatch):
+    """Whatever became of the one between: refused, or no longer waited for."""
+    asked = []
+
+    async def ask(self, do, **question):
+        asked.append((do, question.get("case", "")))
+        if question.get("case") == "b":
+            raise CaseError("No steady state.")
+        return {}
+
+    monkeypatch.setattr(Worker, "ask", ask)
+    monkeypatch.setattr(Worker, "pid", property(lambda self: 1))
+
+    async def day() -> None:
+        worker = Worker()
+        for case in ("a", "a", "b", "a"):
+            with contextlib.suppress(CaseError):
+                await worker.about(Path(case), "predict")
+
+    asyncio.run(day())
+    assert [case for do, case in asked if do == "open"] == ["a", "b", "a"]
 
 
 def test_so_many_valves_are_held():
