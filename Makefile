@@ -45,8 +45,9 @@ reproduce: setup
 	@$(PYTHON) -m dbvfiv reproduce -o out/thesis
 
 docs: setup
-	@$(PYTHON) -m dbvfiv.studies.case > docs/case-reference.md
-	@$(PYTHON) -m dbvfiv.studies.case thesis > cases/dbv12.toml
+	@mkdir -p build
+	@$(PYTHON) -m dbvfiv.studies.case > build/made && mv build/made docs/case-reference.md
+	@$(PYTHON) -m dbvfiv.studies.case thesis > build/made && mv build/made cases/dbv12.toml
 	@$(PYTHON) -m mkdocs build --strict --quiet
 	@echo "The manual is in build/site/index.html."
 

@@ -13,7 +13,8 @@ from typing import Any
 
 from . import __version__, runtime
 
-_NEEDED = ("numpy", "scipy", "jax", "numba", "h5py", "matplotlib", "pydantic", "pint", "typer", "tqdm", "pyvista")
+_NEEDED = ("numpy", "scipy", "jax", "numba", "h5py", "matplotlib", "pydantic", "pint", "typer", "tqdm", "platformdirs")
+_NEEDED += ("pyvista", "plotly", "jinja2")
 _FOR_TESTS = ("pytest", "hypothesis", "felupe")
 # SuperLU_DIST is left out: used a few times in one process, Debian's 8.1 corrupts the heap
 _SOLVERS = ("mumps", "superlu", "umfpack", "petsc")

@@ -1,4 +1,4 @@
-"""Onsets of the 12-inch valve at 28 x 48, for docs/stability.md.
+"""Onsets of the 12-inch valve at 28 x 48, for docs/evidence/stability.md.
 
     python tools/onset_numbers.py [FILE.json] [MAP.h5] [KEY=VALUE ...]
 
@@ -64,7 +64,7 @@ def main(path: Path, keys: list[str]) -> None:
 
 
 def rows(entry: dict) -> list[str]:
-    """Lines of the tables in docs/stability.md."""
+    """Lines of the tables in docs/evidence/stability.md."""
     (fixed,) = entry["fixed"].values()
     scale = 1e3 if entry["parameter"] == "pressure" else 1.0
     start = f"| {fixed if scale > 1 else fixed / 1e3:g} | {entry['law']} |"

@@ -18,6 +18,7 @@ from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 
 from ..case.model import Case
 from ..case.part import QUARTER, Part
+from ..materials.laws import OrthotropicPly
 from ..model.sizes import ValveSizes
 from ..model.valve import ValveModel
 from ..record.mesh import MeshData, WholeValve
@@ -425,11 +426,11 @@ def _layers(axes: Axes, model: ValveModel, mesh: MeshData) -> None:
     section = shell.section if shell.zones is None else shell.at_rest.sections[zone]
     element = mesh.part.centre(mesh.rows.shape[1]) if shell.zones is None else shell.at_rest.elements[zone][0]
     wall, place, kinds = 1e3 * mesh.thickness[element], 0.0, []
-    for share, title, layer in zip(section.fractions, mesh.layer_titles(), model.case.layers):
+    for share, title, layer in zip(section.fractions, mesh.layer_titles(), section.layers):
         height = wall * share
         if height == 0:
             continue
-        ply = layer.material == "fibre" or bool(layer.angle)
+        ply = isinstance(layer.law, OrthotropicPly)
         kinds.append((_PLY, "ply, angle from the axis") if ply else (_RUBBER, "rubber"))
         axes.barh(place + 0.5 * height, 1.0, height, color=kinds[-1][0], edgecolor="white", lw=1.2)
         axes.text(0.02, place + 0.5 * height, title, va="center", fontsize=8)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import shutil
 import subprocess
 from collections.abc import Sequence
@@ -167,19 +168,22 @@ def write_pdf(page: Path, path: Path) -> Path:
         If neither a browser nor WeasyPrint is there, or neither wrote the file.
     """
     browser = next(filter(None, map(shutil.which, _BROWSERS)), None)
+    draft = path.with_name(f"{path.stem}.partial.pdf")  # an earlier one is not taken for what this run has printed
+    draft.unlink(missing_ok=True)
     if browser is not None:
-        options = ("--headless", "--no-sandbox", "--disable-gpu", "--no-pdf-header-footer", f"--print-to-pdf={path}")
-        subprocess.run([browser, *options, page.absolute().as_uri()], capture_output=True, timeout=300, check=False)
+        options = ("--headless", "--no-sandbox", "--disable-gpu", "--no-pdf-header-footer", f"--print-to-pdf={draft}")
+        with contextlib.suppress(subprocess.TimeoutExpired):
+            subprocess.run([browser, *options, page.absolute().as_uri()], capture_output=True, timeout=300, check=False)
     elif find_spec("weasyprint") is not None:
         from weasyprint import HTML  # optional
 
-        HTML(str(page)).write_pdf(str(path))
+        HTML(str(page)).write_pdf(str(draft))
     else:
         raise CaseError(
             f"{str(path)!r} needs the browser chromium (apt-get install chromium) or the package weasyprint "
             f"(pip install dbvfiv[report]), and neither is there; the page is in {str(page)!r} and prints from any "
             "browser."
         )
-    if not path.is_file():
+    if not draft.is_file():
         raise CaseError(f"{str(path)!r} was not written: {browser or 'weasyprint'} gave no file.")
-    return path
+    return draft.replace(path)
