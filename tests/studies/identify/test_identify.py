@@ -230,17 +230,20 @@ def found_of(valve, seed, folder):
 
 
 @pytest.mark.slow
-@pytest.mark.long
-def test_intervals_hold_hidden_inputs_and_onsets_of_fifty_valves(tmp_path):
+@pytest.mark.parametrize(
+    "valves, least, most", [(2, 0.75, 1.0), pytest.param(25, 0.90, 0.99, marks=pytest.mark.random)]
+)
+def test_intervals_hold_hidden_inputs_and_onsets(valves, least, most, tmp_path):
+    """Of so many valves under each kind of damping; of few, the binomial distribution leaves more room beside 95 %."""
     more = {"identify.samples": 24, "identify.round": 8, "identify.over": "pressure=2000,3000,4000,6000,9000"}
     inputs, begins = [], []
     for names, keys in (RAYLEIGH, ELASTIC):
         valve = load(names, **more | keys)
-        for seed in range(25):
+        for seed in range(valves):
             held, begin = found_of(valve, seed, tmp_path)
             inputs, begins = inputs + held, [*begins, begin]
     print(f"\n{np.mean(inputs):.3f} of {len(inputs)} inputs, {np.mean(begins):.3f} of {len(begins)} onsets")
-    assert 0.90 <= np.mean(inputs) <= 0.99 and np.mean(begins) >= 0.90
+    assert least <= np.mean(inputs) <= most and np.mean(begins) >= least
 
 
 @pytest.mark.parametrize(
