@@ -93,9 +93,11 @@ class PencilFamily(ABC):
         """Viscoelastic part of the stiffness: the same matrices for every mu, and one object for equal values."""
         return None
 
-    def structure(self, mu: Hashable) -> tuple[float, float, int]:
-        """Key of the structure alone: the damping parameters and the relaxation."""
-        return (*self.rayleigh(mu), id(self.relaxation(mu)))
+    def structure(self, mu: Hashable) -> tuple[float, float, Relaxation | None]:
+        """Key of the structure alone: the damping parameters and the relaxation, by its identity; whoever keeps the key
+        keeps the object, so that no other one can have it.
+        """
+        return (*self.rayleigh(mu), self.relaxation(mu))
 
     def at(self, mu: Hashable) -> CoupledPencil:
         """Operator at a parameter point; those of one structure share its matrices."""
@@ -162,7 +164,7 @@ class ReducedFamily(PencilFamily):
             for name in ("mass", "damping", "stiffness")
         )
         self.forces, self.slope = (family.forces.T @ self.V).T, family.slope @ self.V
-        self._relaxations: dict[int, tuple[Relaxation, Relaxation]] = {}
+        self._relaxations: dict[Relaxation, Relaxation] = {}
         self._condensed: dict[tuple, tuple] = {}
         self._known: dict[Hashable, np.ndarray] = {}
 
@@ -200,10 +202,9 @@ class ReducedFamily(PencilFamily):
         full = self.family.relaxation(mu)
         if full is None:
             return None
-        if id(full) not in self._relaxations:
-            own = Relaxation(self._relaxing(full), full.strengths, full.times)
-            self._relaxations[id(full)] = full, own  # an object that lives on keeps its id
-        return self._relaxations[id(full)][1]
+        if full not in self._relaxations:
+            self._relaxations[full] = Relaxation(self._relaxing(full), full.strengths, full.times)
+        return self._relaxations[full]
 
     def _relaxing(self, full: Relaxation) -> tuple:
         """V^T K_g V, the same for every parameter point."""

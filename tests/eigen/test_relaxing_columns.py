@@ -160,6 +160,22 @@ def test_columns_carry_certificates_whatever_relaxes():
         assert column.unstable[i] == column.cells[i].certificate.counted == (values.real > 0).sum()
 
 
+def test_an_uncoupled_column_takes_no_relaxation_for_another():
+    """Of a family that keeps none but the last, so that others may come to lie where it was."""
+
+    class Forgetful(RelaxingFamily):
+        def relaxation(self, mu):
+            self._known = {loss: own for loss, own in self._known.items() if loss == mu.loss}
+            return super().relaxation(mu)
+
+    family = Forgetful(6)
+    family.forces, family.slope, family._parts = sp.csr_matrix((SIZE, 0)), sp.csr_matrix((0, SIZE)), {0.0: {}}
+    conditions = [Point(1.0, 0.1, 0.0, 0.0, loss) for loss in np.linspace(0.1, 0.9, 40)]
+    column = ColumnSolver().solve(family, conditions)
+    assert column.certified.all()
+    assert column.leading == pytest.approx([family.reach(c).leading(dense(family, c))[0] for c in conditions], rel=1e-7)
+
+
 def test_correction_is_that_of_newton_on_the_full_pencil():
     family, condition = RelaxingFamily(5), Point(0.3, 0.0, 0.0, 0.0, 0.4)
     reduction = FamilyReduction(family)
