@@ -299,7 +299,8 @@ class ColumnSolver:
     def _anew(self, family: PencilFamily, mu: Hashable) -> Cell:
         """Cell of the full operator, counted on a basis of structural modes, made finer as far as it takes."""
         found = self._certified(family, mu)
-        return Cell(found.spectrum.eigenvalues[: OPTIONS.kept], found.certificate, DIRECT)
+        listed = _modes_of(family, mu, found.spectrum).eigenvalues
+        return Cell(listed[: OPTIONS.kept], found.certificate, DIRECT)
 
     def counted_whole(self, family: PencilFamily, mu: Hashable, cell: Cell) -> Cell:
         """The cell of a parameter point; where it is stable up to the end of a band above which more is counted that is

@@ -176,6 +176,30 @@ def test_an_uncoupled_column_takes_no_relaxation_for_another():
     assert column.leading == pytest.approx([family.reach(c).leading(dense(family, c))[0] for c in conditions], rel=1e-7)
 
 
+def test_a_cell_that_is_counted_anew_lists_no_slow_motions():
+    """Modes of 2 and 40 Hz in a band of 100 Hz, of which the second grows; the first is too slow to be one."""
+
+    class Two(PointFamily):
+        def __init__(self):
+            self.mass, self.damping = np.eye(2), np.diag([4.0, -16.0])
+            self.stiffness = np.diag((2 * np.pi * np.array([2.0, 40.0])) ** 2)
+            self.forces, self.slope = sp.csr_matrix(np.ones((2, 1))), sp.csr_matrix(np.ones((1, 2)))
+            shapes = {"A": (1, 1), "B": (1, 0), "R": (0, 1), "S": (0, 0)}
+            self._parts = {0.0: {name: np.zeros(shapes[name[0]]) for name in FLUID_PARTS}}
+            self._relaxation = Relaxation([self.stiffness], [[0.1]], [1.0])
+
+        def search(self, condition):
+            return SearchOptions(max_frequency=100.0)
+
+        def relaxation(self, mu):
+            return self._relaxation
+
+    family, condition = Two(), Point(1.0, 0.0, 1.0, 0.0)
+    (cell,) = ColumnSolver().solve(family, [condition]).cells
+    assert cell.certificate.agrees and cell.certificate.counted == 2
+    assert cell.leading == pytest.approx(family.reach(condition).leading(dense(family, condition)), rel=1e-7)
+
+
 def test_correction_is_that_of_newton_on_the_full_pencil():
     family, condition = RelaxingFamily(5), Point(0.3, 0.0, 0.0, 0.0, 0.4)
     reduction = FamilyReduction(family)
