@@ -483,8 +483,7 @@ class _Follower:
         branch = self.branch
         branch.next_step = self.tracer.next_step
         if isinstance(item, CyclePoint):
-            branch.points.append(self._point(item))
-            self._fill()
+            self._add(self._point(item))
             notify(self.observers, "accepted", branch)
         else:
             branch.special.append(self._special(item))
@@ -511,16 +510,20 @@ class _Follower:
             self._orbit(item).multipliers,
         )
 
-    def _fill(self) -> None:
-        """Give all points the length of the longest series, and the last one its tangent."""
-        points, longest = self.branch.points, max(len(point.z) for point in self.branch.points)
-        for point in points:
-            if len(point.z) < longest:
-                point.z, point.tangent = (_padded(x, longest) for x in (point.z, point.tangent))
-        self.branch.size = longest - 1
+    def _add(self, point: CurvePoint) -> None:
+        """Add a point with its tangent, and give all the length of the longest series, in copies: shorter ones may be
+        those of a branch handed over.
+        """
+        points = [*self.branch.points, point]
+        longest = max(len(point.z) for point in points)
+        points = [
+            p if len(p.z) == longest else replace(p, z=_padded(p.z, longest), tangent=_padded(p.tangent, longest))
+            for p in points
+        ]
         if len(points) > 1:
             chord = points[-1].z - points[-2].z
             points[-1].tangent = chord / max(np.linalg.norm(chord), 1e-300)
+        self.branch.points[:], self.branch.size = points, longest - 1
 
     def _special(self, item: SpecialCycle) -> SpecialPoint:
         orbit = self._orbit(item.point)

@@ -1,5 +1,7 @@
 """Periodic orbits with exact solutions; multipliers; branches and their files."""
 
+from dataclasses import replace
+
 import jax.numpy as jnp
 import numpy as np
 import pytest
@@ -249,6 +251,11 @@ def test_a_branch_whose_series_grow(tmp_path):
     assert np.isclose(orbit_at(system, branch, 0).period, orbit.period, rtol=1e-12)
     with pytest.raises(ValueError, match="starts at its limit"):
         continue_orbits(system, orbit_at(system, branch, -1), "mu", options)
+    part = continue_orbits(system, orbit, "mu", replace(options, max_points=1))
+    states, values = part.states, part.values()
+    longer = resume(system, part, options)
+    assert longer.size > part.size == states.shape[1]
+    assert np.array_equal(part.states, states) and np.array_equal(part.values(), values)
 
 
 def test_a_branch_stops_where_it_is_asked_to():
