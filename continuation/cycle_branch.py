@@ -123,6 +123,8 @@ class CycleTracer:
         self.points = [
             replace(p, tests={name: float(event(p.cycle)) for name, event in self.events.items()}) for p in points
         ]
+        if len(self.points) > 2 and self._change(*self.points[-2:]) == FOLD and not self._has_turned():
+            self._doubtful = self.points[-2], self.points[-1]
 
     def run(
         self, report: Callable[[CyclePoint | SpecialCycle], None] = lambda item: None, step: float | None = None
@@ -131,6 +133,7 @@ class CycleTracer:
         is found; the reason of the end. `step` is the first step, that of the options by default.
         """
         self.reason = self._steps(report, self.options.step if step is None else step)
+        self._report(report, self._left_over())
         return self.reason
 
     def _steps(self, report, step: float) -> Said:
@@ -351,11 +354,10 @@ class CycleTracer:
     # ----
 
     def _between(self, a: CyclePoint, b: CyclePoint) -> list[SpecialCycle]:
-        found, turned = [], False
-        if len(self.points) > 2:
+        found, turned = [], self._has_turned()
+        if turned:
             before = self.points[-3]
-            turned = (a.value - before.value) * (b.value - a.value) < 0
-            if turned and max(abs(a.value - before.value), abs(b.value - a.value)) > STILL * self.scale:
+            if max(abs(a.value - before.value), abs(b.value - a.value)) > STILL * self.scale:
                 found.append(self._fold(before, a, b))
         for name in self.events:
             if a.tests[name] * b.tests[name] < 0:
@@ -363,14 +365,37 @@ class CycleTracer:
         # A real exponent through zero is that of a fold, if the parameter turns at this step or the next.
         doubtful, self._doubtful = self._doubtful, None
         if doubtful is not None and not turned:
-            found.append(self._located(BRANCH_POINT, *doubtful, growth_of_crossing(*(p.exponents for p in doubtful))))
-        if a.exponents is not None and b.exponents is not None:
-            change = change_between(a.exponents, b.exponents)
-            if change == FOLD and not turned:
-                self._doubtful = a, b
-            elif change is not None and change != FOLD:
-                found.append(self._located(change, a, b, growth_of_crossing(a.exponents, b.exponents)))
+            found.append(self._exchange(BRANCH_POINT, *doubtful))
+        change = self._change(a, b)
+        if change == FOLD and not turned:
+            self._doubtful = a, b
+        elif change is not None and change != FOLD:
+            found.append(self._exchange(change, a, b))
         return found
+
+    def _has_turned(self) -> bool:
+        """True when the parameter went back in the last step."""
+        values = [p.value for p in self.points[-3:]]
+        return len(values) > 2 and (values[1] - values[0]) * (values[2] - values[1]) < 0
+
+    def _change(self, a: CyclePoint, b: CyclePoint) -> str | None:
+        """Kind of the change of stability between two points; None without one, or without exponents."""
+        known = a.exponents is not None and b.exponents is not None
+        return change_between(a.exponents, b.exponents) if known else None
+
+    def _exchange(self, kind: str, a: CyclePoint, b: CyclePoint) -> SpecialCycle:
+        """A change of stability between two points."""
+        return self._located(kind, a, b, growth_of_crossing(a.exponents, b.exponents))
+
+    def _left_over(self) -> list[SpecialCycle]:
+        """A real exponent through zero in the last step: a fold where the parameter goes beyond its last value."""
+        doubtful, self._doubtful = self._doubtful, None
+        if doubtful is None:
+            return []
+        (a, b), found = doubtful, self._exchange(BRANCH_POINT, *doubtful)
+        if (found.point.value - b.value) * (b.value - a.value) > 0:
+            return [self._fold(a, found.point, b)]
+        return [found]
 
     def _fold(self, before: CyclePoint, a: CyclePoint, b: CyclePoint) -> SpecialCycle:
         """The extreme value of the parameter of a parabola through points, renewed until it stays."""

@@ -115,8 +115,9 @@ def lagrange(nodes: Sequence[float], x: float) -> np.ndarray:
 
 
 def crossing_of(exponents: Exponents) -> complex:
-    """The exponent nearest to the imaginary axis."""
-    return complex(exponents.values[np.argmin(np.abs(exponents.values.real))])
+    """The exponent nearest to the imaginary axis; zero where none is apart from that of the shift in time."""
+    values = exponents.values
+    return complex(values[np.argmin(np.abs(values.real))]) if len(values) else 0j
 
 
 def change_between(a: Exponents, b: Exponents) -> str | None:
@@ -141,7 +142,7 @@ def growth_of_crossing(a: Exponents, b: Exponents) -> Callable[[CyclePoint], flo
 
     def test(point: CyclePoint) -> float:
         values = point.exponents.values
-        return float(values.real[min(index, len(values) - 1)])
+        return float(values.real[min(index, len(values) - 1)]) if len(values) else 0.0
 
     return test
 

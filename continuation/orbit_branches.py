@@ -50,7 +50,7 @@ from continuation.options import (
     require,
 )
 from continuation.periodic import PeriodicMotion, peak
-from continuation.tracer import as_observers, notify, run_observed
+from continuation.tracer import KNOWN, as_observers, notify, run_observed
 
 
 class OrbitSolver(CycleSolver):
@@ -415,6 +415,8 @@ class _Follower:
         shape = replace(self.shape, exponents=min(self.shape.exponents, max(n - 1, 1)))
         self.parameter, self.tracer = parameter, CycleTracer(OrbitSolver(system, shape), parameter, kept, shape)
         self.observers: list = []
+        # Special points at the end of a branch handed over, which may be found again.
+        self._known: list[SpecialPoint] = []
 
     def second_orbit(self, first: Cycle) -> Cycle:
         """Orbit a first step along the parameter away from the first one."""
@@ -462,15 +464,16 @@ class _Follower:
         raise NotConverged(f"No orbit was found beside the Hopf point: {reason}", Reason.NO_CYCLE)
 
     def restore(self, branch: Branch) -> None:
-        """Take the points of a branch; the last one with its exponents."""
+        """Take the points of a branch; the last two with their exponents."""
         self.branch = branch.reopen()
+        self._known = [special for special in branch.special if special.index >= len(branch) - 2]
         lengths = np.cumsum([point.step for point in branch.points])
         points = []
         for i, (point, length) in enumerate(zip(branch.points, lengths)):
             motion = _motion(point.z[: branch.size], self.tracer.solver.system.size)
             cycle = Cycle(motion, branch.mu(i), point.residual, point.iterations, 0)
             points.append(CyclePoint(cycle, cycle.mu[self.parameter], float(length), None))
-        points[-1] = replace(points[-1], exponents=self.tracer.describe(points[-1].cycle, after=points[-1]).exponents)
+        points[-2:] = [replace(p, exponents=self.tracer.describe(p.cycle, after=p).exponents) for p in points[-2:]]
         self.tracer.restore(points)
         self.tracer.options = replace(self.tracer.options, max_points=len(points) + self.options.max_points)
 
@@ -485,9 +488,17 @@ class _Follower:
         if isinstance(item, CyclePoint):
             self._add(self._point(item))
             notify(self.observers, "accepted", branch)
-        else:
-            branch.special.append(self._special(item))
-            notify(self.observers, "found", branch, branch.special[-1])
+        elif not self._is_known(special := self._special(item)):
+            branch.special.append(special)
+            notify(self.observers, "found", branch, special)
+
+    def _is_known(self, special: SpecialPoint) -> bool:
+        """True for a special point that the branch handed over has in its last step or beyond it."""
+        near = max(self.options.location_tolerance, KNOWN) * self.tracer.scale
+        return any(
+            known.kind == special.kind and abs(known.mu[self.parameter] - special.mu[self.parameter]) <= near
+            for known in self._known
+        )
 
     def _z(self, cycle: Cycle) -> np.ndarray:
         return np.concatenate([cycle.motion.coefficients.ravel(), [cycle.motion.period, cycle.mu[self.parameter]]])

@@ -14,6 +14,7 @@ from continuation import (
     JaxSystem,
     NotABifurcation,
     NotConverged,
+    Observer,
     OrbitOptions,
     Reason,
     continue_orbits,
@@ -24,9 +25,12 @@ from continuation import (
     resume,
 )
 from continuation.amplitude import amplitude_equation
+from continuation.cycle_branch import CycleTracer
+from continuation.cycle_points import FOLD
 from continuation.first_order import DirectLinearisation, FirstOrderSystem
 from continuation.harmonics import Harmonics
 from continuation.normal_form import SystemForms
+from continuation.orbit_branches import OrbitSolver
 from continuation.periodic import PeriodicMotion
 from tests.systems.brusselator import brusselator, brusselator_1d
 from tests.systems.following import follow, hopf_of, normal_form_of
@@ -194,9 +198,34 @@ def test_fold_of_cycles_of_the_bautin_system(tmp_path):
         ContinuationOptions(limits={"mu": (-1, 0.3)}),
     )
     assert np.allclose(longer.values(), branch.values(), rtol=0, atol=1e-7)
+    assert [(s.kind, s.index) for s in longer.special] == [("fold of cycles", at)]
     again = orbit_at(system, Branch.load(tmp_path / "cycles.h5"), -1)
     r2 = 0.5 + np.sqrt(0.25 + 0.3)
     assert np.allclose(again.amplitude(), np.sqrt(r2), rtol=1e-6)
+
+
+class Stop(Observer):
+    """Interrupt a run when it finds a special point, or at a number of points."""
+
+    def __init__(self, after: int = 0):
+        self.after = after
+
+    def accepted(self, branch):
+        if len(branch) == self.after:
+            raise KeyboardInterrupt
+
+    def found(self, branch, special):
+        if not self.after:
+            raise KeyboardInterrupt
+
+
+def test_a_fold_of_cycles_that_an_interruption_follows_is_listed_once():
+    system, options = bautin(), ContinuationOptions(limits={"mu": (-1, 0.3)}, direction=-1)
+    orbit = find_orbit(system, 0.4 * CIRCLE, 2 * np.pi, {"mu": 0.4**4 - 0.4**2, "nu": 1.0})
+    part = continue_orbits(system, orbit, "mu", options, observers=Stop())
+    assert part.reason.kind is Reason.INTERRUPTED and len(part.special) == 1
+    longer = resume(system, part, options)
+    assert longer.values()[-1] == 0.3 and [s.kind for s in longer.special] == ["fold of cycles"]
 
 
 def test_period_doubling_of_a_twisted_band():
@@ -311,9 +340,34 @@ def test_a_branch_point_of_cycles_is_no_fold():
 
     system = JaxSystem(residual, 3)
     orbit = find_orbit(system, np.hstack([CIRCLE, np.zeros((60, 1))]), 6.0, {"mu": -0.5})
-    branch = continue_orbits(system, orbit, "mu", ContinuationOptions(limits={"mu": (-1.0, 0.5)}))
+    options = ContinuationOptions(limits={"mu": (-1.0, 0.5)})
+    branch = continue_orbits(system, orbit, "mu", options)
     assert [(s.kind, s.located) for s in branch.special] == [("branch point", True)]
     assert abs(branch.special[0].mu["mu"]) < 1e-7 and branch.unstable[0] == 0 and branch.unstable[-1] == 1
+    # in the last step, of a run that ends or is interrupted there, and once when it goes on
+    beyond = branch.special[0].index + 2
+    part = continue_orbits(system, orbit, "mu", replace(options, max_points=beyond - 1))
+    halted = continue_orbits(system, orbit, "mu", options, observers=Stop(beyond))
+    assert len(part) == len(halted) == beyond and not halted.special
+    for found in (part, resume(system, part, options), resume(system, halted, options)):
+        assert [(s.kind, s.located, s.index) for s in found.special] == [("branch point", True, beyond - 2)]
+        assert abs(found.special[0].mu["mu"]) < 1e-7
+
+
+def test_a_fold_of_cycles_in_the_last_step_is_no_branch_point():
+    """Cycles mu = r^4 - r^2, the last a little behind the fold; the parameter has not gone back yet."""
+    system, mu = bautin(), lambda r: {"mu": r**4 - r**2, "nu": 1.0}
+    solver = OrbitSolver(system, OrbitOptions())
+    options = ContinuationOptions(limits={"mu": (-1, 0.3)}, max_points=3)
+    tracer = CycleTracer(solver, "mu", options, OrbitOptions(exponents=1))
+    radii = (0.4, 0.5, np.sqrt(0.5) + 0.1)
+    for r in radii:
+        tracer.extend(solver.solve(PeriodicMotion.of_samples(r * CIRCLE, 6, 1.0), mu(r)))
+    tracer.restore(tracer.points)
+    assert mu(radii[-1])["mu"] < mu(radii[-2])["mu"]
+    assert tracer.run().kind is Reason.POINTS
+    (fold,) = tracer.special
+    assert fold.kind == FOLD and abs(fold.value + 0.25) < 1e-6
 
 
 def test_exponents_only_where_asked():
