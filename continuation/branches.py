@@ -151,9 +151,12 @@ def switch_branch(
             gap = point.z - special.z
             gap = gap / problem.norm(gap)
             known = special.tangent / problem.norm(special.tangent)
-            if abs(problem.dot(gap, direction)) > abs(problem.dot(gap, known)):
+            if tracer.beyond(point.z) is not None:
+                reason = Reason.LOST_AT_LIMIT
+            elif abs(problem.dot(gap, direction)) > abs(problem.dot(gap, known)):
                 branch = Branch("equilibria", system.size, (parameter,), (), dict(special.mu), [point.record()])
                 return tracer.run(branch, point, step)
-            reason = Reason.KNOWN_BRANCH
+            else:
+                reason = Reason.KNOWN_BRANCH
         step *= SHRINK
     raise NotConverged(f"The other branch was not found: {reason.value}.", reason)

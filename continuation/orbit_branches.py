@@ -447,7 +447,7 @@ class _Follower:
         # |z|^2 of the orbit a step away: (a |z|)^2 + (b |z|^2)^2 = step^2
         a, b = np.sqrt(2.0) / kept.state_scale, rate / scale
         radius = min(kept.step * np.sqrt(2.0 / (a**2 + np.sqrt(a**4 + (2 * b * kept.step) ** 2))), most)
-        reason = ""
+        (low, high), reason = self.options.limits.get(self.parameter, (-np.inf, np.inf)), ""
         for _ in range(HALVINGS):
             small = PeriodicMotion.of_waves([special.u, radius * q], self.shape.harmonics, omega)
             row = small.coefficients / np.linalg.norm(small.coefficients[1:])
@@ -455,9 +455,10 @@ class _Follower:
             try:
                 cycles = cycles_beside_onset(self.tracer.solver, small, dict(special.mu), self.parameter, row, SECOND)
                 missed = (cycles[1].mu[self.parameter] - special.mu[self.parameter] - rate * radius**2) / scale
-                if abs(missed) <= 0.5 * np.hypot(a * radius, b * radius**2):
+                inside = all(low <= cycle.mu[self.parameter] <= high for cycle in cycles[1:])
+                if inside and abs(missed) <= 0.5 * np.hypot(a * radius, b * radius**2):
                     return cycles
-                reason = Reason.NOT_NORMAL.value
+                reason = Reason.NOT_NORMAL.value if inside else "its orbits lie beyond the limits"
             except ContinuationError as error:
                 reason = str(error)
             radius *= 0.5

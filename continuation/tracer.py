@@ -367,11 +367,11 @@ class Tracer:
             after, trouble = self._attempt(before, z, normal)
             if trouble is None:
                 after.step = used
-                after, ending, trouble = self._land_on_limit(before, after, self._beyond(after.z), ending)
+                after, ending, trouble = self._land_on_limit(before, after, self.beyond(after.z), ending)
             if trouble is None:
                 found = self._between(branch, before, after)
                 doubtful = [s for s in found if not s.located and s.kind != "zero eigenvalue"]
-                left = [s for s in found if s.located and self._beyond(s.z)]
+                left = [s for s in found if s.located and self.beyond(s.z)]
                 if doubtful and self._retries and used > options.min_step * (1 + 1e-9):
                     self._retries -= 1
                     self._doubted = max(self._doubted, used)
@@ -382,7 +382,7 @@ class Tracer:
                     if turn is None:
                         trouble = Reason.LOST_AT_LIMIT()
                     else:
-                        crossed = self._beyond(left[0].z)
+                        crossed = self.beyond(left[0].z)
                         after, ending, trouble = self._land_on_limit(before, turn, crossed, None)
                         found = [] if trouble else self._between(branch, before, after)
             if trouble is None:
@@ -465,7 +465,7 @@ class Tracer:
             z[last[0]] = last[1]
         return z, used, normal, ending
 
-    def _beyond(self, z):
+    def beyond(self, z):
         """Index of the first parameter beyond its limits and the limit, or None."""
         for i, name in enumerate(self.problem.names):
             if name in self.options.limits:

@@ -105,6 +105,10 @@ def test_cycles_from_a_hopf_point_follow_the_square_root():
     assert np.allclose(branch.values("period"), 2 * np.pi / (2 - 0.7 * branch.values()), rtol=1e-8)
     assert set(branch.unstable) == {0}
     assert np.isclose(orbit_at(system, branch, -1).amplitude()[0], np.sqrt(0.5), rtol=1e-7)
+    near = orbits_from_hopf(system, hopf, "mu", ContinuationOptions(limits={"mu": (-1, 5e-4)}))
+    assert near.reason.kind is Reason.LIMIT and near.values()[-1] == 5e-4 and np.all(near.values() <= 5e-4)
+    with pytest.raises(NotConverged, match="beyond the limits"):
+        orbits_from_hopf(system, hopf, "mu", ContinuationOptions(limits={"mu": (-1, 0)}))
 
 
 def scaled_brusselator(unit):

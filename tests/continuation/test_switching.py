@@ -37,6 +37,10 @@ def test_transcritical():
         assert np.abs(branch.states[:, 0] - branch.values()).max() < 1e-9
         # Exchange of stability: the branch x = mu is stable for mu > 0.
         assert np.all((branch.unstable == 0) == (branch.values() > 0))
+    # A limit nearer than a first step is the end of the branch that goes there.
+    near = ContinuationOptions(limits={"mu": (-1.0, 1e-3)})
+    ends = sorted(switch_branch(system, point, "mu", near, side).values()[-1] for side in (1, -1))
+    assert ends == [-1.0, 1e-3]
 
 
 def test_points_on_both_sides_of_the_buckled_column_tree():
