@@ -440,6 +440,8 @@ class _Follower:
         q, rate, most = q / np.linalg.norm(q), 0.0, np.inf
         try:
             form = hopf_normal_form(system, special.u, special.mu, omega, q, self.parameter)
+            if not form.crossing.real:
+                raise NotABifurcation(f"The growth rate does not change with {self.parameter}: no orbits begin there.")
             rate = -form.c1.real / form.crossing.real
             most = SMALL / max(np.linalg.norm(form.h20), np.linalg.norm(form.h11), 1e-300)
         except DerivativeMissing:

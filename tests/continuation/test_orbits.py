@@ -332,6 +332,9 @@ def test_orbits_start_at_hopf_points_only():
     branch = follow(bautin(), [0, 0], {"mu": -0.5, "nu": 1.0}, "mu", (-1, 1), locate=False)
     with pytest.raises(NotABifurcation):
         orbits_from_hopf(bautin(), branch.special[0], "mu")
+    hopf = hopf_of(bautin(), [0, 0], {"mu": -0.5, "nu": 1.0}, "mu", (-1, 1))
+    with pytest.raises(NotABifurcation, match="The growth rate does not change with nu"):
+        orbits_from_hopf(bautin(), hopf, "nu")
 
 
 def test_a_branch_point_of_cycles_is_no_fold():
