@@ -16,7 +16,7 @@ from typing import Any
 import h5py
 import numpy as np
 
-from continuation.options import NotAParameter, Reason, Said
+from continuation.options import NotAParameter, Reason, Said, require
 
 #: Version of the layout of files.
 FORMAT = 2
@@ -221,9 +221,10 @@ class Branch:
         """
         if not Path(path).is_file():
             raise FileNotFoundError(f"There is no file {path}.")
+        foreign = f"{path} is not a branch file of format {FORMAT}."
+        require(h5py.is_hdf5(path), foreign)
         with h5py.File(path, "r") as file:
-            if file.attrs.get("format") != FORMAT:
-                raise ValueError(f"{path} is not a branch file of format {FORMAT}.")
+            require(file.attrs.get("format") == FORMAT, foreign)
             header = json.loads(file.attrs["header"])
             header["names"], header["extra_names"] = tuple(header["names"]), tuple(header["extra_names"])
             header["reason"] = Said(header["reason"])

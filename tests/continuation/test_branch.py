@@ -264,11 +264,13 @@ def test_an_event_that_is_not_a_number_is_no_crossing():
 
 
 def test_a_foreign_file_is_refused(tmp_path):
-    path = tmp_path / "x.h5"
+    path, text = tmp_path / "x.h5", tmp_path / "x.txt"
     with h5py.File(path, "w") as file:
         file["y"] = 1
-    with pytest.raises(ValueError, match="not a branch file"):
-        Branch.load(path)
+    text.write_text("y = 1")
+    for foreign in (path, text):
+        with pytest.raises(ValueError, match="not a branch file"):
+            Branch.load(foreign)
 
 
 def test_plot_draws_stability_and_special_points():
