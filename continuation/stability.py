@@ -91,7 +91,7 @@ class SpectrumMonitor(Monitor):
         special: list = []
         self._between(tracer, before, after, index, 0, found, special)
         if self._past is not None:
-            special += self._probe(tracer, self._past, before, after, index, special)
+            special += self._probe(tracer, self._past, before, after, index, [*found, *special])
         return special
 
     def accept(self, tracer, before, after, found):
@@ -100,7 +100,7 @@ class SpectrumMonitor(Monitor):
             self._past.data.pop("modes", None)
         self._past, self._recent = before, found
 
-    def _probe(self, tracer, past, before, after, index, special):
+    def _probe(self, tracer, past, before, after, index, found):
         """Look for a crossing and its return within one step.
 
         A parabola through the growth rates at three points tells where a mode that has the
@@ -129,9 +129,10 @@ class SpectrumMonitor(Monitor):
             if middle is None:
                 continue
             new: list = []
-            self._between(tracer, low, middle, at, 1, [], new)
-            self._between(tracer, middle, high, at, 1, [], new)
-            known = special + self._recent
+            seen = self._recent if vertex < 0 else found
+            self._between(tracer, low, middle, at, 1, seen, new)
+            self._between(tracer, middle, high, at, 1, seen, new)
+            known = found + self._recent
             return [
                 n
                 for n in new

@@ -129,6 +129,20 @@ def test_a_tongue_narrower_than_the_step_is_not_stepped_over(centre):
     assert all(branch.values()[s.index] <= s.mu["mu"] <= branch.values()[s.index + 1] for s in branch.special)
 
 
+@pytest.mark.parametrize("dip", [-0.05, -0.03])
+def test_a_pair_that_comes_near_the_axis_beside_a_fold_makes_no_other_zero(dip):
+    """r + u^2, and an oscillator of growth -0.001 - 5 (u - dip)^2."""
+
+    def residual(u, mu):
+        g = -0.001 - 5 * (u[0] - dip) ** 2
+        return jnp.stack([mu["r"] + u[0] ** 2, g * u[1] - 3 * u[2], 3 * u[1] + g * u[2]])
+
+    limits = {"r": (-1.0, 0.5)}
+    options = ContinuationOptions(limits=limits, eigenvalues=3)
+    branch = continue_branch(JaxSystem(residual, 3), [-1.0, 0.0, 0.0], {"r": -1.0}, "r", options)
+    assert [(s.kind, s.located) for s in branch.special] == [("fold", True)]
+
+
 def test_pole_of_the_branch_point_test_is_no_branch_point():
     """A fold is passed with the test function of branch points running all over the place."""
     branch = continue_branch(
