@@ -314,14 +314,12 @@ def _start(tracer, special):
     extra = [special.values["omega"]] if problem.e else []
     n = problem.n
     z = problem.pack(special.u, special.mu, extra)
-    # The branch the point was found on gives one direction, the second parameter the other.
-    along = np.zeros(n + 2)
-    along[:n] = special.tangent[:n]
-    if special.tangent.size > n and special.kind == "hopf":
-        along[n] = special.tangent[n]
-    second = np.zeros(n + 2)
-    second[n + 1] = 1.0
-    frame = problem.frame(np.stack([along, second], axis=1))
+    frame = None
+    if not problem.e:
+        # F_u is singular at a fold: one direction is that of the branch with it, the other the second parameter.
+        along, second = np.zeros((2, n + 2))
+        along[:n], second[n + 1] = special.tangent[:n], 1.0
+        frame = problem.frame(np.stack([along, second], axis=1))
     direction = np.zeros(z.size)
     direction[n + 1] = tracer.options.direction
     point = tracer.start(z, direction, frame)

@@ -73,6 +73,9 @@ def test_generalised_hopf_point():
     assert np.allclose(curve.values("l1"), 2 * curve.values("nu"), rtol=0, atol=1e-10)
     (point,) = curve.of_kind("generalised hopf")
     assert abs(point.mu["nu"]) < 1e-9
+    # From there the curve starts too, of an equilibrium that stays where it is.
+    other = continue_hopf(bautin(), point, ("mu", "nu"), ContinuationOptions(limits={"nu": (-1, 1)}, direction=-1))
+    assert other.values("nu")[-1] == -1 and np.abs(other.values("mu")).max() < 1e-9
 
 
 def test_zero_hopf_point_and_counts():
