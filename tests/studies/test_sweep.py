@@ -14,6 +14,7 @@ from dbvfiv.model.equilibria import LoadPath
 from dbvfiv.studies.case import thesis_case
 from dbvfiv.studies.modes.search import ModesOptions, run_modes
 from dbvfiv.studies.session import Session
+from dbvfiv.studies.stability import walk
 from dbvfiv.studies.sweep import study as tracked
 from eigen import SearchOptions
 from tests.observers import Stop
@@ -121,6 +122,14 @@ def test_pressure(model):
         assert max(nearest(found, column, value) for value in full.eigenvalues[:3]) < 1e-6
     first = eigenvalues(found)[0]
     assert first[0].real > 0 > first[-1].real and found.branches[0].confidence.min() > 0.6
+
+
+def test_more_pressures_than_states_are_kept(model, monkeypatch):
+    monkeypatch.setattr(walk, "_STATES", 1)
+    states, case = walk.StabilityWalk(model.case, model=model), Mu.of(model.case)
+    for pressure in (6e3, 6.1e3, 6.2e3, 6e3):
+        state = states.state(case.at(pressure=pressure))
+        assert state.pressure == pressure and np.array_equal(state.q, states.equilibrium(case.at(pressure=pressure)))
 
 
 @pytest.mark.parametrize("over", [DENSITY, "pressure=2 kPa:14 kPa:7"])

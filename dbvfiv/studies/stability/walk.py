@@ -37,6 +37,8 @@ from .verdict import Verdict
 
 #: Blends of the continuity laws whose fluid is kept, and factors whose relaxation is.
 _KEPT = 256
+#: Steady states of a model that are kept.
+_STATES = 400
 #: Relative accuracy of the pressure at which valve and pump meet.
 MET = 1e-10
 #: Structural frequencies in vacuo that a band holds at least.
@@ -390,15 +392,15 @@ class StabilityWalk:
             path.pressure, path.q, path.slope = nearest, built.known[nearest], None
         built.aim(place.pressure)
         try:
-            built.described[place.pressure] = path.go_to(place.pressure)
+            found = path.go_to(place.pressure)
         except SolveError:
             path.pressure, path.q, path.slope = before  # where a run that goes on without this place stands too
             raise
         built.passed()
-        if len(built.known) > 400:
+        if len(built.known) > _STATES:
             built.known.clear()
             built.described.clear()
-        built.known[place.pressure] = path.q
+        built.known[place.pressure], built.described[place.pressure] = path.q, found
         return path.q
 
     def family(self, place: Mu) -> ValveFamily:
