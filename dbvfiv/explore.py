@@ -239,10 +239,9 @@ class Explorer:
             return Answer(place, state, Verdict.not_valid(refusal), confirmed=True)
         spectrum = self.walk.spectrum(place, self.case.modes.count)
         found = self.walk.sample(place, self.walk.cell(place, spectrum))
-        counts, region = (found.unstable, found.counted, found.certain), {"line": found.line, "band": found.band}
         # the count may have pointed to unstable modes beyond the band of the list
         values = max((spectrum.eigenvalues, found.eigenvalues), key=lambda listed: np.sum(listed.real > 0))
-        return Answer(place, state, Verdict.of(values, *counts, **region), values, 0.0, True)
+        return Answer(place, state, replace(found, eigenvalues=values).verdict, values, 0.0, True)
 
     def with_margin(self, answer: Answer) -> Answer:
         """A confirmed answer with the factor on the damping at which flutter begins or ends.

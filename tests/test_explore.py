@@ -73,6 +73,15 @@ def test_an_unstable_mode_far_above_the_list_is_told():
     assert answer.verdict.frequency > 400
 
 
+def test_a_band_below_the_flutter_is_left_open():
+    """As `modes` says it: stable up to 100 Hz, and the count finds the flutter at 489 Hz."""
+    changes = COARSE | {"drive.pressure": 450.0, "damping.beta": 4.64e-4, "modes.max_frequency": 100.0}
+    valve = dbvfiv.load(thesis_case(), changes)
+    answer, modes = valve.explore().confirm().verdict, valve.modes().verdict
+    assert answer.outcome == modes.outcome == "undecided" and not answer.certain
+    assert answer.reason.endswith("modes.max_frequency moves the end.")
+
+
 def test_corners_are_prepared(explorer):
     explorer.predict()
     steps = 0
