@@ -27,8 +27,13 @@ def draw(result: StudyResult) -> Iterator[tuple[str, Callable[[], Figure]]]:
     yield "margin", lambda: margin(result)
     if (result.deciding or {}).get("decides") and result.deciding["decides"][0]["share"] is not None:
         yield "what-decides", lambda: what_decides(result)
-    if result.deciding and result.deciding["samples"] >= LEAST:
+    if result.deciding and _with_ratio(result.at(result.deciding["value"])).sum() >= LEAST:
         yield "tornado", lambda: tornado(result)
+
+
+def _with_ratio(found: dict[str, np.ndarray]) -> np.ndarray:
+    """True for samples of the inputs as they are that have a damping ratio."""
+    return (found["stage"] == 0) & np.isfinite(found["damping_ratio"])
 
 
 def _axis(axes, result: StudyResult) -> np.ndarray:
@@ -82,7 +87,7 @@ def margin(result: StudyResult) -> Figure:
         axes.axhline(0.0, color="black", lw=0.8)
     else:
         found = result.at(result.points[0]["value"])
-        plain = (found["stage"] == 0) & np.isfinite(found["damping_ratio"])
+        plain = _with_ratio(found)
         ratio, outcome = 100 * found["damping_ratio"][plain], found["outcome"][plain]
         edges = np.histogram_bin_edges(ratio, max(1, round(len(ratio) ** 0.5)))
         for name in (STABLE, FLUTTERS):
@@ -133,7 +138,7 @@ def tornado(result: StudyResult) -> Figure:
     """
     point = result.deciding
     found = result.at(point["value"])
-    plain = (found["stage"] == 0) & np.isfinite(found["damping_ratio"])
+    plain = _with_ratio(found)
     ratio, values = 100 * found["damping_ratio"][plain], found["inputs"][plain]
     ends = np.quantile(values, [0.2, 0.8], axis=0)
     low, high = (

@@ -8,10 +8,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from eigen.columns import ColumnSolver
+from eigen.columns import Cell, ColumnSolver
 
 from ...case.parameters import Mu
-from ...errors import CaseError, SolveError
+from ...errors import CaseError, NotValidError, SolveError
 from ..inputs import CONFIDENCE, Plan, Probability, quasi_random
 from ..stability.neighbours import At, Beside, Neighbours
 from ..stability.verdict import OUTCOMES, Verdict
@@ -114,8 +114,12 @@ class Sampler:
             met = walk.meet_pump(places[0], start.lift, start.q).pressure
             places = [place.at(pressure=met) for place in places]
             walk.settle(places[0], start.q)
-            state, column = walk.state(places[0]), walk.column(places, snapshots=min(len(places), 7))
-            verdicts = [walk.sample(*pair, value).verdict for pair in zip(places, column.cells)]
+            state = walk.state(places[0])
+            try:
+                cells = walk.column(places, snapshots=min(len(places), 7)).cells
+            except NotValidError:  # at all of them
+                cells = [Cell()] * len(places)
+            verdicts = [walk.sample(*pair, value).verdict for pair in zip(places, cells)]
         except (SolveError, CaseError) as error:
             state, verdicts = None, [Verdict.undecided(str(error))] * len(places)
         for k, verdict in enumerate(verdicts):

@@ -71,6 +71,25 @@ def test_undecided_samples_say_why():
     assert last.endswith("modes.max_frequency moves the end.")
 
 
+@pytest.fixture(scope="module")
+def refused():
+    """Samples that share a state in which the published constants of its rubber are unstable."""
+    return load(**{"damping.model": "loss factor", "drive.pressure": 12e3}).uncertainty(
+        inputs={"loss_factor": "lognormal(1.3)"}
+    )
+
+
+def test_samples_that_are_all_not_valid_are_decided(refused):
+    (point,) = refused.points
+    assert point["outcomes"]["not valid"]["probability"] == 1.0 and point["undecided"] == 0
+    assert point["probability"] == 0.0 and point["interval"][1] < 0.25
+    assert (refused.at(point["value"])["opening"] > 0).all()
+
+
+def test_figures_of_samples_without_a_damping_ratio_are_drawn(refused):
+    assert set(refused.figures()) == {"margin"}
+
+
 def test_the_document_has_probability_interval_and_what_decides(found):
     document = json.loads(json.dumps(found.summary()))
     (point,) = document["points"]
