@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from dataclasses import asdict, replace
 from functools import cached_property
+from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -46,6 +47,8 @@ _MEASURED, _FOUND = "measured", "found"
 UNLIKELY = 3.0
 #: Quantiles of an interval, and values that stand for a distribution of no simple form.
 INTERVAL, STEPS = (0.025, 0.5, 0.975), 41
+#: Probability below which nothing is said of what may be.
+RARE = 0.025
 #: Distance of the distribution function of a posterior from that of its form up to which the form stands for it, and
 #: least correlation that is kept.
 FORM, KEPT = 0.06, 0.05
@@ -269,20 +272,18 @@ class IdentifyResult(StudyResult):
 
     @cached_property
     def onset(self) -> dict[str, Any] | None:
-        """Onset of flutter below and above the last record: median, 95 % interval (None beyond the range) and the
-        probability that it does within the range; None where too few valves are known.
+        """Onset of flutter below and above the last record, of samples that are stable there, and under ``ends`` its
+        end, of those that flutter: median, 95 % interval (None beyond the range) and the probability, among all, that
+        there is one within the range; None where too few valves are known.
         """
         if self._onsets is None:
             return None
         below, above, present = self._onsets
         found: dict[str, Any] = {"parameter": self.places.parameter, "now": self.places.now}
-        found["flutters_now"] = float(np.mean(present < 0))
-        for name, at, beyond in (("below", below, -np.inf), ("above", above, np.inf)):
-            whole = np.where(np.isfinite(at), at, beyond)
-            low, middle, high = np.quantile(whole, INTERVAL, method="nearest")
-            plain = [float(v) if np.isfinite(v) else None for v in (low, middle, high)]
-            share = float(np.isfinite(at).mean())
-            found[name] = {"median": plain[1], "interval": [plain[0], plain[2]], "probability": share}
+        found |= {"flutters_now": float(np.mean(present < 0)), "ends": {}}
+        for kept, among in ((found, present >= 0), (found["ends"], present < 0)):
+            for name, at, beyond in (("below", below, -np.inf), ("above", above, np.inf)):
+                kept[name] = _interval(at, among, beyond)
         return found
 
     @cached_property
@@ -293,8 +294,9 @@ class IdentifyResult(StudyResult):
         targets = {self.plan.inputs[i].name: self.scores[:, i] for i, _ in self.learned.confounded()}
         if self._onsets is not None:
             for name, at in zip(("onset below", "onset above"), self._onsets):
-                if np.isfinite(at).mean() > 0.5:
-                    targets[name] = at
+                begins = np.where(self._onsets[2] >= 0, at, np.nan)
+                if np.isfinite(begins).mean() > 0.5:
+                    targets[name] = begins
         return self.learning.further(self.samples, targets)
 
     @cached_property
@@ -404,24 +406,36 @@ class IdentifyResult(StudyResult):
         if self.onset is None:
             return ["Where flutter begins is not known: too few valves have modes over the range."]
         said, found = [], self.onset
-        if found["flutters_now"] > 0.025:
-            said.append(f"It flutters at the last record with a probability of {100 * found['flutters_now']:.0f} %.")
-        ends = {"below": self.places.values[0], "above": self.places.values[-1]}
-        for name in ("above", "below"):
-            part = found[name]
-            if part["probability"] < 0.025:
-                said.append(f"No flutter {name} {self._value(found['now'])} up to {self._value(ends[name])}.")
-                continue
-            edge = f"beyond {self._value(ends[name])}"
-            low, middle, high = (
-                edge if v is None else self._value(v)
-                for v in (part["interval"][0], part["median"], part["interval"][1])
-            )
-            said.append(f"{name.capitalize()} the last record flutter begins at {middle} (95 %: {low} to {high}).")
+        flutters = found["flutters_now"]
+        if flutters > RARE:
+            said.append(f"It flutters at the last record with a probability of {100 * flutters:.0f} %.")
+        for verb, parts, share in (("begins", found, 1 - flutters), ("ends", found["ends"], flutters)):
+            said += [self._side_said(name, verb, parts[name]) for name in ("above", "below") if share > RARE]
         return said
+
+    def _side_said(self, name: str, verb: str, part: dict[str, Any]) -> str:
+        """Sentence on where flutter begins or ends on one side of the last record."""
+        end = self._value(self.places.values[-1 if name == "above" else 0])
+        if part["probability"] < RARE:
+            return f"Flutter {verb} nowhere {name} {self._value(self.places.now)} up to {end}."
+        low, middle, high = (
+            f"beyond {end}" if v is None else self._value(v)
+            for v in (part["interval"][0], part["median"], part["interval"][1])
+        )
+        return f"{name.capitalize()} the last record flutter {verb} at {middle} (95 %: {low} to {high})."
 
     def _missed(self, lost: int) -> str:
         return f"{lost} places have no steady state"
+
+
+def _interval(at: np.ndarray, among: np.ndarray, beyond: float) -> dict[str, Any]:
+    """Median and interval of values (n,) of some of the samples, NaN being `beyond` the range, and the share of all
+    samples that are some of these and have one.
+    """
+    whole = np.where(np.isfinite(at), at, beyond)[among]
+    found = np.quantile(whole, INTERVAL, method="nearest") if whole.size else np.full(3, beyond)
+    low, middle, high = (float(value) if np.isfinite(value) else None for value in found)
+    return {"median": middle, "interval": [low, high], "probability": float((np.isfinite(at) & among).mean())}
 
 
 def _oscillation(match: dict[str, Any]) -> str:
@@ -496,10 +510,12 @@ def onset(result: StudyResult) -> Figure:
     axes.fill_between(x, low, high, color=COMPUTED, alpha=0.25, lw=0, label="95 %")
     axes.plot(x, middle, "o-", color=COMPUTED, label="median")
     axes.axhline(0.0, color="black", lw=0.8)
-    for side in ("below", "above"):
-        ends = [value for value in result.onset[side]["interval"] if value is not None]
+    for words, side in product(("onset", "end"), ("below", "above")):
+        part = result.onset[side] if words == "onset" else result.onset["ends"][side]
+        ends = [value for value in part["interval"] if value is not None]
         if len(ends) == 2:  # found by itself: between the values of the range damping is not straight
-            axes.axvspan(*(np.array(ends) / PARAMETERS[name].scale), color=REST, alpha=0.5, label=f"onset {side}, 95 %")
+            span = np.array(ends) / PARAMETERS[name].scale
+            axes.axvspan(*span, color=REST, alpha=0.5, label=f"{words} {side}, 95 %")
     for number, match in enumerate(result.matches):
         value = result.places.value_at(match["record"]) / PARAMETERS[name].scale
         if match["damping_ratio"] is not None:

@@ -59,6 +59,7 @@ class Hidden:
         return band[np.argmin(np.abs(band.real / band.imag))]
 
     def onset(self):
+        """Pressure above 3 kPa at which flutter begins; ends, of a valve that flutters there."""
         pressures = np.geomspace(2e3, 9e3, 24)
         damping = [least_damping(self.modes(p)[None])[0] for p in pressures]
         return float(onsets(pressures, np.array([damping]), 3e3)[1][0])
@@ -224,7 +225,8 @@ def found_of(valve, seed, folder):
         {"file": second, "at": "pressure=3 kPa"},
     ]
     result = valve.identify(records)
-    onset, (low, high) = hidden.onset(), result.onset["above"]["interval"]
+    onset, stands = hidden.onset(), result.onset if stable else result.onset["ends"]
+    low, high = stands["above"]["interval"]
     begins = (low or np.inf) <= (onset if np.isfinite(onset) else np.inf) <= (high or np.inf)
     return [holds(row, value) for row, value in zip(result.inputs, hidden.values)], begins
 

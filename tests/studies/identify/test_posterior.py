@@ -1,5 +1,7 @@
 """Samples of a posterior, emulators, what is confounded and what a further measurement leaves, against closed forms."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from scipy.stats import norm
@@ -7,7 +9,7 @@ from scipy.stats import norm
 from dbvfiv.case.distribution import Distribution
 from dbvfiv.case.quantity import Quantity
 from dbvfiv.studies.identify.learning import Emulator, Learned, expected_variance, sample_posterior
-from dbvfiv.studies.identify.study import distribution_text
+from dbvfiv.studies.identify.study import IdentifyResult, distribution_text
 from dbvfiv.studies.identify.valves import follow, least_damping, onsets
 
 SLOPES = np.array([[1.0, 0.8, 0.0, 0.0], [0.0, 0.3, 1.0, 0.0]])
@@ -83,6 +85,25 @@ def test_onsets_next_to_the_present_value():
     assert np.isnan([below[1], above[1]]).all()
     assert 1.0 < below[2] < 2.0 and 8.0 < above[2] < 16.0 and present[2] < 0
     assert np.isnan(onsets(values, damping, 16.0)[1]).all()
+
+
+@pytest.mark.parametrize("ends", [[4.0], [4.0, 4.0, 4.0, np.nan]])
+def test_flutter_at_the_last_record_ends_and_does_not_begin(ends):
+    """Samples that flutter at 2 kPa, up to 4 kPa, and one that flutters beyond 4 kPa."""
+    damping = np.array([[-1.0, -1.0, 1e-12, 1.0] if end == 4.0 else [1.0, 1.0, 1.0, -1.0] for end in ends])
+    values = np.geomspace(1e3, 8e3, 4)
+    found = object.__new__(IdentifyResult)
+    places = SimpleNamespace(parameter="pressure", now=2e3, values=values, head=lambda *_: "")
+    vars(found).update(_onsets=onsets(values, damping, 2e3), places=places)
+    now, begins, over = found.onset["flutters_now"], found.onset["above"], found.onset["ends"]["above"]
+    assert now == over["probability"] == np.mean(np.array(ends) == 4.0) and begins["probability"] == 1 - now
+    assert over["interval"] == pytest.approx([4e3, 4e3], rel=1e-2) and found.onset["ends"]["below"]["median"] is None
+    said = found._onset_said()
+    assert said[0] == f"It flutters at the last record with a probability of {100 * now:.0f} %."
+    assert any(line.startswith("Above the last record flutter ends at 4") for line in said)
+    assert "Flutter ends nowhere below 2 kPa up to 1 kPa." in said
+    assert any("Above the last record flutter begins" in line for line in said) == (now < 1.0)
+    assert now == 1.0 or 4e3 < begins["median"] < 8e3
 
 
 def test_modes_are_followed_by_their_shapes():
