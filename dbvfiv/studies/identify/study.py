@@ -95,6 +95,12 @@ def run(
     case, plan, places = session.case, Plan(session.case), Places(session.case)
     asked = case.identify
     plan.scores_of(np.zeros((1, len(plan.inputs))))  # correlations are checked before anything is solved
+    if places.now is None:
+        raise CaseError(
+            f"identify.over moves {places.parameter}, of which the valve of the records has no one value; give a range "
+            "of another parameter.",
+            key="identify.over",
+        )
     lines, said = records_said(case)
     if not record.notes(_MEASURED):
         record.note(_MEASURED, lines=[asdict(line) for line in lines], records=said)

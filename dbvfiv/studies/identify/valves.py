@@ -20,6 +20,7 @@ from ...errors import CaseError, SolveError
 from ...verdict.reading import Reading, judge_file
 from ..case import Case
 from ..inputs import Plan
+from ..stability.place import design_value
 from ..stability.walk import StabilityWalk
 
 #: Leading modes taken of a valve at a place.
@@ -103,13 +104,14 @@ class Places:
         return self.case.identify.parameter
 
     @cached_property
-    def now(self) -> float:
+    def now(self) -> float | None:
         """Value of that parameter at the last record."""
         return self.value_at(-1)
 
-    def value_at(self, record: int) -> float:
-        """Value of that parameter at a record."""
-        return self._point(self.of_records[record])[self.parameter]
+    def value_at(self, record: int) -> float | None:
+        """Value of that parameter at a record; None of one of the design that has no one value in the case."""
+        name, point = self.parameter, self._point(self.of_records[record])
+        return point[name] if name in point else design_value(self.case, name)
 
     @cached_property
     def values(self) -> tuple[float, ...]:

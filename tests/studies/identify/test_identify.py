@@ -8,7 +8,7 @@ import pytest
 
 import dbvfiv
 from dbvfiv.errors import CaseError
-from dbvfiv.studies.identify.valves import least_damping, onsets
+from dbvfiv.studies.identify.valves import Places, least_damping, onsets
 from dbvfiv.studies.inputs import Plan
 from dbvfiv.studies.response.study import Transfer
 from dbvfiv.studies.stability.walk import StabilityWalk
@@ -265,6 +265,19 @@ def test_intervals_hold_hidden_inputs_and_onsets(valves, least, most, tmp_path):
 def test_records_that_cannot_be_used_are_answered_by_a_sentence(records, words, one_sentence):
     with pytest.raises(CaseError, match=words) as caught:
         load().identify(records)
+    assert one_sentence(str(caught.value))
+
+
+@pytest.mark.parametrize(("over", "own"), [("thickness=0.8,1.2", 1.0), ("angle=30,60", 54.0), ("beta=1e-4,1e-3", 5e-4)])
+def test_the_range_stands_about_the_value_at_the_last_record(over, own):
+    changes = {"identify.over": over, "identify.records": [{"frequency": 20.0, "frequency_interval": 0.1}]}
+    assert Places(load(**changes).case).now == pytest.approx(own)
+
+
+def test_a_range_over_what_has_no_one_value_is_refused(one_sentence):
+    valve = load(**{"identify.over": "angle=30,60", "layers.2.angle": 30.0})
+    with pytest.raises(CaseError, match="identify.over moves angle, of which .* no one value") as caught:
+        valve.identify([{"frequency": 20.0, "frequency_interval": 0.1}])
     assert one_sentence(str(caught.value))
 
 
