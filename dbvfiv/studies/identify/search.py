@@ -49,7 +49,7 @@ TABLES = (
     TableSpec(POSTERIOR, _POSTERIOR, chunk=512),
 )
 _LOST = "lost valve"
-#: Samples of the posterior, and valves that a worker takes at a time.
+#: Samples of the posterior at least, and valves that a worker takes at a time.
 SAMPLES, OWN = 1000, 4
 
 
@@ -134,8 +134,9 @@ class Search:
         return z
 
     def _sampled(self, learning: Learning, number: int) -> tuple[np.ndarray, float]:
-        seed = self.plan.case.identify.seed + number
-        return sample_posterior(learning.log_likelihood, learning.dimension, SAMPLES, seed)
+        asked = self.plan.case.identify
+        count = max(SAMPLES, asked.round)  # no valve of a round is drawn twice
+        return sample_posterior(learning.log_likelihood, learning.dimension, count, asked.seed + number)
 
     def _ask(self, scores: np.ndarray, number: int, places: Sequence[int]) -> None:
         first = len(self.scores)

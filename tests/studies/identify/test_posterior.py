@@ -9,6 +9,7 @@ from scipy.stats import norm
 from dbvfiv.case.distribution import Distribution
 from dbvfiv.case.quantity import Quantity
 from dbvfiv.studies.identify.learning import Emulator, Learned, expected_variance, sample_posterior
+from dbvfiv.studies.identify.search import Search, _some
 from dbvfiv.studies.identify.study import IdentifyResult, distribution_text
 from dbvfiv.studies.identify.valves import follow, least_damping, onsets
 
@@ -33,6 +34,14 @@ def test_posterior_and_evidence_of_a_linear_model(error):
     own = SLOPES @ SLOPES.T + np.diag(error**2)
     expected = -0.5 * DATA @ np.linalg.solve(own, DATA) - 0.5 * np.linalg.slogdet(2 * np.pi * own)[1]
     assert evidence == pytest.approx(expected, abs=0.25)
+
+
+def test_valves_of_a_long_round_are_all_different():
+    """A valve that stands twice is predicted by itself, without an error."""
+    search = object.__new__(Search)
+    search.plan = SimpleNamespace(case=SimpleNamespace(identify=SimpleNamespace(seed=1, round=1500)))
+    z, _ = search._sampled(SimpleNamespace(log_likelihood=lambda z: -0.5 * z[:, 0] ** 2, dimension=2), 0)
+    assert len(np.unique(_some(z, 1500), axis=0)) == 1500
 
 
 def test_both_regions_of_a_posterior_have_their_weights():
