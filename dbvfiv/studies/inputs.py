@@ -341,13 +341,25 @@ def _shipped(case: Case) -> Iterator[tuple[str, str, str]]:
     tolerance = next((t for upto, t in CLOSURE if wall <= upto), CLOSURE_BEYOND * wall)
     spread = tolerance / wall / 1.96
     source = f"ISO 3302-1, class M3: +-{tolerance:.2g} mm across the closure of the mould on {wall:.3g} mm"
-    yield "thickness", f"normal(1, {spread:.3g})", source
-    if (angle := design_value(case, "angle")) is not None:
-        yield "angle", f"normal({angle:g}, 2)", "an estimate: plies laid by hand"
+    yield "thickness", _normal("thickness", 1.0, spread, f"lognormal({1 + spread:.3g})"), source
+    angle, most = design_value(case, "angle"), PARAMETERS["angle"].high
+    if angle is not None and angle <= most:
+        ends = max(angle - 3.46, 0.0), min(angle + 3.46, most)  # of the same standard deviation before they are cut
+        yield (
+            "angle",
+            _normal("angle", angle, 2.0, "uniform({:g}, {:g})".format(*ends)),
+            "an estimate: plies laid by hand",
+        )
     if case.has_line and not case.upstream.pieces and case.upstream.length:
         yield "pipe_length", "normal(2 %)", "an estimate: drawings against the pipe as laid"
     if case.has_waves and not case.upstream.pieces:
         yield "wave_speed", "lognormal(1.1)", "an estimate: air in the water and stiffness of the pipe"
+
+
+def _normal(name: str, mean: float, spread: float, other: str) -> str:
+    """Text of a normal distribution of a parameter, or another one where too much of it lies where that cannot be."""
+    row, text = PARAMETERS[name], f"normal({mean:g}, {spread:.3g})"
+    return other if Distribution.parse(text, row.quantity).share_outside(row.low, row.high) > ALLOWED else text
 
 
 def _losses(case: Case, used: Sequence[str]) -> Iterator[tuple[str, str, str]]:

@@ -222,6 +222,31 @@ def test_shipped_inputs_name_their_sources():
     assert all(one.source for one in inputs.values())
 
 
+def plies(angle):
+    return {"layers.2.angle": angle, "layers.3.angle": -angle}
+
+
+@pytest.mark.parametrize(
+    ("keys", "name", "form", "numbers"),
+    [
+        ({}, "angle", "normal", (54.0, 2.0)),
+        (plies(90.0), "angle", "uniform", (86.54, 90.0)),
+        (plies(1.0), "angle", "uniform", (0.0, 4.46)),
+        (plies(120.0), "angle", None, None),
+        ({"valve.scale": 1 / 12}, "thickness", "lognormal", (1.0, 1.2)),
+        ({"valve.scale": 1 / 2}, "thickness", "normal", (1.0, 0.0)),
+    ],
+)
+def test_shipped_inputs_lie_where_their_numbers_can_be(keys, name, form, numbers):
+    """Plies near the ends of their range, and a wall of a one-inch valve, whose tolerance is a fifth of it."""
+    case = dbvfiv.load(None, SMALL | keys).case
+    inputs = {one.name: one.distribution for one in inputs_of(case)}
+    if form is None:
+        assert name not in inputs
+    else:
+        assert inputs[name].form == form and inputs[name].numbers == pytest.approx(numbers, abs=0.06)
+
+
 def test_a_sealing_pressure_may_be_uncertain():
     keys = {**SMALL, "uncertainty.inputs": {"sealing": "normal(5 %)"}}
     case = dbvfiv.load("cases/dbv12-moulded.toml", keys).case
