@@ -44,6 +44,8 @@ PERFORMANCE = {
 }
 #: Keys of the shape that every valve can be changed by.
 SHAPE = ("valve.duckbill_length", "valve.saddle_length", "valve.lip_half_width")
+#: Names of the inlet pressure, which a model takes beside its case.
+_PRESSURE = "pressure", PARAMETERS["pressure"].key
 
 
 @dataclass(frozen=True)
@@ -342,7 +344,7 @@ def _layer(name: str) -> tuple[int, str]:
 
 
 def _value(model, pressure, mu, name) -> float:
-    if name == "pressure":
+    if name in _PRESSURE:
         return pressure
     if name in SURROUNDINGS:
         return getattr(Mu.of(model.case).at(**mu), name)  # of a pipe without length 0
@@ -364,7 +366,7 @@ def changed(model: ValveModel, pressure: float, mu: Mu, name: str, value: float)
         For a value that the case does not allow.
     """
     case = model.case
-    if name == "pressure":
+    if name in _PRESSURE:
         return model, value, mu
     if name in SURROUNDINGS:
         mu = mu.at(**{name: value})

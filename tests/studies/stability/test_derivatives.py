@@ -127,6 +127,12 @@ def test_sizes_before_the_scale_are_differentiated_by(valve):
     assert mass[1] == pytest.approx(mass[0] / 8, rel=1e-6)
 
 
+def test_the_pressure_has_the_derivatives_of_its_key(valve):
+    key, own = valve.slope("drive.pressure"), valve.slope("pressure")
+    assert own.derivative != 0 and own.performance["flow"] > 0
+    assert (key.value, key.eigenvalues, key.performance) == (own.value, own.eigenvalues, own.performance)
+
+
 def test_only_what_a_valve_has_is_a_parameter(valve):
     assert {"angle", "strain", "storage", "layer 3 angle", "valve.saddle_length"} <= set(parameters_of(valve.model))
     own = {"kind": "neo-hookean", "shear_modulus": "1 MPa", "density": 1200}
