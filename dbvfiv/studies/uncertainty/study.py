@@ -443,13 +443,14 @@ class UncertaintyResult(StudyResult):
 
     def measured(self, value: float, name: str, accuracy: float) -> tuple[Any, Any] | None:
         """Percentiles of the least damping ratio at a value now, and if an input were known to an accuracy (0.1 for
-        10 % at 95 %) and had its median; None where too few samples lie there.
+        10 % at 95 %) and had its median; None where too few samples lie there, as about a median of 0.
         """
         found, number = self.at(value), [one.name for one in self.plan.inputs].index(name)
         plain = (found["stage"] == 0) & np.isfinite(found["damping_ratio"])
-        median = self.plan.inputs[number].distribution.median
-        apart = (found["inputs"][plain, number] - median) / (accuracy * abs(median) / 1.96)
         own = self.plan.inputs[number].distribution
+        if not own.median:
+            return None
+        apart = (found["inputs"][plain, number] - own.median) / (accuracy * abs(own.median) / 1.96)
         # weights that turn the distribution of the input into a narrower normal one
         scores = own.score(found["inputs"][plain, number])
         log = -0.5 * apart**2 + 0.5 * scores**2 + np.log(_stretch(own, found["inputs"][plain, number]))

@@ -4,21 +4,24 @@ run is interrupted; what cannot be used is answered by a sentence.
 
 import json
 import re
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 import dbvfiv
+from dbvfiv.case.distribution import Distribution
 from dbvfiv.errors import CaseError
 from dbvfiv.observer import Observer
 from dbvfiv.record.record import GrowingRecord
 from dbvfiv.report.gather import Gathered
 from dbvfiv.report.parts import chance_part
 from dbvfiv.studies import workers
-from dbvfiv.studies.inputs import inputs_of
+from dbvfiv.studies.inputs import inputs_of, quasi_random
 from dbvfiv.studies.session import load_result
 from dbvfiv.studies.stability.verdict import OUTCOMES
 from dbvfiv.studies.uncertainty.figures import tornado
+from dbvfiv.studies.uncertainty.study import UncertaintyResult
 from tests.observers import Stop
 from tests.small_valves import SMALL, load_small
 
@@ -88,6 +91,21 @@ def test_samples_that_are_all_not_valid_are_decided(refused):
 
 def test_figures_of_samples_without_a_damping_ratio_are_drawn(refused):
     assert set(refused.figures()) == {"margin"}
+
+
+@pytest.mark.parametrize("mean", [0.0, 40.0])
+def test_a_measurement_of_an_input_narrows_the_margin_by_a_share_of_its_median(mean):
+    """A ratio that is a twentieth of the input in per cent: 10 % of 40 are 4; of 0 there is no share."""
+    own, result = Distribution("normal", (mean, 8.0)), object.__new__(UncertaintyResult)
+    inputs = own.at(quasi_random(4096, 1, 1))
+    rows = {"damping_ratio": inputs[:, 0] / 2000, "inputs": inputs, "stage": np.zeros(4096, int)}
+    vars(result).update(plan=SimpleNamespace(inputs=[SimpleNamespace(name="x", distribution=own)]), at=lambda _: rows)
+    known = result.measured(0.0, "x", 0.1)
+    if mean == 0.0:
+        assert known is None
+    else:
+        now, then = (np.ptp(row) for row in known)
+        assert then == pytest.approx(2 * 4.0 / 2000, rel=0.05) and now == pytest.approx(2 * 1.96 * 8.0 / 2000, rel=0.05)
 
 
 def test_the_document_has_probability_interval_and_what_decides(found):
