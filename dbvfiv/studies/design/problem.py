@@ -93,6 +93,12 @@ def variables_of(case: Case) -> tuple[Variable, ...]:
             low, high = parse_span(text, quantity)
         except ValueError as error:
             raise CaseError(f"{key} is given as {text!r}, {error}; it must be LOW:HIGH.", key=key) from None
+        if name == "angle" and low <= 0:
+            raise CaseError(
+                f"{key} is given as {text!r}, and plies at 0 degrees have no angle to go on from; give a lower bound "
+                "above 0, such as 1 deg.",
+                key=key,
+            )
         if not low <= own <= high:
             raise CaseError(
                 f"{key} is given as {text!r}, and the case has {own:g} {quantity.si}".rstrip()

@@ -216,6 +216,7 @@ def test_several_heads_of_an_aim_count_together(valve):
         ({"design.variables": {"thicknes": "0.7:1.4"}}, "neither a parameter"),
         ({"design.variables": {"thickness": "1.1:1.4"}}, "not between them"),
         ({"design.variables": {"thickness": "thin:thick"}}, "must be LOW:HIGH"),
+        ({"design.variables": {"angle": "0 deg:70 deg"}}, "lower bound above 0, such as 1 deg"),
         ({"design.variables": {"pressure": "1 kPa:2 kPa"}}, "no number that a designer chooses"),
         ({"design.aim": "mass down", "design.constraints": ["mass at most 3 kg"]}, "name no head"),
         ({"design.aim": "drag at 2 m down"}, "cannot be read"),
