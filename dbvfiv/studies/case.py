@@ -234,7 +234,7 @@ def _nothing_flows(case: Case, kind: str | None) -> Iterator[str]:
 def _varies_pressure(case: Case, kind: str) -> bool:
     if kind == "map":
         return "pressure" in (axis.parameter for axis in case.map.axes)
-    return kind in ("sweep", "onset") and getattr(case, kind).axis.parameter == "pressure"
+    return kind in ("sweep", "onset", "cycle") and getattr(case, kind).axis.parameter == "pressure"
 
 
 def _slivers(case: Case) -> Iterator[str]:

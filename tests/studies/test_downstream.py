@@ -10,7 +10,7 @@ from dbvfiv.case.quantity import GRAVITY
 from dbvfiv.errors import CaseError, SolveError
 from dbvfiv.model import ValveModel, linearise, select_search
 from dbvfiv.model.equilibria import LoadPath
-from dbvfiv.studies.case import thesis_case
+from dbvfiv.studies.case import require_consistent, thesis_case
 from dbvfiv.studies.stability.walk import StabilityWalk
 from eigen import SearchOptions, TransferBasis, certified_spectrum
 from tests.small_valves import FORMER, load_small
@@ -61,6 +61,14 @@ def test_a_drive_that_does_not_overcome_it_is_refused():
             held.steady(pressure=pressure)
     with pytest.raises(CaseError, match="nothing flows"):
         held.modes(pressure="5 kPa")
+
+
+@pytest.mark.parametrize("kind", ["sweep", "onset", "cycle"])
+def test_a_range_of_pressures_above_it_needs_no_drive(kind):
+    held = load_small({"downstream.pressure": "20 kPa", "drive.pressure": "18 kPa"})
+    require_consistent(held.replace({f"{kind}.over": "pressure=25 kPa:40 kPa:5"}).case, kind)
+    with pytest.raises(CaseError, match="nothing flows"):
+        require_consistent(held.case, kind)
 
 
 def test_a_valve_at_rest_against_it():
