@@ -122,7 +122,7 @@ class Explorer:
         self._heads = self._spread()
 
     def _offered(self) -> Iterator[tuple[str, tuple[float, float]]]:
-        damped = [name for name in ("loss_factor", "beta", "alpha") if not self.case.damping.lacks(name)]
+        damped = [name for name in ("loss_factor", "beta", "alpha") if self.base.get(name, 0.0) > 0]
         for name in ("pressure", "density", *damped[:1], "pipe_length"):
             own, (low, high) = self.base.get(name, 0.0), OFFERED.get(name, DAMPED)
             if own > 0 and not (name == "pipe_length" and self.case.upstream.pieces):

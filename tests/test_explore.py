@@ -43,6 +43,13 @@ def test_bounds_hold_where_corrections_do_not_converge(keys):
     assert predicted.verdict.outcome == exact.verdict.outcome == "stable"
 
 
+@pytest.mark.parametrize(("alpha", "beta", "name"), [(2.0, 0.0, "alpha"), (2.0, 0.003, "beta")])
+def test_the_damping_that_a_wall_has_is_offered(alpha, beta, name):
+    damping = {"damping.model": "rayleigh", "damping.alpha": alpha, "damping.beta": beta}
+    ranges = dbvfiv.load(None, COARSE | damping).explore().ranges
+    assert {"alpha", "beta", "loss_factor"} & set(ranges) == {name}
+
+
 def test_heads_begin_at_none_where_weight_opens_the_valve():
     explorer = dbvfiv.load(None, COARSE | {"gravity.direction": "-z", "materials.strain_level": 0.1}).explore()
     assert explorer.model.flow.back < 0.0 < explorer.ranges["pressure"][0]
