@@ -117,15 +117,21 @@ def _start(case: dict) -> Chances:
 
 def find_chances(case: Case, record: GrowingRecord, workers: int | str) -> None:
     """Keep the columns of a map of probability that an earlier run has not kept."""
-    known = {note["value"] for note in record.notes(_CHANCE)}
+    known = {note["value"]: note for note in record.notes(_CHANCE)}
     chances, wanted = Chances(case), [v for v in MapPlan(case).across.values if v not in known]
     row = PARAMETERS[chances.plan.across.parameter]
+
+    def say(value: float, found: dict[str, Any]) -> None:
+        if "failure" in found:
+            record.warn(f"No probability at {row.amount(value, 4)}: {found['failure']}")
 
     def keep(value: float, found: dict[str, Any]) -> None:
         record.note(_CHANCE, value=value, **found)
         record.progress(f"probability at {row.amount(value, 4)}")
-        if "failure" in found:
-            record.warn(f"No probability at {row.amount(value, 4)}: {found['failure']}")
+        say(value, found)
+
+    for value, note in known.items():
+        say(value, note)
 
     with Workers(workers, _start, (case.to_dict(),), record.warn, chances) as team:
         for value, found in team.share(wanted, lambda value: Work(_column, (value,))):

@@ -1,9 +1,12 @@
 """Bands of probability on maps: cells are those of samples found one by one with their full matrices."""
 
+from types import SimpleNamespace
+
 import pytest
 
 import dbvfiv
 from dbvfiv.errors import CaseError
+from dbvfiv.studies.map.chances import find_chances
 from dbvfiv.studies.map.figures import stability_map
 from tests.observers import Stop
 from tests.small_valves import load_small
@@ -29,6 +32,13 @@ def test_cells_have_the_probability_of_samples_found_one_by_one(tmp_path):
     assert found.summary()["probability"]["value"] == value.tolist()
     assert any("Probability of flutter from 24 samples" in line for line in found.lines())
     assert stability_map(found).axes[0].collections
+
+
+def test_a_column_without_a_probability_is_told_again_by_a_run_that_goes_on():
+    said, kept = [], [{"value": 3e3, "failure": "No state."}, {"value": 5e3, "flutters": [], "undecided": []}]
+    record = SimpleNamespace(notes=lambda _: kept, warn=said.append)
+    find_chances(load_small(KEYS, AXES, {"map.samples": 24}).case, record, 1)
+    assert said == ["No probability at 3 kPa: No state."]
 
 
 @pytest.mark.parametrize(
