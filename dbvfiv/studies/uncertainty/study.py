@@ -491,9 +491,12 @@ class UncertaintyResult(StudyResult):
     def comparison(self) -> str:
         """Sentence on how many of the same samples have the same outcome under both flow models."""
         law, other = self.other_law
-        pairs = [(self.at(value)["outcome"], other.at(value)["outcome"]) for value in self.plan.values]
-        same = sum(int((a[: len(b)] == b[: len(a)]).sum()) for a, b in pairs)
-        count = sum(min(len(a), len(b)) for a, b in pairs)
+        same = count = 0
+        for value in self.plan.values:
+            one, two = self.at(value), other.at(value)
+            both, first, second = np.intersect1d(one["sample"], two["sample"], return_indices=True)
+            same += int((one["outcome"][first] == two["outcome"][second]).sum())
+            count += len(both)
         return f"Under {law} {same} of {count} samples have the outcome of {self.case.fluid.continuity}."
 
     def lines(self) -> list[str]:

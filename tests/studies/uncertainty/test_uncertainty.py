@@ -108,6 +108,17 @@ def test_a_measurement_of_an_input_narrows_the_margin_by_a_share_of_its_median(m
         assert then == pytest.approx(2 * 4.0 / 2000, rel=0.05) and now == pytest.approx(2 * 1.96 * 8.0 / 2000, rel=0.05)
 
 
+def test_flow_models_are_compared_by_the_same_samples():
+    """Blocks that workers kept in any order before a run was interrupted."""
+    one, two = object.__new__(UncertaintyResult), object.__new__(UncertaintyResult)
+    plan, case = SimpleNamespace(values=(1.0,)), SimpleNamespace(fluid=SimpleNamespace(continuity="storage"))
+    for result, samples in ((one, [0, 1, 4, 5]), (two, [2, 3, 4, 5])):
+        rows = {"sample": np.array(samples), "outcome": np.array(samples) % 4}
+        vars(result).update(plan=plan, case=case, at=lambda _, rows=rows: rows)
+    vars(one).update(other_law=("quasi-steady", two))
+    assert one.comparison == "Under quasi-steady 2 of 2 samples have the outcome of storage."
+
+
 def test_the_document_has_probability_interval_and_what_decides(found):
     document = json.loads(json.dumps(found.summary()))
     (point,) = document["points"]
