@@ -49,7 +49,12 @@ class Keys(Section):
         (), "What must hold; one may have bounds FIRST:LAST:COUNT, for a front of designs."
     )
     starts: StrictInt = key(1, "Designs to start from: the case itself, then others between the bounds.", ge=1, le=100)
-    evaluations: StrictInt = key(40, "Valves that a start may try.", ge=2, le=10_000)
+    evaluations: StrictInt = key(
+        40,
+        "Valves that a start may try, and as many again, three times at most, as heads or reserves are added.",
+        ge=2,
+        le=10_000,
+    )
     finer: Number = key(1.5, "Elements each way, over those of the case, on which a design is verified.", ge=1, le=4)
 
     @field_validator("constraints")

@@ -92,7 +92,9 @@ class Search:
         self._latest: tuple | None = None  # valve of the last step that was one
 
     def from_start(self, share: np.ndarray, evaluations: int) -> Design | None:
-        """Best design found from a start, given by shares (n,); None where no valve could be computed."""
+        """Best design found from a start, given by shares (n,); None where no valve could be computed. Each round may
+        try so many valves.
+        """
         best, tried = None, [share]
         self.reserves.clear()
         for _ in range(ROUNDS):
