@@ -127,7 +127,10 @@ class Explorer:
             own, (low, high) = self.base.get(name, 0.0), OFFERED.get(name, DAMPED)
             if own > 0 and not (name == "pipe_length" and self.case.upstream.pieces):
                 above = max(self.model.flow.back, 0.0) if name == "pressure" else 0.0
-                yield name, (above + low * (own - above), min(above + high * (own - above), PARAMETERS[name].high))
+                highest = min(above + high * (own - above), PARAMETERS[name].high)
+                if name == "loss_factor":
+                    highest = self.model.relaxation.highest(own, highest)
+                yield name, (above + low * (own - above), highest)
 
     def moves(self, name: str) -> bool:
         """True where a parameter changes the steady state."""

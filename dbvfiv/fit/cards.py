@@ -5,7 +5,7 @@ Rayleigh's C = alpha M + beta K as the ratio xi = alpha / (2 omega) + beta omega
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache, partial
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
@@ -26,7 +26,7 @@ from dbvfiv.materials.laws import (
     fibre_ply,
     ply_from_constituents,
 )
-from dbvfiv.materials.prony import Prony, PronyFit, fit_constant
+from dbvfiv.materials.prony import WORST, Prony, PronyFit, fit_constant
 from dbvfiv.materials.shipped import published_rubber, rubber, shipped_loss, shipped_loss_names
 from dbvfiv.texts import listed, shortly
 
@@ -35,8 +35,8 @@ if TYPE_CHECKING:
     from dbvfiv.case.damping import Relaxing
 
 
-#: Errors of a fit, rms, beyond which it says nothing of the material, and largest one that passes without a note.
-_WORST, _FAIR = 0.5, 0.1
+#: Largest error of a fit that passes without a note.
+_FAIR = 0.1
 _CONSTITUENTS = ("fibre_fraction", "fibre_modulus", "matrix_modulus", "fibre_poisson", "matrix_poisson", "xi")
 
 
@@ -122,6 +122,9 @@ class MaterialDamping:
         Error of the series against the given data; None for a series that was given outright.
     data : tuple of arrays, or None
         Frequencies, Hz, and tan delta that were given or measured; None for a relaxation modulus or a series.
+    missed : float
+        Largest relative error over the band of the series with the factor, against the factor times tan delta of
+        `prony`.
     """
 
     name: str
@@ -129,12 +132,18 @@ class MaterialDamping:
     prony: Prony
     fit: PronyFit | None = None
     data: tuple[np.ndarray, np.ndarray] | None = None
+    missed: float = 0.0
 
     @property
     def note(self) -> str | None:
-        """A sentence where the fit is poor."""
+        """A sentence where the fit is poor, or the factor is not met."""
         if self.fit is None or self.fit.largest_error <= _FAIR:
-            return None
+            if self.missed <= _FAIR:
+                return None
+            return (
+                f"{self.name}: with damping.loss_factor the series misses tan delta by up to {self.missed:.0%} of it; "
+                "more damping.branches or a lower factor help."
+            )
         return (
             f"{self.name}: the series misses the {self.fit.quantity} by up to {self.fit.largest_error:.0%}; more "
             "damping.branches or a narrower damping.band help unless the data scatter."
@@ -170,15 +179,26 @@ def damping_of(case: Case, name: str) -> MaterialDamping:
     way, branches = card.ways[0], case.damping.branches
     try:
         found = _READERS[way](name, card, case.damping.band, branches)
-        if found.fit and found.fit.rms_error > _WORST:
+        if found.fit and found.fit.rms_error > WORST:
             raise MaterialError(
                 f"a series of {branches} branches misses it by {found.fit.rms_error:.0%} rms; more "
                 "damping.branches or a narrower damping.band are needed."
             )
-        return found
     except MaterialError as error:
         key = f"materials.{name}.{way}"
         raise CaseError(f"{key} cannot be used: {error}", key=key) from None
+    return replace(found, missed=_missed(case, found)) if case.damping.relaxes else found
+
+
+def _missed(case: Case, found: MaterialDamping) -> float:
+    """Error that `MaterialDamping.missed` holds."""
+    factor, at = case.damping.loss_factor, np.geomspace(*case.damping.band, 100)
+    try:
+        series = found.prony.scaled(factor)
+    except MaterialError as error:
+        raise CaseError(f"materials.{found.name} cannot be used: {error}", key="damping.loss_factor") from None
+    wanted = factor * found.prony.loss_factor(at)
+    return float(np.abs(series.loss_factor(at) / wanted - 1.0).max()) if np.all(wanted > 0.0) else 0.0
 
 
 def _of_constant(name: str, card: Relaxing, band, branches: int) -> MaterialDamping:

@@ -22,6 +22,8 @@ from dbvfiv.case.damping import LARGEST_LOSS
 from dbvfiv.materials.laws import MaterialError
 from dbvfiv.texts import shortly
 
+#: Error of a fit, rms, beyond which it says nothing of the material.
+WORST = 0.5
 #: How far beyond its branches a series keeps its loss factor when it is scaled, in decades.
 _MARGIN = 0.1
 _ROUNDS = 40
@@ -152,7 +154,7 @@ class Prony:
         Raises
         ------
         MaterialError
-            If the factor is negative or not finite.
+            If the factor is negative or not finite, or no series with these times comes near such a loss factor.
         """
         if not (np.isfinite(factor) and factor >= 0):
             raise MaterialError(f"A loss factor was to be multiplied by {factor:g}; the factor must not be negative.")
@@ -170,7 +172,15 @@ def _scaled(prony: Prony, factor: float) -> Prony:
     low, high = np.log10(1.0 / times.max()) - _MARGIN, np.log10(1.0 / times.min()) + _MARGIN
     frequency = np.logspace(low, high, max(int(20 * (high - low)), 4 * times.size) + 1) / (2 * np.pi)
     target = factor * prony.loss_factor(frequency)
-    return Prony(tuple(fit_loss(frequency, target, times, target)), prony.times)
+    found = Prony(tuple(fit_loss(frequency, target, times, target)), prony.times)
+    missed = float(np.linalg.norm(found.loss_factor(frequency) - target) / np.linalg.norm(target))
+    if missed > WORST:
+        raise MaterialError(
+            f"The loss factor of a material is to be {factor:.4g} times its own, up to {target.max():.3g}, which a "
+            f"series of {times.size} {'branch' if times.size == 1 else 'branches'} misses by {missed:.0%} rms; "
+            "damping.loss_factor must be lower."
+        )
+    return found
 
 
 @shortly

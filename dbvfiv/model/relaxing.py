@@ -9,6 +9,7 @@ import numpy as np
 
 from eigen.operator import Relaxation
 
+from ..materials.laws import MaterialError
 from ..shell.section import RelaxingGroup, Section
 
 
@@ -62,7 +63,7 @@ class WallRelaxation:
         Raises
         ------
         MaterialError
-            If the factor is negative or not finite.
+            If the factor is negative or not finite, or a series does not come near it.
         """
         series = [group.series.scaled(loss_factor) for group in self.groups]
         pairs = [(i, g, t) for i, one in enumerate(series) for g, t in zip(one.strengths, one.times) if g > 0]
@@ -71,6 +72,16 @@ class WallRelaxation:
         for i, g, t in pairs:
             strengths[i, np.searchsorted(times, t)] += g
         return Branches(tuple(group.name for group in self.groups), strengths, times)
+
+    def highest(self, factor: float, wanted: float) -> float:
+        """Highest factor on the loss factors that all series meet, from one that they meet up to one that is wanted."""
+        while wanted > factor:
+            try:
+                self.branches(wanted)
+                return wanted
+            except MaterialError:
+                wanted *= 0.9
+        return factor
 
     def stiffness(self, loss_factor: float, matrices: Callable[[], Sequence]) -> Relaxation | None:
         """Viscoelastic part of a stiffness, None for an elastic wall.

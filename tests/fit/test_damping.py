@@ -17,6 +17,7 @@ from dbvfiv.fit import damping_of, relaxation_from_case
 from dbvfiv.fit.cards import describe_damping, outside_band, rayleigh_constants, rayleigh_ratio, read_frequencies
 from dbvfiv.materials import MaterialError, shipped_loss, shipped_loss_names
 from dbvfiv.model.build import build_section
+from dbvfiv.model.relaxing import WallRelaxation
 from dbvfiv.studies.case import Case, thesis_case
 
 LOSS = {"damping.model": "loss factor"}
@@ -311,6 +312,18 @@ def test_the_report_halves_the_loss_factor_and_counts_the_factor_on_all():
     match = summary["matches"][0]
     np.testing.assert_allclose(rayleigh_ratio([5.0, 40.0], match["alpha"], match["beta"]), match["ratios"], rtol=1e-12)
     assert summary["frequencies"][0] == 1.0 and summary["frequencies"][-1] == 200.0 and 20.0 in summary["frequencies"]
+
+
+def test_a_factor_that_a_material_does_not_reach_is_refused_and_a_fair_one_is_told(refused):
+    case = case_of(loss_factor=0.35).replace({"damping.loss_factor": 5.0})
+    first = describe_damping(case).materials[0]
+    assert first.missed == pytest.approx(0.34, abs=0.02) and first.fit.largest_error < 0.05
+    assert "CR: with damping.loss_factor the series misses tan delta by up to" in first.note
+    with refused(CaseError, match="materials.CR cannot be used: The loss factor .* 8 times its own, up to 2.8") as told:
+        describe_damping(case.replace({"damping.loss_factor": 8.0}))
+    assert told.value.key == "damping.loss_factor"
+    wall = WallRelaxation.of(build_section(case))
+    assert wall.highest(5.0, 10.0) == pytest.approx(5.9, abs=0.6) and wall.highest(1.0, 3.0) == 3.0
 
 
 def test_under_rayleigh_damping_a_material_may_say_nothing():

@@ -206,3 +206,12 @@ def test_scaling_is_smooth_about_one_and_ends_in_an_elastic_material():
     for bad in (-0.1, np.nan, np.inf):
         with pytest.raises(MaterialError, match="must not be negative"):
             made.scaled(bad)
+
+
+@pytest.mark.parametrize(("loss_factor", "branches", "most"), [(0.35, 4, 5.0), (0.3, 2, 3.0), (0.5, 8, 3.0)])
+def test_a_factor_that_the_branches_do_not_reach_is_refused(loss_factor, branches, most):
+    made = fit_constant(loss_factor, BAND, branches).prony
+    at = np.geomspace(*BAND, 200)
+    assert np.mean(made.scaled(most).loss_factor(at)) == pytest.approx(most * loss_factor, rel=0.35)
+    with pytest.raises(MaterialError, match=f"is to be 8 times its own.* {branches} branches misses.*must be lower"):
+        made.scaled(8.0)

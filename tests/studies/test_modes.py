@@ -21,6 +21,7 @@ from dbvfiv.studies.modes.search import ModesOptions, run_modes
 from dbvfiv.studies.stability.walk import StabilityWalk
 from eigen import SearchOptions
 from eigen.pairs import acceptable, all_eigenvalues
+from tests.small_valves import SMALL
 
 LIGHT = Mu(density=10.0, alpha=0.0, beta=0.003)
 WATER = Mu(density=1000.0, alpha=5.0, beta=0.003)
@@ -160,6 +161,20 @@ def test_an_unstable_pair_is_proof(model, state):
     """Without stiffness damping the band holds some of the unstable modes: unstable, though the counts differ."""
     found = run_modes(model, state, Mu(density=10.0, alpha=5.0, beta=0.0), ModesOptions(3))
     assert found.certificate.unstable_count > 0 and found.stable is False
+
+
+def test_the_critical_damping_is_sought_among_factors_that_the_materials_reach():
+    """Ten times the factor is beyond the branches; from both sides of the critical one it is the same."""
+    keys = {f"materials.{name}.loss_factor": 1.0 for name in ("CR", "SBR", "EPDM")}
+    keys |= {"materials.strain_level": 0.1, "fluid.density": 10.0, "fluid.continuity": "quasi-steady"}
+    critical = {}
+    for factor, outcome in ((0.244, "flutters"), (0.3, "stable")):
+        valve = dbvfiv.load(None, SMALL | keys | {"drive.pressure": 6e3, "damping.loss_factor": factor})
+        verdict = valve.modes().verdict
+        assert verdict.outcome == outcome
+        critical[outcome] = factor * verdict.critical_damping_factor
+    assert 2.0 < valve.model.relaxation.highest(0.244, 2.44) < 2.44
+    assert critical["flutters"] == pytest.approx(critical["stable"], rel=1e-3)
 
 
 def test_the_critical_damping_of_a_mode_beyond_the_list():

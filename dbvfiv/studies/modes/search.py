@@ -568,7 +568,10 @@ def critical_damping_factor(walk: StabilityWalk, place: Mu, verdict: Verdict) ->
     if own <= 0 or verdict.outcome not in (STABLE, FLUTTERS):
         return np.nan
     factors = LOWER if verdict.outcome == STABLE else HIGHER
-    factors = factors[own * factors <= PARAMETERS[name].high]
+    highest = PARAMETERS[name].high
+    if name == "loss_factor":
+        highest = walk.built(place).model.relaxation.highest(own, min(highest, own * factors.max()))
+    factors = factors[own * factors <= highest]
     line = ParameterLine(walk, place, name, own * factors)
     if not line.is_reduced:
         return np.nan
