@@ -62,8 +62,8 @@ class Distribution:
         if match is None:
             raise ValueError("which is no distribution")
         form, inside = match[1], match[2].strip()
-        if form == "samples" and "," not in inside:
-            inside = ",".join(line for _, line in numbered_lines(Path(inside)))
+        if (file := samples_file(text)) is not None:
+            inside = ",".join(line for _, line in numbered_lines(file))
         parts = [part.strip() for part in inside.split(",") if part.strip()]
         if form == "samples":
             if len(parts) < 2:
@@ -164,6 +164,12 @@ class Distribution:
             if self.form == "lognormal"
             else f"{self.form}({first}, {second})"
         )
+
+
+def samples_file(text: str) -> Path | None:
+    """File that the text of a distribution names for its samples; None for any other text."""
+    match = _FORM.fullmatch(text)
+    return None if match is None or match[1] != "samples" or "," in match[2] else Path(match[2].strip())
 
 
 def with_full_names(text: str, folder: Path | None) -> str:

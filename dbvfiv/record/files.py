@@ -16,7 +16,7 @@ import sys
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from datetime import UTC, datetime
 from importlib import metadata
 from pathlib import Path
@@ -28,6 +28,7 @@ import h5py
 import numpy as np
 
 from .. import __version__
+from ..case.distribution import samples_file
 from ..case.model import Case
 from ..case.write import case_toml
 from ..errors import CaseError, as_path
@@ -359,30 +360,37 @@ class Attachment:
     ----------
     path : str
         As the case names it.
-    text : str
+    data : bytes
         Its contents.
     """
 
     path: str
-    text: str
+    data: bytes
 
     def place(self) -> str:
-        """Name of a file with these contents: the original one, or a copy in the cache folder."""
-        if _text(Path(self.path)) == self.text:
+        """Name of a file with these contents: the original one, or a copy in the cache folder where that can be
+        written.
+        """
+        if _contents(Path(self.path)) == self.data:
             return self.path
-        digest = hashlib.sha256(self.text.encode()).hexdigest()[:16]
+        digest = hashlib.sha256(self.data).hexdigest()[:16]
         copy = cache_directory() / "attachments" / digest / Path(self.path).name
-        if _text(copy) != self.text:
-            copy.parent.mkdir(parents=True, exist_ok=True)
-            copy.write_text(self.text, encoding="utf-8", newline="")
+        try:
+            if _contents(copy) != self.data:
+                copy.parent.mkdir(parents=True, exist_ok=True)
+                copy.write_bytes(self.data)
+        except OSError:
+            return self.path
         return str(copy)
 
 
 def attachments_of(case: Case) -> tuple[Attachment, ...]:
-    """The files that a case names, each once."""
+    """The files that a case names, each once; results of other runs are left where they are."""
     paths = dict.fromkeys(str(path) for path in _paths(case))
-    texts = {path: _text(Path(path)) for path in paths}
-    return tuple(Attachment(path, text) for path, text in texts.items() if text is not None)
+    found = {path: _contents(Path(path)) for path in paths}
+    return tuple(
+        Attachment(path, data) for path, data in found.items() if data is not None and not data.startswith(_HDF5)
+    )
 
 
 def placed(data: Any, attachments: tuple[Attachment, ...]) -> Any:
@@ -391,12 +399,20 @@ def placed(data: Any, attachments: tuple[Attachment, ...]) -> Any:
         return {name: placed(value, attachments) for name, value in data.items()}
     if isinstance(data, list):
         return [placed(value, attachments) for value in data]
-    return next((a.place() for a in attachments if a.path == data), data) if isinstance(data, str) else data
+    if not isinstance(data, str):
+        return data
+    samples = samples_file(data)
+    name = data if samples is None else str(samples)
+    there = next((a.place() for a in attachments if a.path == name), None)
+    return data if there is None else there if samples is None else f"samples({there})"
 
 
 def _paths(value: Any) -> Iterator[Path]:
     if isinstance(value, Path):
         yield value
+    elif isinstance(value, str):
+        if (samples := samples_file(value)) is not None:
+            yield samples
     elif hasattr(type(value), "model_fields"):
         for name in type(value).model_fields:
             yield from _paths(getattr(value, name))
@@ -408,10 +424,14 @@ def _paths(value: Any) -> Iterator[Path]:
             yield from _paths(item)
 
 
-def _text(path: Path) -> str | None:
+#: First bytes of HDF5 files.
+_HDF5 = b"\x89HDF\r\n\x1a\n"
+
+
+def _contents(path: Path) -> bytes | None:
     try:
-        return path.read_bytes().decode("utf-8")
-    except (OSError, UnicodeDecodeError):
+        return path.read_bytes()
+    except (OSError, ValueError):  # no name of a file
         return None
 
 
@@ -498,7 +518,7 @@ def write_header(file: h5py.File, header: Header) -> None:
     case["json"] = json.dumps(header.case.to_dict())
     files = case.create_group("files")
     for number, attachment in enumerate(header.attachments):
-        dataset = files.create_dataset(str(number), data=attachment.text, dtype=h5py.string_dtype())
+        dataset = files.create_dataset(str(number), data=np.frombuffer(attachment.data, "u1"))
         dataset.attrs["path"] = attachment.path
     group = file.create_group("versions")
     for name, version in header.versions.items():
@@ -506,19 +526,28 @@ def write_header(file: h5py.File, header: Header) -> None:
 
 
 def read_header(file: h5py.File, case_model: type[Case]) -> Header:
-    """Read what `write_header` wrote; the case has the sections of the model given."""
+    """Read what `write_header` wrote; the case has the sections of the model given, and it and its attachments name
+    files that exist.
+    """
     attributes = file.attrs
     files = file["case/files"]
-    attached = [files[name] for name in sorted(files, key=int)]
+    attached = [Attachment(str(files[name].attrs["path"]), _bytes_of(files[name])) for name in sorted(files, key=int)]
     return Header(
         kind=str(attributes["dbvfiv_kind"]),
-        case=_case(file["case/json"].asstr()[()], case_model),
+        case=_case(placed(json.loads(file["case/json"].asstr()[()]), tuple(attached)), case_model),
         versions={name: str(version) for name, version in file["versions"].attrs.items()},
-        attachments=tuple(Attachment(str(d.attrs["path"]), d.asstr()[()]) for d in attached),
+        attachments=tuple(replace(one, path=one.place()) for one in attached),
         complete=bool(attributes["complete"]),
         layout=int(attributes["layout"]),
         **{name: str(attributes[name]) for name in ("name", "program", "created", "command")},
     )
+
+
+def _bytes_of(attached: h5py.Dataset) -> bytes:
+    """Contents of a file, which earlier versions kept as a text."""
+    if h5py.check_string_dtype(attached.dtype) is not None:
+        return attached.asstr()[()].encode()
+    return attached[()].tobytes()
 
 
 #: Keys that earlier versions wrote with every case and that no study asks for now.
@@ -528,8 +557,7 @@ GONE = {
 }
 
 
-def _case(text: str, model: type[Case]) -> Case:
-    data = json.loads(text)
+def _case(data: dict[str, Any], model: type[Case]) -> Case:
     for section, names in GONE.items():
         for name in names:
             data.get(section, {}).pop(name, None)

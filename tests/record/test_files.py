@@ -4,13 +4,16 @@ import json
 import shutil
 import subprocess
 import sys
+from pathlib import Path
 
 import h5py
 import numpy as np
 import pytest
 
 import dbvfiv
+from dbvfiv.case.valve import Valve
 from dbvfiv.errors import CaseError
+from dbvfiv.geometry import key_point_table
 from dbvfiv.materials.shipped import published_rubber
 from dbvfiv.model.equilibria import LoadPath
 from dbvfiv.observer import Observer
@@ -92,6 +95,67 @@ def test_files_of_the_case_travel_with_the_result(tmp_path, coarse_run, monkeypa
         again = read_header(file, Case).rebuildable_case()
     path = again.materials.named["own"].path
     assert path != data and path.read_text().startswith("strain,stress")
+
+
+def _kept(tmp_path, case: Case, name="h.h5") -> Header:
+    """Header of a case out of a file that was written and read."""
+    with h5py.File(tmp_path / name, "w") as file:
+        write_header(file, Header.of("steady", case))
+    return _read(tmp_path, name)
+
+
+def _read(tmp_path, name="h.h5") -> Header:
+    with h5py.File(tmp_path / name) as file:
+        return read_header(file, Case)
+
+
+LATIN = "# \u00b5\nfrequency,tan delta\n1,0.1\n200,0.2\n".encode("latin-1")
+
+
+@pytest.mark.parametrize(
+    ("key", "form", "data"),
+    [
+        ("materials.CR", {"loss_data": "{}"}, LATIN),
+        ("materials.CR", {"kind": "fit", "path": "{}", "density": 1300, "loss_factor": 0.1}, b"PK\x03\x04\0workbook"),
+        ("uncertainty.inputs", {"density": "samples({})"}, b"990\n1000\n1010\n"),
+    ],
+)
+def test_files_of_any_contents_stay_with_a_result_and_its_case(tmp_path, monkeypatch, key, form, data):
+    monkeypatch.setenv("DBVFIV_CACHE", str(tmp_path / "cache"))
+    own = tmp_path / "own.dat"
+    own.write_bytes(data)
+    given = {name: value.format(own) if isinstance(value, str) else value for name, value in form.items()}
+    case = Case().replace({key: given})
+    assert _kept(tmp_path, case).case == case
+    own.write_bytes(b"other")
+    (copy,) = _read(tmp_path).attachments
+    assert copy.path != str(own) and copy.data == data
+    with h5py.File(tmp_path / "again.h5", "w") as file:
+        write_header(file, _read(tmp_path))
+    shutil.rmtree(tmp_path / "cache")
+    again = _read(tmp_path, "again.h5").rebuildable_case()
+    assert copy.path in json.dumps(again.to_dict()) and Path(copy.path).read_bytes() == data
+
+
+def test_key_points_that_are_gone_still_give_their_valve(tmp_path, monkeypatch):
+    monkeypatch.setenv("DBVFIV_CACHE", str(tmp_path / "cache"))
+    small, points = Valve(flange_radius=0.06, lip_half_width=0.1), tmp_path / "points.csv"
+    points.write_text(key_point_table(small, 17))
+    own = {"valve.key_points": str(points), "downstream.pipe_diameter": 0.25}
+    case = Case().replace(own)
+    kept = _kept(tmp_path, case)
+    points.unlink()
+    assert kept.case == case and _read(tmp_path).case.valve.inlet_radius == pytest.approx(0.06)
+
+
+def test_texts_of_earlier_versions_are_read(tmp_path):
+    own = tmp_path / "own.csv"
+    own.write_bytes(LATIN)
+    _kept(tmp_path, Case().replace({"materials.CR.loss_data": str(own)}))
+    with h5py.File(tmp_path / "h.h5", "a") as file:
+        del file["case/files/0"]
+        file["case/files"].create_dataset("0", data="1,0.1 \u00b5", dtype=h5py.string_dtype()).attrs["path"] = str(own)
+    assert _read(tmp_path).attachments[0].data == "1,0.1 \u00b5".encode()
 
 
 def test_a_stopped_run_keeps_what_it_found(tmp_path, coarse_valve):
