@@ -17,7 +17,7 @@ from ..studies.request import is_sheet
 from ..texts import json_value
 
 #: Suffixes that promise another format than that of result files.
-OTHER_FORMATS = (".json", ".toml", ".html", ".pdf", ".png", ".svg")
+OTHER_FORMATS = (".json", ".toml", ".html", ".pdf", ".png", ".svg", ".vtkhdf")
 
 
 def _writable(path: Path | None) -> Path | None:
@@ -27,7 +27,7 @@ def _writable(path: Path | None) -> Path | None:
     if path is not None and path.suffix.lower() in OTHER_FORMATS:
         raise CaseError(
             f"--output {str(path)!r} would be an HDF5 file; name it '{path.stem}.h5', and ask for JSON by --json, for "
-            "figures by --plots."
+            "figures by --plots, for fields by `dbvfiv export`."
         )
     if path is not None and not is_sheet(path):
         check_writable(path)

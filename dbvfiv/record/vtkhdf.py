@@ -7,8 +7,10 @@ every step points to it.
 from __future__ import annotations
 
 import inspect
+import os
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -138,7 +140,8 @@ def export_result(result: Any, path: str | Path, quarter: bool = False, deformed
     Raises
     ------
     CaseError
-        If the result has nothing to show in space, cannot be told a choice, or the file cannot be written.
+        If the result has nothing to show in space, cannot be told a choice, the file cannot be written, or its name is
+        taken by a file of another kind.
     """
     valve = WholeValve.of(result.mesh, quarter)
     for name in choices:
@@ -152,14 +155,30 @@ def export_result(result: Any, path: str | Path, quarter: bool = False, deformed
         chosen = "".join(f"-{name}{value}" for name, value in choices.items())
         path = path / f"{result.header.name}-{result.kind}{chosen}.vtkhdf"
     units = _UNITS | {name: "Pa" for name in steps[0].cell_data if name.startswith("von_mises")}
+    draft = path.with_name(f".{path.name}.{os.getpid()}.new")
     try:
+        _refuse_other(path)
         path.parent.mkdir(parents=True, exist_ok=True)
-        write_vtkhdf(path, valve.points, valve.quads, _moved(steps, valve, deformed), units)
+        write_vtkhdf(draft, valve.points, valve.quads, _moved(steps, valve, deformed), units)
+        return draft.replace(path)
     except OSError as error:
         raise CaseError(
             f"{str(path)!r} cannot be written ({error.strerror or 'the folder may not be written'})."
         ) from error
-    return path
+    finally:
+        with suppress(OSError):
+            draft.unlink(missing_ok=True)
+
+
+def _refuse_other(path: Path) -> None:
+    """Refuse the name of anything but an earlier export, such as of the result itself."""
+    if not path.exists() or not path.stat().st_size:
+        return
+    if h5py.is_hdf5(path):
+        with h5py.File(path) as file:
+            if "VTKHDF" in file:
+                return
+    raise CaseError(f"{str(path)!r} exists and is no VTKHDF file, so it is not overwritten; choose another name.")
 
 
 def _moved(steps: Sequence[Step], valve: WholeValve, deformed: bool) -> Iterator[Step]:

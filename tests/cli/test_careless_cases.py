@@ -81,6 +81,7 @@ def test_one_sentence_for_a_careless_case(command_line, one_sentence, changes, w
         ("report", "--set", "drive.pressure=1 m", "--set", "downstream.pressure=2 m"),
         ("report", "-o", "my.pdf"),
         ("report", "-o", "my"),
+        ("steady", "-o", "run.vtkhdf"),
     ],
 )
 def test_studies_refuse_contradictions_before_they_solve(command_line, one_sentence, monkeypatch, arguments):

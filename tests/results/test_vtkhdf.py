@@ -1,5 +1,7 @@
 """VTKHDF files, read back by VTK itself."""
 
+import shutil
+
 import numpy as np
 import pytest
 
@@ -80,3 +82,18 @@ def test_nothing_to_export_is_a_sentence(tmp_path, coarse_run, refused):
     empty: SteadyResult = coarse_run.only()
     with refused(CaseError):
         empty.export(tmp_path)
+
+
+def test_only_earlier_exports_are_overwritten(tmp_path, coarse_run, refused, monkeypatch):
+    own = tmp_path / "run.vtkhdf"
+    shutil.copy(coarse_run.path, own)
+    result = dbvfiv.load_result(own)
+    with refused(CaseError, match="run.vtkhdf' exists and is no VTKHDF file"):
+        result.export(own)
+    assert len(dbvfiv.load_result(own).states) == 3
+    path = result.export(tmp_path / "fields.vtkhdf", quarter=True)
+    assert result.only(*result.states[:2]).export(path) == path and Reader(path).times == (6e3, 18e3)
+    monkeypatch.setattr("dbvfiv.record.vtkhdf._write_steps", lambda *_: 1 / 0)
+    with pytest.raises(ZeroDivisionError):
+        result.export(path)
+    assert Reader(path).times == (6e3, 18e3) and {file.name for file in tmp_path.iterdir()} == {own.name, path.name}
