@@ -10,6 +10,7 @@ import threading
 import time
 import traceback
 from collections.abc import Sequence
+from contextlib import suppress
 from functools import cache
 from types import FrameType
 from typing import Annotated, Any
@@ -132,9 +133,9 @@ def _outcome(arguments: Sequence[str], ending: Ending) -> int:
     """Exit status of a command line; failures become sentences."""
     try:
         status = build().main(list(arguments), prog_name="dbvfiv", standalone_mode=False)
-        sys.stdout.flush()
         if status == 130:  # newer Typer swallows Ctrl-C
             raise KeyboardInterrupt
+        sys.stdout.flush()
         return status if isinstance(status, int) else 0
     except CaseError as error:
         return _report(str(error), 2)
@@ -152,8 +153,7 @@ def _outcome(arguments: Sequence[str], ending: Ending) -> int:
         text = " ".join(problem.format_message().split()).rstrip(".?").replace(". ", "; ")
         return _report(f"{text}; `dbvfiv --help` lists what there is.", 2)
     except BrokenPipeError:
-        # the reader left (`dbvfiv ... | head`); keep Python from complaining at exit
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        _let_reader_go()
         return 1
     except OSError as error:
         name = f" {error.filename!r}" if error.filename else ""
@@ -170,6 +170,15 @@ def _outcome(arguments: Sequence[str], ending: Ending) -> int:
 
 
 def _report(sentence: str, status: int) -> int:
-    sys.stdout.flush()
-    print(sentence, file=sys.stderr)
+    try:
+        sys.stdout.flush()
+    except BrokenPipeError:
+        _let_reader_go()
+    with suppress(BrokenPipeError):
+        print(sentence, file=sys.stderr)
     return status
+
+
+def _let_reader_go() -> None:
+    """Keep Python from complaining at exit that the reader has left (`dbvfiv ... | head`)."""
+    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())

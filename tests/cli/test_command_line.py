@@ -1,6 +1,7 @@
 """Exit statuses, one-sentence failures, and JSON that is alone on standard output."""
 
 import json
+import os
 import subprocess
 import sys
 import types
@@ -68,6 +69,32 @@ def test_failures_become_exit_statuses(monkeypatch, command_line, one_sentence, 
     assert outcome.status == status
     assert outcome.out == ""
     assert one_sentence(outcome.err), outcome.err
+
+
+@pytest.mark.parametrize(("failure", "status"), [("KeyboardInterrupt()", 130), ("CaseError('It is wrong.')", 2)])
+def test_a_reader_that_has_left_changes_no_status(failure, status):
+    script = f"""
+import sys, typer
+from dbvfiv.cli import main
+from dbvfiv.errors import CaseError
+def work():
+    print("found")
+    raise {failure}
+app = typer.Typer(add_completion=False)
+app.callback()(lambda: None)
+app.command("work")(work)
+main.build = lambda: typer.main.get_command(app)
+sys.stdin.readline()
+sys.exit(main.run(["work"]))
+"""
+    pipes = dict.fromkeys(("stdin", "stdout", "stderr"), subprocess.PIPE)
+    held = os.environ | {"PYTHONUNBUFFERED": ""}  # the pipe is written when the command reports
+    with subprocess.Popen([sys.executable, "-c", script], text=True, env=held, **pipes) as process:
+        process.stdout.close()
+        process.stdin.write("go\n")
+        process.stdin.close()
+        told = process.stderr.read()
+    assert process.returncode == status and told.count("\n") == 1, told
 
 
 def test_case_as_json(command_line, tmp_path):
