@@ -20,7 +20,7 @@ STABILISED = 0.02
 @dataclass(frozen=True)
 class FitReport:
     """Fits to the same tests: of every form, with those refused and why; the one told in full, and the same form
-    fitted to the first loading, where there are several cycles and the last is the one fitted.
+    fitted to the first loading, where a test has several cycles, the last is the one fitted and the first can be.
     """
 
     tests: tuple[TensionTest, ...]
@@ -167,10 +167,13 @@ def describe_fits(
                 raise
             refused[form.title] = str(problem)
     chosen = next(f for f in fits if f.form == wanted) if wanted else _best(fits)
-    many = any(c.cycle is not None and c.cycle > 1 for c in curves)
+    many = any(len({c.cycle for c in curves if c.mode == mode}) > 1 for mode in {c.mode for c in curves})
     first = None
     if many and cycle == "last":
-        first = fit_rubber(loading_tests(curves, "first"), chosen.form, constraint, stable_to, error)
+        try:
+            first = fit_rubber(loading_tests(curves, "first"), chosen.form, constraint, stable_to, error)
+        except MaterialError as problem:
+            refused["first loading"] = str(problem)
     return FitReport(tests, describe_cycles(curves), fits, refused, chosen, first)
 
 

@@ -49,6 +49,15 @@ def test_first_and_stabilised_constants_come_back():
     assert "loss_factor" in report.summary("r", 1300.0)
 
 
+def test_cycles_are_compared_where_there_are_two_that_can_be_fitted():
+    fifth, brief = _cycle(5, 0.6e6), TensionTest(np.array([0.0, 0.1, 0.2]), np.array([0.0, 1e5, 2e5]), cycle=1)
+    alone = describe_fits([fifth], law="neo-hookean")
+    assert alone.first is None and "Mullins" not in "\n".join(alone.lines("r", 1300.0))
+    report = describe_fits([brief, fifth], law="neo-hookean")
+    assert report.first is None and report.chosen.shear_modulus == pytest.approx(0.6e6, rel=1e-6)
+    assert "first loading: Cycle 1 of the uniaxial test has 2 rows" in "\n".join(report.lines("r", 1300.0))
+
+
 def test_a_set_on_a_row_is_taken_off_exactly():
     curve = _cycle(2, 0.6e6, 0.05)  # a row lies at 5 %
     test = loading_tests([curve])[0]
