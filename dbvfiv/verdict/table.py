@@ -85,6 +85,8 @@ def is_unit_of_time(text: str) -> bool:
 
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eEdD][+-]?\d+)?")
 _MISSING = {"", "nan", "+nan", "-nan", "na", "n/a", "#n/a", "#na", "null", "none", "-", "--", "inf", "+inf", "-inf"}
+#: What is said behind the numbers of a line; a missing value as spreadsheets write it, #N/A, is a cell.
+_REMARK = re.compile(r"#(?!n/?a[\"\s]*(?:[\t,;]|$|[-+.\d#])).*", re.IGNORECASE)
 #: Dates with a time of day, as ISO 8601 and control systems write them.
 _DATE = re.compile(r"\d{1,4}[-./]\d{1,2}[-./]\d{1,4}[T ]\s*\d{1,2}:\d{2}")
 #: A date and a time of day in columns of their own.
@@ -187,11 +189,11 @@ def read_table(path: str | Path) -> Table:
         If the file cannot be read.
     """
     lines = re.split(r"\r\n|\r|\n", _decoded(Path(path).read_bytes()))
-    bodies = [(number, line) for number, line in enumerate(lines, 1) if line.split("#")[0].strip(" \t,;")]
+    bodies = [(number, line) for number, line in enumerate(lines, 1) if _REMARK.sub("", line).strip(" \t,;")]
     if not bodies:
         raise ValueError("it holds no numbers")
-    separator, decimal = _format_of([line.split("#")[0] for _, line in bodies])
-    rows = [(number, _cells(line.split("#")[0], separator)) for number, line in bodies]
+    separator, decimal = _format_of([_REMARK.sub("", line) for _, line in bodies])
+    rows = [(number, _cells(_REMARK.sub("", line), separator)) for number, line in bodies]
     parted = _parted_dates(rows)
     rows = [(number, _joined(cells, parted)) for number, cells in rows]
     numbers = [[_number(cell, decimal) for cell in cells] for _, cells in rows]

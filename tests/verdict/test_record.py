@@ -108,6 +108,16 @@ def test_missing_values_of_other_columns_do_not_matter(command_line, tmp_path):
     assert judged(command_line, file, "-c", "p")[0]["skipped_rows"] == 0
 
 
+@pytest.mark.parametrize(
+    ("row", "last"),
+    [("0.3,#N/A,6", 6.0), ("0.3,#NA,6 # NA", 6.0), ("0.3,5,#n/a", np.nan), ("0.3,5,6#N/A = missing", 6.0)],
+)
+def test_a_missing_value_of_spreadsheets_is_a_cell_and_no_remark(tmp_path, row, last):
+    table = read_table(record(tmp_path, f"t,a,b\n0.1,1,2\n0.2,3,4\n{row}\n"))
+    assert table.values[2, 2] == pytest.approx(last, nan_ok=True)
+    assert np.isnan(table.values[2, 1]) == row.startswith("0.3,#") and np.isfinite(table.values[:, 0]).all()
+
+
 @pytest.mark.parametrize("text, words", [("t,p\n0,1\n", "a single sample"), ("t,p\n", "no numbers")])
 def test_one_row_and_none(command_line, tmp_path, one_sentence, text, words):
     outcome = command_line("verdict", record(tmp_path, text))
