@@ -308,6 +308,8 @@ class Materials(Section):
             if isinstance(value, dict):
                 before = named.get(name)
                 change = isinstance(before, dict) and "kind" not in value  # of single keys of a table that is there
+                if change and "hardness" in value:  # which stands for the modulus
+                    before = {key: one for key, one in before.items() if key != "shear_modulus"}
                 named[name] = before | value if change else value
             else:
                 known[name] = value  # not a table: refused as an unknown key

@@ -397,10 +397,6 @@ def change_case(case: Case, changes: Changes) -> Case:
             other = toml_value(given) if isinstance(given, str) else given
             if other is given:
                 raise
-            try:
-                case.replace({error.key: other})
-            except CaseError:
-                raise error from None
             wanted[error.key] = other
 
 

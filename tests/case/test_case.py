@@ -18,6 +18,7 @@ from dbvfiv.case.describe import SYNONYMS, explain, page, walk
 from dbvfiv.case.key_points import read_key_points
 from dbvfiv.case.materials import shear_modulus_of
 from dbvfiv.case.measured import read_measured
+from dbvfiv.case.model import change_case
 from dbvfiv.case.tables import read_drive_table, read_pump_table
 from dbvfiv.case.write import case_toml
 from dbvfiv.fit.curves import read_curves
@@ -108,6 +109,30 @@ def test_replace_leaves_the_original_alone_and_checks_again():
     assert case == Case()
     with pytest.raises(CaseError, match="fluid.density"):
         case.replace({"fluid.density": -1})
+
+
+@pytest.mark.parametrize(
+    "given",
+    [
+        ["downstream.length=2", "downstream.pipe_diameter=0.4"],
+        ["downstream.length=2"],
+        ["downstream.length=-2", "downstream.pipe_diameter=400 mm"],
+    ],
+)
+def test_changes_from_python_are_those_of_set(given):
+    found = []
+    for make in (lambda: change_case(Case(), given), lambda: load_case(None, given)):
+        try:
+            found.append(make())
+        except CaseError as error:
+            found.append(str(error).removeprefix("In an override, "))
+    assert found[0] == found[1]
+
+
+def test_a_rubber_takes_another_hardness():
+    case = Case().replace({"materials.tube": {"hardness": "60 Shore A", "density": 1200}})
+    harder = case.replace({"materials.tube.hardness": "70 Shore A"}).materials.named["tube"]
+    assert harder.shear_modulus == pytest.approx(1.848e6, rel=1e-3)
 
 
 def test_a_case_cannot_be_changed_in_place():
