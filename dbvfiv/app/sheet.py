@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import json
 import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from ..case.describe import quantity_of
+from ..case.describe import quantity_of, show_value, toml_name
 from ..case.load import make_case, parse_toml, put, toml_value
 from ..case.parameters import PARAMETERS
 from ..case.quantity import GRAVITY
@@ -98,32 +97,15 @@ def read_sheet(text: str) -> dict[str, Any]:
 
 def write_sheet(data: Mapping[str, Any]) -> str:
     """TOML text of the given keys, a table for each section; `read_sheet` gives the same data."""
-    tables = [(name, value) for name, value in data.items() if isinstance(value, Mapping)]
-    lines = [f"{_name(name)} = {_value(value)}" for name, value in data.items() if not isinstance(value, Mapping)]
-    for name, table in tables:
-        lines += ["", f"[{_name(name)}]", *(f"{_name(key)} = {_value(value)}" for key, value in table.items())]
+    lines = _lines({name: value for name, value in data.items() if not isinstance(value, Mapping)})
+    for name, value in data.items():
+        if isinstance(value, Mapping):
+            lines += ["", f"[{toml_name(name)}]", *_lines(value)]
     return "\n".join(lines).lstrip("\n") + "\n"
 
 
-def _name(name: str) -> str:
-    return name if re.fullmatch(r"[A-Za-z0-9_-]+", name) else _quoted(name)
-
-
-def _quoted(text: str) -> str:
-    """Text as JSON has it, which leaves the one control character that TOML refuses."""
-    return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007f")
-
-
-def _value(value: Any) -> str:
-    if isinstance(value, Mapping):
-        return "{ " + ", ".join(f"{_name(key)} = {_value(part)}" for key, part in value.items()) + " }"
-    if isinstance(value, list):
-        return "[" + ", ".join(map(_value, value)) + "]"
-    if isinstance(value, str):
-        return _quoted(value)
-    if isinstance(value, bool):
-        return "true" if value else "false"
-    return repr(value) if isinstance(value, (int, float)) else str(value)
+def _lines(table: Mapping[str, Any]) -> list[str]:
+    return [f"{toml_name(name)} = {show_value(value, None)}" for name, value in table.items()]
 
 
 def given(data: Mapping[str, Any], key: str) -> str:
@@ -131,7 +113,7 @@ def given(data: Mapping[str, Any], key: str) -> str:
     value: Any = data
     for part in key.split("."):
         value = value.get(part) if isinstance(value, Mapping) else None
-    return "" if value is None else value if isinstance(value, str) else _value(value)
+    return "" if value is None else value if isinstance(value, str) else show_value(value, None)
 
 
 def usual_value(section: Section, name: str) -> Any:

@@ -6,12 +6,14 @@
 from __future__ import annotations
 
 import difflib
+import json
 import math
 import re
 import types
 import typing
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from datetime import date, time
 from functools import cache
 from pathlib import Path
 from typing import Any, Literal
@@ -85,6 +87,9 @@ def _item_limits(annotation: Any) -> dict[str, Any]:
     return _limits(flat)
 
 
+_BARE = re.compile(r"[A-Za-z0-9_-]+")
+
+
 def show_value(value: Any, quantity: Quantity | None) -> str:
     """A value as TOML text, with its unit where it has one."""
     if isinstance(value, bool):
@@ -101,10 +106,19 @@ def show_value(value: Any, quantity: Quantity | None) -> str:
         pairs = (f"{n} = {show_value(getattr(value, n), quantity_of(f))}" for n, f in given.items())
         return "{ " + ", ".join(pairs) + " }"
     if isinstance(value, dict):
-        pairs = ", ".join(f'"{name}" = {show_value(v, quantity)}' for name, v in value.items())
+        pairs = ", ".join(f"{toml_name(name)} = {show_value(v, quantity)}" for name, v in value.items())
         return f"{{ {pairs} }}" if pairs else "{}"
-    text = str(value).replace("\\", "\\\\").replace('"', '\\"')
-    return f'"{text}"'
+    return str(value) if isinstance(value, (date, time)) else _quoted(str(value))
+
+
+def toml_name(name: str) -> str:
+    """A key or the name of a table as TOML has it."""
+    return name if _BARE.fullmatch(name) else _quoted(name)
+
+
+def _quoted(text: str) -> str:
+    """Text as JSON has it, which leaves the one control character that TOML refuses."""
+    return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007f")
 
 
 def _bounds(limits: dict[str, Any], quantity: Quantity | None) -> str:

@@ -8,12 +8,11 @@ from collections.abc import Iterator
 from typing import Any
 
 from .. import __version__
-from .describe import allowed_words, element_model, quantity_of, show_value
+from .describe import allowed_words, element_model, quantity_of, show_value, toml_name
 from .materials import Materials
 from .section import Section
 
 _WIDTH = 110
-_BARE = set("abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_-")
 
 HEAD = """# A case of dbvfiv: a duckbill valve, its material, the fluid and the load.
 #
@@ -62,7 +61,7 @@ def case_toml(case: Section, comments: bool = True, about: str = "") -> str:
         parts.extend(_keys(value, comments))
         if isinstance(value, Materials):
             for own, card in value.named.items():
-                parts.append(f"\n[materials.{_quoted(own)}]")
+                parts.append(f"\n[materials.{toml_name(own)}]")
                 parts.extend(_keys(card, comments))
             if comments:
                 parts.append(OWN_MATERIAL.rstrip("\n"))
@@ -136,7 +135,3 @@ def _value(value: Any, field: Any) -> str:
         rows = "".join(f"    {show_value(item, None)},\n" for item in value)
         return f"[\n{rows}]"
     return show_value(value, quantity_of(field))
-
-
-def _quoted(name: str) -> str:
-    return name if name and set(name) <= _BARE else show_value(name, None)

@@ -233,6 +233,7 @@ MOONEY = {"kind": "mooney-rivlin", "c10": "-1.5 MPa", "c01": "2.1 MPa", "c11": 7
         LOSS | {"materials.CR.loss_factor": "NBR", "materials.fibre.prony": [[0.1, "3 ms"], [0.2, 1]]},
         RAYLEIGH,
         RAYLEIGH | {"damping.beta": 0.001},
+        {"project.customer": 'ACME "\\"\nMain\tStreet\x7f\x01', "uncertainty.inputs": {"thickness": "normal(5 %)"}},
     ],
 )
 def test_written_text_reads_back_as_the_same_case(tmp_path, changes, comments):
