@@ -540,7 +540,7 @@ def load(case: str | Path | Case | None = None, changes: Changes | None = None) 
 #: What a resumed study may be given anew, the studies that take it, and what it is called in a sentence.
 _OWN = {
     "duration": (("transient",), "A new duration belongs to transient runs"),
-    "workers": (("map", "uncertainty"), "Workers belong to maps and to samples of an uncertainty"),
+    "workers": (("map", "uncertainty", "identify"), "Workers belong to maps, uncertainties and identifications"),
 }
 
 
@@ -560,7 +560,7 @@ def resume(
     duration : number (s) or text with a unit, optional
         Of a transient run: a later end.
     workers : int or str, optional
-        Of a map or an uncertainty: processes that share the work, or the address of a Dask scheduler.
+        Of a map, an uncertainty or an identification: processes that share it, or the address of a Dask scheduler.
     observer : Observer, optional
 
     Returns

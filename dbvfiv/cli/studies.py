@@ -113,7 +113,7 @@ def resume(
     ] = None,
     workers: Annotated[
         str | None,
-        typer.Option("--workers", "-w", "--on", metavar="N|ADDRESS", help="Of a map: who shares the columns."),
+        typer.Option("--workers", "-w", "--on", metavar="N|ADDRESS", help="Of maps and samples: who shares them."),
     ] = None,
     as_json: AsJson = False,
 ) -> None:

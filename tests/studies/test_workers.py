@@ -2,6 +2,7 @@
 worker killed half way.
 """
 
+import inspect
 import os
 import signal
 import threading
@@ -9,9 +10,12 @@ from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 
 import pytest
 
+from dbvfiv import api
 from dbvfiv.errors import CaseError
 from dbvfiv.runtime import mpi_size
+from dbvfiv.studies import KINDS
 from dbvfiv.studies import workers as module
+from dbvfiv.studies.session import find_study
 from dbvfiv.studies.workers import Lost, Work, Workers, read_workers, require_answer
 from tests.studies.work import TASKS, dies, expected, root_of, run_under_mpi, start
 
@@ -23,6 +27,17 @@ def shared(count, function=root_of, tasks=TASKS, said=None, on_result=lambda tas
             found[task] = result
             on_result(task)
     return found
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_new_workers_are_for_the_studies_that_share_their_work(kind, monkeypatch, refused):
+    monkeypatch.setattr(api, "kind_of", lambda _: kind)
+    monkeypatch.setattr(api, "resume_result", lambda *_, **given: given)
+    if "workers" in inspect.signature(find_study(kind).run).parameters:
+        assert api.resume("r.h5", workers="2") == {"workers": 2}
+    else:
+        with refused(CaseError, match=f"Workers belong to .*'r.h5' is of kind '{kind}'"):
+            api.resume("r.h5", workers="2")
 
 
 def test_processes_give_what_one_gives():

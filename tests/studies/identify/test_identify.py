@@ -131,7 +131,7 @@ def test_an_interrupted_run_has_the_digits_of_a_whole_one(found, tmp_path):
     path = tmp_path / "identify.h5"
     partly = found.valve.identify(found.records, output=path, observer=Stop(3))
     assert partly.interrupted and partly.lines() == ["Too few valves were computed to learn from."]
-    whole = dbvfiv.resume(path)
+    whole = dbvfiv.resume(path, workers=2)
     assert whole.complete and whole.summary() == found.result.summary() == dbvfiv.load_result(path).summary()
     assert set(whole.figures()) == {"inputs", "onset"}
 
