@@ -320,7 +320,7 @@ class StepResult:
     residuals, solves, factorisations : int
         Work done.
     error : float
-        Estimated local error of the displacements, m.
+        Estimated local error of the displacements, m; not a number without a step before.
     contact_loss : float
         Energy that touching faces took and did not store, J.
     numerical_loss : float
@@ -373,6 +373,10 @@ class Stepper:
         self._factored: tuple[float, bool, float] | None = None
         self._past = Predictor()
 
+    def take_back(self) -> None:
+        """Forget the last step, which its caller does not go on from."""
+        self._past.drop()
+
     # -- the step
     # ----
 
@@ -404,7 +408,7 @@ class Stepper:
         past, here = self._past.last, (state.time + (1.0 - scheme.alpha_m) * h, trial.a_mid)
         self._past.add(*here)
         work = [now - then for now, then in zip((self.residuals, self.solves, self.factorisations), before)]
-        jump = 0.0 if past is None else self.motion.length(here[1] - past[1]) * h / (here[0] - past[0])
+        jump = np.nan if past is None else self.motion.length(here[1] - past[1]) * h / (here[0] - past[0])
         error = scheme.error_constant * h * h * jump
         taken = trial.contact_loss, numerical_loss(self.motion, trial, new)
         return StepResult(new, trial.load, *self._works(trial), *work, error, *taken)
@@ -566,6 +570,10 @@ class Predictor:
     def add(self, time: float, accelerations: np.ndarray) -> None:
         """Remember a step."""
         self._points = [*self._points[-3:], (time, accelerations)]
+
+    def drop(self) -> None:
+        """Forget the last step."""
+        self._points.pop()
 
     def shorten(self) -> None:
         """Forget all but the last step."""

@@ -194,9 +194,12 @@ def test_adaptive_steps_follow_the_error(valve, open_state):
     pressure = lambda t: 12e3 + 2e3 * np.exp(-(((t - 0.05) / 0.002) ** 2))  # noqa: E731
     stepper = Stepper(motion, scheme("generalised-alpha", 0.1), pressure)
     control = step_control(stepper, ControlOptions(2e-3, True, 2e-8))
-    lengths = []
+    lengths, errors = [], []
     while state.time < 0.1:
-        old, state = state, control.advance(state, 0.1 if state.time < 0.1 - 1e-9 else 1.0).state
+        result = control.advance(state, 0.1 if state.time < 0.1 - 1e-9 else 1.0)
+        old, state = state, result.state
         lengths.append((old.time, state.time - old.time))
+        errors.append(result.error)
+    assert np.isnan(errors[0]) and 0.0 <= min(errors[1:]) and max(errors[1:]) < 2e-8 / 0.7**3
     during = [h for t, h in lengths if 0.047 < t < 0.053]
     assert max(during) < 0.6 * max(h for t, h in lengths)
