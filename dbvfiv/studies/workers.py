@@ -199,12 +199,15 @@ class Workers:
                 try:
                     running[self._pool.submit(_do, self._sent, work)] = task
                 except BrokenExecutor:
+                    if not running:  # all workers died between two tasks
+                        yield task, Lost
+                        return
                     queue.insert(0, task)
                     break
-            if not queue and not running:
+            if not running:
                 return
             done, _ = wait(running, return_when=FIRST_COMPLETED)
-            broken = not running
+            broken = False
             for future in done:
                 task = running.pop(future)
                 try:

@@ -58,6 +58,19 @@ def test_a_killed_process_costs_nothing_but_time():
     assert killed and any("worker was lost" in sentence for sentence in said)
 
 
+def test_processes_killed_between_two_calls_are_started_again():
+    import multiprocessing
+
+    said, found = [], {}
+    with Workers(2, start, (3,), said.append) as team:
+        for tasks in (TASKS[:2], TASKS[2:]):
+            found |= team.share(tasks, lambda task: Work(root_of, (task,)))
+            for process in multiprocessing.active_children():
+                process.kill()
+                process.join()
+    assert found == expected() and any("worker was lost" in sentence for sentence in said)
+
+
 def test_a_task_that_kills_every_worker_is_given_up(monkeypatch):
     monkeypatch.setattr(module, "TRIES", 2)
     found = shared(1, dies, (1, 2))
