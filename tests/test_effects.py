@@ -1,5 +1,7 @@
 """Keys that mend warnings: a case that warns, the key that the warning names set, and the warning is gone."""
 
+from tempfile import NamedTemporaryFile
+
 import pytest
 
 from dbvfiv.effects import EFFECTS, explained
@@ -8,12 +10,21 @@ from dbvfiv.model import ValveModel
 from dbvfiv.model.closed import ClosedValve
 from dbvfiv.model.equilibria import model_warnings
 from dbvfiv.studies.case import load_case, oddities
+from dbvfiv.studies.response.study import left_out
 from dbvfiv.studies.session import Session
 from tests.small_valves import SMALL
 
 
 def of_model(case):
     return model_warnings(ValveModel(case))
+
+
+def of_spectrum(case):
+    """What the root mean squares are without, of a power that falls by half up to 50 Hz and to nothing at 60 Hz."""
+    with NamedTemporaryFile("w", suffix=".csv") as file:
+        file.write("10, 4\n50, 2\n60, 0\n")
+        file.flush()
+        return [*filter(None, [left_out(case.replace({"response.spectrum": file.name}))])]
 
 
 def of_closed(case):
@@ -70,6 +81,7 @@ MENDED = {
     "and its jet of": (oddities, ["fluid.density=1"], "343 m/s"),
     "a gas, of which": (oddities, ["fluid.density=1", "drive.pressure=1 m"], "1 mH2O"),
     "held shut by its supports": (of_closed, ["closure.supports=held-lips"], "contact"),
+    "of its power above": (of_spectrum, ["response.max_frequency=40 Hz"], "60 Hz"),
     "asks for all symmetry classes": (of_closed, ["closure.supports=held-lips", "closure.symmetry=all"], "SS"),
 }
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import inspect
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from importlib import import_module
 from pathlib import Path
 from types import ModuleType
@@ -14,8 +14,8 @@ import typer
 from ..errors import CaseError, SolveError
 from ..observer import Progress
 from ..studies import KINDS
-from ..studies.request import is_sheet
-from .terminal import AsJson, CaseFile, Output, Override, PlotFolder, ResultFile, in_units, print_answer
+from ..studies.request import AnimationOption, is_sheet
+from .terminal import AsJson, CaseFile, Output, Override, PlotFolder, ResultFile, in_units, print_answer, print_figures
 
 #: Arguments that the command of a study may take from those that all share.
 _SHARED = ("case", "plots", "output")
@@ -90,8 +90,8 @@ def perform(kind: str, case, request, name: str, output: Path | None, plots: Pat
         live = None if as_json else find_study(kind).live
         progress = Progress(quiet=as_json, row=live and live(session.case), say=case.units.say)
         result = session.perform(kind, output if request.sheet is None else None, progress, **choices)
+        found = [result]
         if request.sheet is not None:
-            found = [result]
             try:
                 for variant in request.variants:
                     if found[-1].interrupted:
@@ -99,7 +99,7 @@ def perform(kind: str, case, request, name: str, output: Path | None, plots: Pat
                     found.append(session.replace(variant).perform(kind, None, progress, **choices))
             finally:  # what was found is kept
                 request.sheet(found)
-        _report(result, output, plots, as_json, further=request.further, printed=live is not None)
+        _report(result, output, plots, as_json, further=request.further, printed=live is not None, others=found[1:])
 
 
 def resume(
@@ -108,9 +108,7 @@ def resume(
         str | None, typer.Option("--duration", metavar="T", help="New end of the run, 2.0 (s) or '500 ms'.")
     ] = None,
     plots: PlotFolder = None,
-    animate: Annotated[
-        Path | None, typer.Option("--animate", metavar="FILE.gif", help="Write an animation of the last cycle.")
-    ] = None,
+    animate: AnimationOption = None,
     workers: Annotated[
         str | None,
         typer.Option("--workers", "-w", "--on", metavar="N|ADDRESS", help="Of maps and samples: who shares them."),
@@ -150,8 +148,9 @@ def _report(
     as_json: bool,
     further: Callable[[Any], list[Path]] | None = None,
     printed: bool = False,
+    others: Sequence[Any] = (),
 ) -> None:
-    """Print a result, draw it, and leave with the exit status it deserves.
+    """Print a result, draw it, and leave with the exit status that it and others of its sheet deserve.
 
     Parameters
     ----------
@@ -160,25 +159,31 @@ def _report(
         Writes further files.
     printed : bool
         True where its table was printed row by row already.
+    others : sequence of StudyResult
 
     Raises
     ------
     KeyboardInterrupt
-        If the run was interrupted.
+        If a run was interrupted.
     SolveError
         If something was not reached.
     """
-    figures = result.plot(plots) if plots is not None and result.drawable else []
-    figures += further(result) if further else []
+
+    def draw() -> list[Path]:
+        figures = result.plot(plots) if plots is not None and result.drawable else []
+        return figures + (further(result) if further else [])
 
     def lines() -> list[str]:
         lines = [*(result.remarks() if printed else result.lines()), *filter(None, [result.record.settled])]
         return [result.case.units.say(line) for line in lines]
 
     document = result.summary() | {"output": str(output) if output else None} if as_json else {}
-    print_answer(document, lines, as_json, (figures, plots), output)
-    if result.interrupted:
+    print_answer(document, lines, as_json, (draw() if as_json else (), plots), output)
+    if not as_json:  # what was found is told before a film may fail
+        print_figures(draw(), plots)
+    results = [result, *others]
+    if any(each.interrupted for each in results):
         raise KeyboardInterrupt
-    shortfall = result.shortfall()
-    if shortfall is not None:
-        raise SolveError(f"{shortfall}.")  # why was said when it happened
+    missed = [clause for each in results if (clause := each.shortfall()) is not None]
+    if missed:
+        raise SolveError(f"{'; '.join(missed)}.")  # why was said when it happened

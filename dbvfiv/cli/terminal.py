@@ -101,6 +101,11 @@ def print_answer(
         print("\n".join(shown))
     if output:
         print(f"Kept in {output}.")
+    print_figures(figures, folder)
+
+
+def print_figures(figures: Sequence[Path], folder: Path | None) -> None:
+    """Print how many figures are in a folder; nothing without any."""
     if figures:
         print(f"{len(figures)} figure{'s' * (len(figures) > 1)} in {folder}.")
 

@@ -24,7 +24,19 @@ def is_sheet(path: Path | None) -> bool:
     return path is not None and path.suffix.lower() in SHEETS
 
 
-def with_unit(given: str | list[str] | None) -> str | list[str] | None:
+def require_gif(path: Path | None) -> Path | None:
+    """Refuse a name of an animation that is none of a GIF.
+
+    Raises
+    ------
+    CaseError
+    """
+    if path is not None and path.suffix.lower() != ".gif":
+        raise CaseError(f"An animation is given as {str(path)!r}; it must be a .gif file.")
+    return path
+
+
+def with_unit(option: typer.CallbackParam, given: str | list[str] | None) -> str | list[str] | None:
     """Refuse a bare number where a command takes a pressure, or several, or ranges of it.
 
     Raises
@@ -35,8 +47,8 @@ def with_unit(given: str | list[str] | None) -> str | list[str] | None:
         for part in text.split(":")[:2]:
             if isinstance(number := number_or_text(part), float) and number != 0:
                 raise CaseError(
-                    f"--pressure is given as {text!r}, without a unit: Pa or m? Give '{part} Pa', '{part} kPa', or "
-                    f"'{part} m' for a head of the fluid."
+                    f"{option.opts[0]} is given as {text!r}, without a unit: Pa or m? Give '{part} Pa', '{part} kPa', "
+                    f"or '{part} m' for a head of the fluid."
                 )
     return given
 
@@ -133,6 +145,10 @@ DensityOption = Annotated[
 ]
 LawOption = Annotated[
     str | None,
+    typer.Option("--law", metavar="LAW", help="Flow model in place of fluid.continuity: quasi-steady or storage."),
+]
+LawsOption = Annotated[
+    str | None,
     typer.Option(
         "--law",
         metavar="LAW",
@@ -173,3 +189,9 @@ class Request:
     further: Callable[[Any], list[Path]] | None = None
     sheet: Callable[[Sequence[Any]], Path] | None = None
     variants: tuple[dict[str, Any], ...] = ()
+
+
+AnimationOption = Annotated[
+    Path | None,
+    typer.Option("--animate", metavar="FILE.gif", callback=require_gif, help="Write an animation of the last cycle."),
+]

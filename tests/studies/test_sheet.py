@@ -5,6 +5,7 @@ import csv
 import pytest
 
 import dbvfiv
+from dbvfiv.studies.session import Session
 from tests.small_valves import THESIS_SET
 
 OPTIONS = (*THESIS_SET, "--set", "mesh.around=4", "--set", "mesh.along=6")
@@ -39,6 +40,22 @@ def test_a_sheet_of_two_sizes_in_units_of_choice(command_line, tmp_path):
     assert float(rows[2]["bore [in]"]) == pytest.approx(2 * float(rows[0]["bore [in]"]), rel=1e-5)
     # lengths twice as large at the same head: four times the flow
     assert float(rows[2]["flow [gpm]"]) == pytest.approx(4 * float(rows[0]["flow [gpm]"]), rel=1e-4)
+
+
+def test_a_later_size_of_a_sheet_that_falls_short_is_told(command_line, tmp_path, monkeypatch):
+    """The first size is whole; the exit status is that of the second."""
+    perform, told = Session.perform, []
+
+    def cut_short(session, *given, **choices):
+        result = perform(session, *given, **choices)
+        if told.append(result) or len(told) == 2:
+            result.record.fail("At 0.2 m: no state.")
+        return result
+
+    monkeypatch.setattr(Session, "perform", cut_short)
+    path = tmp_path / "catalogue.csv"
+    outcome = command_line("steady", *OPTIONS, "-p", "0.2 m", "--scale", 0.5, "--scale", 1, "-o", path)
+    assert outcome.status == 1 and len(told) == 2 and len(rows_of(path)) == 2, outcome.err
 
 
 @pytest.mark.parametrize(

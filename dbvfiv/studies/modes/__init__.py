@@ -12,7 +12,7 @@ from ...case.model import Case
 from ...case.quantity import Frequency, Number, Rate, number_or_text
 from ...case.section import Section, key
 from ...errors import CaseError
-from ..request import DensityOption, LawOption, Request, law_changes, pressure_option
+from ..request import DensityOption, LawsOption, Request, law_changes, pressure_option
 
 ORDER = 25
 
@@ -45,7 +45,7 @@ def command(
         pressure_option("Static inlet pressure in place of drive.pressure; 0 with --in-vacuo is the valve at rest."),
     ] = None,
     density: DensityOption = None,
-    law: LawOption = None,
+    law: LawsOption = None,
     count: Annotated[int | None, typer.Option("--count", "-n", metavar="N", help="How many modes.")] = None,
     in_vacuo: Annotated[
         bool,

@@ -31,6 +31,7 @@ from ...drawing.style import (
 from ...drawing.views import COLOURS, ValveSkin, faces, frame, mark_pieces, shaded
 from ...errors import CaseError
 from ...model.symmetry import symmetry_named
+from ..request import require_gif
 from ..result import StudyResult
 from ..state import State
 from .search import Certificate, ModeShape
@@ -400,6 +401,7 @@ def animate_mode(result: StudyResult, mode: ModeShape, path: str | Path, frames:
     path = Path(path)
     if frames < 2:
         raise CaseError(f"An animation needs at least 2 frames, not {frames}.")
+    require_gif(path)
     with style():
         figure = new_figure(7.6, 4.6)
         axes = figure.add_subplot(projection="3d", computed_zorder=False)

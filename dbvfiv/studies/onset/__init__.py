@@ -14,7 +14,7 @@ from ...case.section import key
 from ..request import (
     ClassesOption,
     DensityOption,
-    LawOption,
+    LawsOption,
     PressureOption,
     Request,
     law_changes,
@@ -66,7 +66,7 @@ def command(
     ] = None,
     pressure: PressureOption = None,
     density: DensityOption = None,
-    law: LawOption = None,
+    law: LawsOption = None,
     symmetry: ClassesOption = None,
 ) -> Request:
     """Every onset along one parameter: value, frequency, super- or subcritical, uncertainty of the mesh.

@@ -87,6 +87,11 @@ def command(
 
     dbvfiv response cases/dbv12-in-line.toml -p "2 m" --noise "200 Pa" --plots figures
     """
+    known = case.response.spectrum if spectrum is None else spectrum
+    if noise is not None and known is not None:
+        raise CaseError(
+            f"--noise is given as {noise!r}, but the spectrum {str(known)!r} is in its place; one of them has to go."
+        )
     changes = {
         **ranged_changes("response", case.response.over, over, pressure, density),
         "fluid.continuity": law,

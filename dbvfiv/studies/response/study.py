@@ -17,6 +17,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 from matplotlib.figure import Figure
+from scipy.integrate import trapezoid
 from scipy.linalg import qr
 
 from eigen.factor import SingularShiftError, Workspace
@@ -295,6 +296,25 @@ def check(case: Case) -> None:
     require_inertia(case)
 
 
+def left_out(case: Case) -> str:
+    """Sentence on the power of response.spectrum above response.max_frequency; empty without any.
+
+    Raises
+    ------
+    CaseError
+    """
+    frequency, power = np.transpose(case.response.density())
+    most, whole = case.response.max_frequency, trapezoid(power, frequency)
+    within = np.append(frequency[frequency < most], min(most, frequency[-1]))
+    share = 1.0 - trapezoid(np.interp(within, frequency, power), within) / whole if whole else 0.0
+    if share < 1e-6:
+        return ""
+    return (
+        f"response.spectrum has {100 * share:.3g} % of its power above response.max_frequency = {most:g} Hz, which "
+        "root mean squares are without."
+    )
+
+
 def run(session: Session, record: GrowingRecord) -> None:
     """Response at the state of the case, or at every value of response.over.
 
@@ -311,6 +331,8 @@ def run(session: Session, record: GrowingRecord) -> None:
     walk = StabilityWalk(case, record, session.model)
     done = set(record.column(POINTS, "value"))
     record.begin("response", len(values))
+    if sentence := left_out(case):
+        record.warn(sentence)
     for value in values:
         if value in done:
             continue

@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Any, Literal
 
-import typer
 from pydantic import StrictBool, StrictInt, ValidationInfo, field_validator, model_validator
 
 from ...case.quantity import Length, Number, Time
 from ...case.section import BrokenRule, Section, key
 from ...case.tables import ExistingFile, read_drive_table
-from ..request import Request, require_start_file
+from ..request import AnimationOption, Request, require_start_file
 
 ORDER = 40
 
@@ -110,12 +109,7 @@ class Keys(Section):
         return self
 
 
-Animation = Annotated[
-    Path | None, typer.Option("--animate", metavar="FILE.gif", help="Write an animation of the last cycle.")
-]
-
-
-def command(animate: Animation = None) -> Request:
+def command(animate: AnimationOption = None) -> Request:
     """Time history of the coupled valve and a verdict: steady, decaying, limit cycle, growing, closed, chatters or
     irregular.
 

@@ -26,6 +26,7 @@ from ...errors import CaseError
 from ...shell.mesh import nodal_thickness
 from ...verdict import Series, in_steps, spectrum
 from ..comparing import colours_of, labels
+from ..request import require_gif
 from ..result import StudyResult
 
 
@@ -305,6 +306,7 @@ def animate(result: StudyResult, path: Path, frames: int = 48, duration: float |
     """
     if frames < 2:
         raise CaseError(f"An animation needs at least 2 frames, not {frames}.")
+    require_gif(path)
     with style():
         figure, move = _picture(result, *_shown_rows(result, frames, duration))
         try:

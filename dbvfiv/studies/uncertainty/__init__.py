@@ -15,7 +15,7 @@ from ...case.quantity import Number
 from ...case.section import Described, flattened, key
 from ..request import (
     DensityOption,
-    LawOption,
+    LawsOption,
     PressureOption,
     Request,
     WorkersOption,
@@ -78,7 +78,7 @@ def command(
     ] = None,
     pressure: PressureOption = None,
     density: DensityOption = None,
-    law: LawOption = None,
+    law: LawsOption = None,
     samples: Annotated[int | None, typer.Option("--samples", "-n", metavar="N", help="Samples of the inputs.")] = None,
     rare: Annotated[
         bool,

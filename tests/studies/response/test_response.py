@@ -149,5 +149,13 @@ def test_the_command_tells_peaks_precursors_and_states_that_flutter(tmp_path, co
     assert len(first["curve"]["frequency"]) == 64 and first["peaks"][0]["frequency"] > 0
     assert {path.name for path in tmp_path.glob("*.png")} == {"response.png", "precursors.png"}
     assert dbvfiv.load_result(tmp_path / "found.h5").summary()["points"][0]["peaks"] == first["peaks"]
+    for option, part in (
+        (("--noise", "200"), "--noise is given as '200', without a unit"),
+        (("--noise", "2 Pa", "--spectrum", "cases/closing.csv"), "one of them has to go"),
+        (("--law", "both"), "it must be"),
+    ):
+        refused = command_line("response", "cases/dbv12.toml", *size, *option)
+        assert refused.status == 2 and part in refused.err.replace("\n", " "), refused.err
+    assert "both" not in command_line("response", "--help").out
     still = command_line("response", "cases/dbv12.toml", *size, "--set", "fluid.unsteady=false", "-p", "6 kPa")
     assert still.status == 2 and "needs a fluid with inertia" in still.err.replace("\n", " ")

@@ -43,6 +43,8 @@ def test_resume_refuses_in_one_sentence(command_line, tmp_path, one_sentence):
     for arguments in (
         ["resume", tmp_path / "none.h5"],
         ["transient", "--set", "transient.numerical_damping=0.7"],
+        ["transient", "--animate", tmp_path / "last.mp4"],
+        ["resume", tmp_path / "none.h5", "--animate", tmp_path / "last.mp4"],
         ["verdict", tmp_path / "none.csv"],
     ):
         outcome = command_line(*arguments)
