@@ -120,8 +120,9 @@ def _run(result: Any, since: float | None, per_day: float | None) -> Motion:
     if since is not None:
         begin = since
     elif per_day is None and verdict["verdict"] == "limit cycle":
-        lip = verdict["lip_displacement"]
-        begin = max(begin, end - max(1, min(int(lip["cycles_observed"]), LAST)) / lip["frequency"])
+        lip, flow = verdict["lip_displacement"], verdict["mass_flow"]
+        cycle = lip if lip["verdict"] == "limit cycle" else flow
+        begin = max(begin, end - max(1, min(int(cycle["cycles_observed"]), LAST)) / cycle["frequency"])
     elif per_day is None and verdict["verdict"] not in ("irregular", "chatters"):
         raise CaseError(
             f"The run ends {verdict['verdict']} and not in a motion that lasts; give how often a day it takes place, "

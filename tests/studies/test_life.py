@@ -14,7 +14,7 @@ from dbvfiv.materials.fatigue import SHAPE, UNIT, CrackGrowth, shipped_growth
 from dbvfiv.shell import Layer, Section, Shell, ShellMesh
 from dbvfiv.shell.recovery import interlaminar_shear
 from dbvfiv.studies.case import load_case
-from dbvfiv.studies.life import Life, Motion, motion_of
+from dbvfiv.studies.life import Life, Motion, _run, motion_of
 from tests.shell.structures import rectangle
 from tests.small_valves import load_small
 
@@ -150,6 +150,22 @@ def test_run_in_time(command_line, one_sentence, tmp_path):
     assert 0 < lasting["ratio"] < 1 and lasting["interval"][0] < lasting["hours"] < lasting["interval"][1]
     outcome = command_line("life", sparse, "--since", 0.01)
     assert outcome.status == 2 and one_sentence(outcome.err) and "of the swings of the lip" in outcome.err
+
+
+def test_a_cycle_of_the_flow_alone_gives_the_time():
+    """The lip stands still: two periods of the flow, 4 ms each, at the end of the run."""
+    flow = {"verdict": "limit cycle", "frequency": 250.0, "cycles_observed": 2}
+    still = {"verdict": "steady", "frequency": None, "cycles_observed": 0}
+    result = SimpleNamespace(
+        kind="transient",
+        require_steps=lambda: None,
+        history={"time": np.linspace(0.0, 0.1, 101)},
+        verdict={"verdict": "limit cycle", "lip_displacement": still, "mass_flow": flow},
+        record=SimpleNamespace(column=lambda *_: np.array([0.05])),
+        model=SimpleNamespace(shell=None),
+    )
+    with pytest.raises(CaseError, match="0 full states from 0.092 s on"):
+        _run(result, None, None)
 
 
 def test_results_without_a_motion_are_refused(opened, command_line, one_sentence, tmp_path):

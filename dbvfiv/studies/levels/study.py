@@ -96,7 +96,8 @@ class LevelsResult(StudyResult):
 
     def summary(self) -> dict[str, Any]:
         rows = [row.items() for row in self.rows]
-        return {"points": [{k: None if isinstance(x, float) and np.isnan(x) else x for k, x in r} for r in rows]}
+        points = [{k: None if isinstance(x, float) and np.isnan(x) else x for k, x in r} for r in rows]
+        return {"points": points} | self.ending()
 
     def lines(self) -> list[str]:
         columns = self.case.units.columns(_COLUMNS)

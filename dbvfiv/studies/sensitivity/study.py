@@ -174,7 +174,7 @@ class SensitivityResult(StudyResult):
 
     def summary(self) -> dict[str, Any]:
         if not self.record.notes(MODE):
-            return {"sensitivities": [], "failures": list(self.failures), "warnings": list(self.warnings)}
+            return {"sensitivities": []} | self.ending()
         return {
             "state": self.state.summary() | describe_surroundings(self.case),
             "mode": {"number": self.number, "growth_rate": self.growth_rate, "frequency": self.frequency},

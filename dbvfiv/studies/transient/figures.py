@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from matplotlib.animation import FuncAnimation, PillowWriter
@@ -53,6 +54,11 @@ def title(result: StudyResult) -> str:
     return f"{result.header.name}: {driven(case, float(result.history['inlet_pressure'][-1]))}{fluid}"
 
 
+def verdict_word(verdict: Mapping[str, Any]) -> str:
+    """Name of a verdict, and whether it is not certain."""
+    return f"{verdict['verdict']}{'' if verdict['decided'] else ' (not certain)'}"
+
+
 def history(result: StudyResult) -> Figure:
     """Mass flow, lip opening and areas over time."""
     h, case = result.history, result.case
@@ -78,9 +84,7 @@ def history(result: StudyResult) -> Figure:
     panels[-1].set_xlabel("Time, s")
     panels[-1].set_xlim(t[0], t[-1])
     panels[0].set_title(title(result), loc="left", fontweight="bold")
-    verdict = result.verdict
-    sure = "" if verdict["decided"] else " (not certain)"
-    panels[0].set_title(f"{verdict['verdict']}{sure}", loc="right", fontsize=10)
+    panels[0].set_title(verdict_word(result.verdict), loc="right", fontsize=10)
     for axes in panels:
         axes.tick_params(labelbottom=True)
     return figure
@@ -432,7 +436,7 @@ def draw_together(results: Sequence[StudyResult], names: Sequence[str] | None = 
         if cycles:
             parts.append(_last_cycles(result))
         for column, (rows, time) in enumerate(parts):
-            name = f"{label}: {result.verdict['verdict']}" if column == 0 else None
+            name = f"{label}: {verdict_word(result.verdict)}" if column == 0 else None
             panels[0, column].plot(time, h["mass_flow"][rows], label=name, **look)
             panels[1, column].plot(time, 1e3 * h["lip_opening"][rows], **look)
             look["lw"] = 1.5

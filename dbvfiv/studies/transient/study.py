@@ -227,9 +227,8 @@ class TransientResult(StudyResult):
         under = f", {self.case.continuity}" if self.case.continuity else ""
         if not self.begun:
             return [verdict["reason"]]
-        sure = "" if verdict["decided"] else " (not certain)"
         lines = [
-            f"{verdict['verdict']}{sure} after {verdict['time']:.4g} s and {verdict['steps']} steps{under}",
+            f"{figures.verdict_word(verdict)} after {verdict['time']:.4g} s and {verdict['steps']} steps{under}",
             verdict["reason"],
             *([self.stability.sentence(under.removeprefix(", "))] if self.stability else []),
             "",
@@ -311,7 +310,7 @@ class Together:
             frequency = "-" if lip["frequency"] is None else f"{lip['frequency']:.3f}"
             lines.append(
                 f"{name:<{width}}{h['mass_flow'][-1]:>11.5g}{1e3 * h['lip_displacement'][-1]:>9.4g}"
-                f"{1e3 * lip['amplitude']:>14.4g}{frequency:>8}  {result.verdict['verdict']}"
+                f"{1e3 * lip['amplitude']:>14.4g}{frequency:>8}  {figures.verdict_word(result.verdict)}"
             )
         return lines
 

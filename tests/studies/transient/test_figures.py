@@ -7,6 +7,8 @@ from PIL import Image
 import dbvfiv
 from dbvfiv.errors import CaseError
 from dbvfiv.studies.case import thesis_case
+from dbvfiv.studies.transient.figures import draw_together
+from dbvfiv.studies.transient.study import Together
 from dbvfiv.verdict import Series, in_steps
 
 
@@ -31,6 +33,14 @@ def test_the_imbalance_has_an_axis_of_its_own(run):
     reach = np.ptp(rest.get_ylim()) / np.ptp(rest.lines[0].get_ydata())
     assert reach < 3.0  # it can be seen
     assert "of the work turned over" in rest.get_title("left")
+
+
+def test_runs_side_by_side_say_which_verdicts_are_not_certain(run, monkeypatch):
+    for decided in (True, False):
+        monkeypatch.setitem(run.verdict, "decided", decided)
+        legend = [text.get_text() for text in draw_together([run, run], ["one", "two"]).legends[0].get_texts()]
+        for line in (*Together([run], ["one"]).lines()[1:], *legend, run.lines()[0]):
+            assert ("(not certain)" in line) is not decided, line
 
 
 def test_spectra_say_their_resolution_and_print_no_more_digits(run, monkeypatch):
