@@ -4,6 +4,7 @@ where the iteration fails, or by the estimated local error.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -161,12 +162,11 @@ class Drive:
     def __call__(self, time: float) -> float:
         return float(np.interp(time, self.times, self.pressures))
 
-    def constant_after(self, time: float) -> bool:
-        """True where the pressure is constant from a time, s, on."""
-        return (
-            all(p == self.pressures[-1] for t, p in zip(self.times, self.pressures) if t > time)
-            and self(time) == self.pressures[-1]
-        )
+    @property
+    def settled_at(self) -> float:
+        """Time, s, from which on the pressure is constant."""
+        changes = [i for i, pressure in enumerate(self.pressures) if pressure != self.pressures[-1]]
+        return self.times[changes[-1] + 1] if changes else 0.0
 
     @classmethod
     def of(cls, case: Case) -> Drive:
@@ -191,7 +191,7 @@ class RunOptions:
     control : ControlOptions
     step : StepOptions
     save_every : float
-        Distance in time of full states, s; zero for none but the last.
+        Distance in time of full states, s; zero for the first and the last alone.
     restart_every : int
         Steps between restart points.
     stop_when : tuple of str
@@ -210,9 +210,22 @@ class RunOptions:
     judge_every: int = 100
 
     @property
+    def near(self) -> float:
+        """Difference of times, s, that is none: times are sums of steps and rounded as often."""
+        return 1e-3 * self.control.step
+
+    @property
     def end(self) -> float:
         """Time, s, from which on no further step is made: that of the last step but for rounding."""
-        return self.duration * (1 - 1e-12) - 1e-9 * self.control.step
+        return self.duration - self.near
+
+    def states_due(self, time: float) -> int:
+        """Full states due after the start and up to a time, s, but for that at the end."""
+        return math.floor((time + self.near) / self.save_every) if self.save_every else 0
+
+    def next_stop(self, time: float) -> float:
+        """Instant, s, that adaptive steps must meet: the next full state or the end."""
+        return min(self.duration, self.save_every * (self.states_due(time) + 1)) if self.save_every else self.duration
 
     @classmethod
     def of(cls, case: Case) -> RunOptions:

@@ -72,7 +72,7 @@ class Keys(Section):
         "units (time [ms], pressure [kPa]); relative to the case file.",
     )
     save_every: Time = key(
-        0.0, "Distance in time of full states in the result file; zero keeps none but the last.", ge=0, le=1e5
+        0.0, "Distance in time of full states in the result file; zero keeps the first and the last.", ge=0, le=1e5
     )
     restart_every: StrictInt = key(500, "Steps between restart points.", ge=1, le=10_000_000)
     stop_when: tuple[Verdict, ...] = key(

@@ -317,6 +317,8 @@ class Runner:
         self._reader = Reader(self.motion, record.tables[HISTORY].columns)
         self.failures: list[str] = []
         self.interrupted = self.stopped = False
+        self._row: dict[str, Any] = {}  # the last one of the history that this run has made
+        self._saved_at: float | None = None
 
     def start(self, first: MotionState | None = None) -> Runner:
         """Run from the case's first state, or from a given one; a step that is not found ends the run, which keeps
@@ -338,7 +340,8 @@ class Runner:
             self._judge_rubber(state, inlet)
         row = self._reader.first(progress, inlet)
         self.history.append(row)
-        self._save(row)
+        self._row = row
+        self._save()
         self._checkpoint(needed=True)
         return self._go()
 
@@ -377,10 +380,10 @@ class Runner:
 
     def _go(self) -> Runner:
         progress, every = self.progress, self.options.judge_every
-        judged, before, row = _next_verdict(progress.steps, every), self._certain_before(), {}
+        judged, before = _next_verdict(progress.steps, every), self._certain_before()
         try:
             while not self.stopped and progress.state.time < self.options.end:
-                row = self._step()
+                self._step()
                 if gone := self._beyond_pump(progress.state):
                     self._fail(gone)
                     break
@@ -397,8 +400,8 @@ class Runner:
             )
         except KeyboardInterrupt:
             self.interrupted = True
-        if row and not (self.options.save_every and _multiple(progress.state.time, self.options.save_every)):
-            self._save(row)
+        if progress.state.time == self._row.get("time") != self._saved_at:  # a row may be missing when interrupted
+            self._save()
         self.history.flush()
         if not self.interrupted and not self.failures:
             self._checkpoint(needed=True)
@@ -420,30 +423,25 @@ class Runner:
             found = [self._judge().summary()]
         return found[-1]["verdict"] if found and found[-1]["decided"] else ""
 
-    def _step(self) -> dict[str, Any]:
+    def _step(self) -> None:
         options, progress = self.options, self.progress
         before = progress.state.time
-        result = self.control.advance(progress.state, self._next_stop(before))
+        result = self.control.advance(progress.state, options.next_stop(before))
         progress.advance(result)
         time = progress.state.time
         row = self._reader.row(progress, result.load, time - before, result.residuals)
         self.history.append(row)
-        if options.save_every and time >= progress.saved * options.save_every - 1e-9 * options.control.step:
-            self._save(row)
+        self._row = row
+        if options.states_due(time) > options.states_due(before):
+            self._save()
         if progress.steps % options.restart_every == 0:
             self._checkpoint()
         self.record.item(row)
-        return row
 
-    def _next_stop(self, time: float) -> float:
-        """Instant that adaptive steps must meet: the next full state or the end."""
-        every, end = self.options.save_every, self.options.duration
-        if not every:
-            return end
-        return min(end, every * (math.floor(time / every * (1 + 1e-12) + 1e-9) + 1))
-
-    def _save(self, row: dict[str, Any]) -> None:
-        self.history.state(self.progress.state, row)
+    def _save(self) -> None:
+        """Keep the full state of the last row."""
+        self.history.state(self.progress.state, self._row)
+        self._saved_at = self._row["time"]
         self.progress.saved += 1
 
     def _checkpoint(self, needed: bool = False) -> None:
@@ -462,8 +460,8 @@ class Runner:
     def _judge(self) -> RunVerdict:
         state, model = self.progress.state, self.model
         inlet, residual, since = self.drive(state.time), np.nan, 0.0
-        if self.drive.constant_after(state.time):
-            since = self.drive.times[-1]
+        if state.time >= self.drive.settled_at:
+            since = self.drive.settled_at
             if model.pump is not None and self.motion.fluid.moves:
                 inlet = model.pump.pressure(inlet, self._pumped(state))
             if inlet > model.flow.back:
@@ -509,7 +507,3 @@ def _last_verdict(steps: int, every: int) -> int:
     while due <= steps:
         last, due = due, max(due + every, int(1.05 * due))
     return last
-
-
-def _multiple(time: float, every: float) -> bool:
-    return abs(time / every - round(time / every)) < 1e-6

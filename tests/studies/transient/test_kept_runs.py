@@ -14,7 +14,8 @@ import pytest
 import dbvfiv
 from dbvfiv.case import CaseError
 from dbvfiv.motion import stepper
-from dbvfiv.motion.control import RunOptions
+from dbvfiv.motion.control import ControlOptions, RunOptions
+from dbvfiv.motion.scheme import scheme
 from dbvfiv.record.files import Header
 from dbvfiv.record.mesh import MeshData
 from dbvfiv.record.record import GrowingRecord, Journal, StoredRecord
@@ -138,6 +139,32 @@ def test_a_finished_run_goes_on_to_a_later_end(tmp_path, valve):
     longer = dbvfiv.resume(path, duration=0.03)
     assert longer.history["time"][-1] == pytest.approx(0.03) and longer.case.transient.duration == 0.03
     assert load_result(path).complete
+
+
+def test_states_are_due_by_the_time(tmp_path, valve):
+    """An end between two of them shifts none, and the last one is kept once."""
+    path, every = tmp_path / "run.h5", {"transient.duration": 0.005, "transient.save_every": 0.002}
+    times = [state.time for state in transient(valve(SHORT | every), output=path).states]
+    assert times == pytest.approx([0.0, 0.002, 0.004, 0.005])
+    times = [state.time for state in dbvfiv.resume(path, duration=0.01).states]
+    assert times == pytest.approx([0.0, 0.002, 0.004, 0.005, 0.006, 0.008, 0.01])
+    run = transient(valve(SHORT | every | {"transient.save_every": 0.0015}))
+    assert [state.time for state in run.states] == pytest.approx([0.0, 0.002, 0.003, 0.005])
+    run = transient(valve(SHORT | every), observer=Stop(3))
+    assert [state.time for state in run.states] == pytest.approx([0.0, 0.002, 0.003])
+    assert np.allclose(run.states[-1].station_area, run.history["station_area"][-1])
+
+
+@pytest.mark.parametrize("step, duration, every", [(1e-5, 1.0, 0.2), (2e-5, 2.0, 0.2), (5e-5, 1.0, 0.05)])
+def test_rounded_times_meet_the_end_and_the_states(step, duration, every):
+    options = RunOptions(duration, scheme("newmark"), ControlOptions(step), save_every=every)
+    time, steps, saved = 0.0, 0, []
+    while time < options.end:
+        before, time, steps = time, time + step, steps + 1
+        if options.states_due(time) > options.states_due(before):
+            saved.append(time)
+    assert steps == round(duration / step)
+    assert saved == pytest.approx(every * np.arange(1, round(duration / every) + 1), abs=1e-9)
 
 
 def test_torn_restart_points_are_passed_over(tmp_path, valve, all_restart_points):

@@ -117,6 +117,13 @@ def test_storage_law_draws_water_in_through_shut_lips_and_opens(valve, kpa):
     assert run.control.halvings < 30
 
 
+def test_a_hold_is_judged_from_its_begin():
+    assert Drive((0.0, 0.1, 1.0), (0.0, 6e3, 6e3)).settled_at == 0.1
+    assert Drive((0.0, 0.1, 1.0), (6e3, 6e3, 0.0)).settled_at == 1.0
+    assert Drive((0.0, 0.1, 1.0), (0.0, 6e3, 0.0)).settled_at == 1.0
+    assert Drive((0.5,), (6e3,)).settled_at == Drive((0.5, 1.0), (6e3, 6e3)).settled_at == 0.0
+
+
 def test_drives(tmp_path, valve):
     assert Drive.of(valve({"transient.ramp": 0.1}).case)(0.025) == pytest.approx(4500)
     table = tmp_path / "drive.csv"
@@ -124,7 +131,7 @@ def test_drives(tmp_path, valve):
     case = valve().case.replace({"transient.drive_table": str(table)})
     drive = Drive.of(case)
     assert (drive(0.005), drive(0.01), drive(1.0)) == pytest.approx((3e3, 6e3, 6e3))
-    assert drive.constant_after(0.01) and not drive.constant_after(0.005)
+    assert drive.settled_at == pytest.approx(0.01)
 
 
 @pytest.mark.parametrize(
