@@ -74,7 +74,7 @@ class Gathered:
     Attributes
     ----------
     case : Case
-        With settled strain levels.
+        With settled strain levels, and the sealing pressure of a cracking head.
     name : str
     heads : tuple of float, Pa
         Pressures at which the valve was examined.
@@ -298,9 +298,9 @@ def gather(
         point = kept_run("steady", session, path, bar.of("operating point")).states[0].pressure
         session = session.replace({"drive.pressure": point})
     bar.expect(list(planned(session.case)))
-    if session.case.seeks_levels:
-        bar.expect([Run("settled", "levels", "strain levels", {}, 12)])
-        session = session.settle(bar.of("settled"))
+    if case.seeks_levels or case.valve.cracking_head:
+        bar.expect([Run("settled", "levels", "strain levels" if case.seeks_levels else "cracking head", {}, 12)])
+        session = session.settle(bar.of("settled")).at_cracking(bar.of("settled"))
         bar.done("settled")
     sizes = ValveSizes.of(session.described)
     found = Gathered(session.case, name, heads_of(session.case), sizes, levels=str(session.settled or ""))

@@ -187,10 +187,12 @@ class Session:
         """
         if self.case.seeks_levels:
             return self.settle().model
-        return self._at_cracking().model if self.case.valve.cracking_head else self.described
+        return self.at_cracking().model if self.case.valve.cracking_head else self.described
 
-    def _at_cracking(self, observer: Observer | None = None) -> Session:
-        """The session with the sealing pressure that valve.cracking_head asks for."""
+    def at_cracking(self, observer: Observer | None = None) -> Session:
+        """The session with the sealing pressure that valve.cracking_head asks for; itself without one."""
+        if not self.case.valve.cracking_head:
+            return self
         if self._cracks is None:
             ratio = self.case.steady.cracking_area
             found = _attempt(lambda: sealing_for_cracking(self.case, ratio, observer))
@@ -303,17 +305,26 @@ class Session:
         """
         require_consistent(self.case, kind)
         find_study(kind).check(self.case)
-        if self.case.seeks_levels and kind != "levels":
-            return self.settle(observer).perform(kind, output, observer, **choices)
-        if self.case.valve.cracking_head:
-            return self._at_cracking(observer).perform(kind, output, observer, **choices)
-        if self.case.meets_pump(kind):
-            return self._at_operating_point(kind, observer).perform(kind, output, observer, **choices)
+        session = self.asked(kind, observer)
+        if session is not self:
+            return session.perform(kind, output, observer, **choices)
         header = Header.of(kind, self.case, self.name)
         return self._run(kind, header, output, observer, None, choices)
 
+    def asked(self, kind: str, observer: Observer | None = None) -> Session:
+        """The session that a study runs on: what its case leaves to be found is found; itself where nothing is.
+
+        Raises
+        ------
+        CaseError, SolveError
+        """
+        settled = self if kind == "levels" else self.settle(observer)
+        return settled.at_cracking(observer)._at_operating_point(kind, observer)
+
     def _at_operating_point(self, kind: str, observer: Observer | None) -> Session:
-        """The session of the case with the pressure at which valve and pump meet."""
+        """The session with the pressure at which valve and pump meet; itself where a study does not seek it."""
+        if not self.case.meets_pump(kind):
+            return self
         pressure = operating_pressure(self.model, observer)
         changes: dict[str, Any] = {"drive.pressure": pressure}
         if kind == "steady":
@@ -418,16 +429,16 @@ def kept_run(kind: str, session: Session, path: Path, observer: Observer | None 
         If the run was interrupted; what was found is in the file.
     CaseError, SolveError
     """
-    session = session.settle(observer)
+    session = session.asked(kind, observer)
     kept = _load_if_readable(path)
     sheet = {name: getattr(session.case, name) for name in ("project", "report")}  # these compute nothing
     if kept is not None and kept.kind == kind and kept.case.model_copy(update=sheet) == session.case:
-        if kept.complete or kept.failures:
+        if kept.record.complete:
             return kept
         result = resume_result(path, observer, **choices)
     else:
         result = session.perform(kind, path, observer, **choices)
-    if result.interrupted and not result.failures:
+    if not result.record.complete:
         raise KeyboardInterrupt
     return result
 

@@ -7,6 +7,7 @@ import signal
 import subprocess
 import sys
 import time
+from dataclasses import replace
 
 import h5py
 import pytest
@@ -16,10 +17,12 @@ from dbvfiv.cli import run
 from dbvfiv.errors import CaseError, SolveError
 from dbvfiv.model.equilibria import LoadPath
 from dbvfiv.observer import Observer
-from dbvfiv.studies.case import THESIS
+from dbvfiv.record.mesh import MeshData
+from dbvfiv.studies import session as sessions
+from dbvfiv.studies.case import THESIS, load_case
 from dbvfiv.studies.map.column import MapColumn
 from dbvfiv.studies.modes.search import FoundModes
-from dbvfiv.studies.session import Session, load_result
+from dbvfiv.studies.session import Session, find_study, kept_run, load_result
 from dbvfiv.studies.stability.samples import Sample
 from tests.golden.compare import differences, steady
 from tests.observers import Stop
@@ -156,6 +159,48 @@ def test_failed_values_are_not_tried_again(coarse_case, tmp_path, monkeypatch):
     result = resume(path)
     assert tried == [12e3] and result.complete and "12000 Pa" in result.failures[0]
     assert 12e3 not in result.values and len(result.points) == 1
+
+
+@pytest.fixture
+def attempts(monkeypatch):
+    """Cases of steady runs, of which the first misses a pressure and is interrupted, and none finds a state."""
+    cases = []
+
+    def run(_session, record):
+        cases.append(record.header.case)
+        record.begin("steady", 2)
+        if len(cases) == 1:
+            record.fail("At 2 kPa: no state.")
+            raise KeyboardInterrupt
+
+    monkeypatch.setattr(sessions, "find_study", lambda kind: replace(find_study(kind), run=run))
+    return cases
+
+
+def test_a_kept_run_that_missed_a_pressure_and_was_interrupted_goes_on(coarse_case, tmp_path, attempts):
+    path, session = tmp_path / "steady.h5", Session(coarse_case)
+    with pytest.raises(KeyboardInterrupt):
+        kept_run("steady", session, path)
+    for _ in range(2):
+        assert kept_run("steady", session, path).complete and len(attempts) == 2
+
+
+def test_kept_runs_are_those_of_the_pressures_that_were_found(coarse_case, tmp_path, attempts, monkeypatch):
+    """At an operating point, and with the sealing pressure of a cracking head."""
+    attempts.append(None)
+    monkeypatch.setattr(sessions, "operating_pressure", lambda *_: 5e3)
+    monkeypatch.setattr(sessions, "sealing_for_cracking", lambda *_: 300.0)
+    monkeypatch.setattr(Session, "mesh", MeshData.of(Session(coarse_case).model))
+    level = "materials.strain_level=10 %"
+    pump = load_case(None, ["upstream.pump=[[0, 3.0], [0.1, 0.3]]", "upstream.length=3 m", level])
+    cracks = {"valve.sealing_pressure": None, "valve.cracking_head": 0.1}
+    head = load_case("cases/dbv12-moulded.toml", [level]).replace(cracks)
+    for case, key, value in ((pump, "drive", 5e3), (head, "valve", 300.0)):
+        path = tmp_path / f"{key}.h5"
+        for _ in range(2):  # each time by a session that knows nothing
+            kept = kept_run("steady", Session(case), path)
+        assert value in (kept.case.drive.pressure, kept.case.valve.sealing_pressure) and attempts.pop() == kept.case
+        assert len(attempts) == 1
 
 
 def test_the_command_resumes(coarse_case, tmp_path, capsys):
