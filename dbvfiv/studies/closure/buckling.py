@@ -29,13 +29,15 @@ from ...model.load_steps import LoadStepOptions, LoadSteps
 
 #: The eigenvalue at a located buckling state over that at the stable end of its bracket.
 TOLERANCE = 1e-7
+#: Eigenvalues nearest to zero among which the lowest are looked for, at least.
+_FEWEST = 4
 #: How often a state that is not of the path is done without before the search for a nearer one ends.
 _REFUSALS = 6
 
 
 @dataclass(frozen=True, eq=False)
 class StiffnessSpectrum:
-    """Eigenvalues nearest to zero at one state, ascending.
+    """Lowest eigenvalues at one state, ascending.
 
     Attributes
     ----------
@@ -55,9 +57,16 @@ class StiffnessSpectrum:
         """(k,) those of the symmetric part, 1/s2."""
         symmetric = (0.5 * (self.stiffness + self.stiffness.T)).tocsr()
         symmetric.sort_indices()
-        look = {"sigma": 0.0, "OPinv": _inverse(symmetric), "v0": _start(symmetric), "tol": 1e-12}
+
+        def nearest(count: int, shift: float) -> np.ndarray:
+            look = {"sigma": shift, "OPinv": _inverse(symmetric - shift * self.mass), "v0": _start(symmetric)}
+            return np.sort(spla.eigsh(symmetric, count, self.mass, return_eigenvectors=False, tol=1e-12, **look))
+
         try:
-            return np.sort(spla.eigsh(symmetric, len(self.values), self.mass, return_eigenvectors=False, **look))
+            values = nearest(_among(len(self.values), symmetric), 0.0)
+            while (below := nearest(1, shift := _below(values))) < values[0] + 1e-6 * shift:
+                values = np.append(below, values)
+            return values[: len(self.values)]
         except (spla.ArpackError, ArithmeticError) as error:
             raise SolveError(f"The lowest eigenvalues of the symmetric stiffness were not found ({error}).") from error
 
@@ -80,14 +89,16 @@ class StiffnessSpectrum:
 
 
 def stiffness_spectrum(model: Any, q: np.ndarray, pressure: float, count: int = 4) -> StiffnessSpectrum:
-    """Eigenvalues nearest to zero of a state (n,) at a pressure, Pa; see `spectrum_of`."""
+    """Lowest eigenvalues of a state (n,) at a pressure, Pa; see `spectrum_of`."""
     matrix = model.shell.dofs.matrix
     return spectrum_of(matrix(model.tangent(q, pressure).stiffness), matrix(model.mass(q)), pressure, count)
 
 
 def spectrum_of(stiffness, mass, pressure: float, count: int = 4, tolerance: float = 1e-8) -> StiffnessSpectrum:
-    """Eigenvalues nearest to zero of two sparse matrices (n, n) by shift-and-invert Arnoldi (ARPACK) with sparse LU
-    factors.
+    """Lowest eigenvalues of two sparse matrices (n, n) by shift-and-invert Arnoldi (ARPACK) with sparse LU factors.
+
+    Those nearest to zero are found, and what lies below them is looked for until nothing more is found: negative ones
+    may be farther from zero than many positive ones. It is a search and no proof.
 
     Raises
     ------
@@ -95,18 +106,36 @@ def spectrum_of(stiffness, mass, pressure: float, count: int = 4, tolerance: flo
         If the eigenvalues did not converge, or did not to the accuracy asked for.
     """
     try:
-        values, vectors, residuals = _nearest(stiffness, mass, count, 0.0)
-        if residuals.max() > tolerance:
+        most = _among(count, stiffness)
+        found = _nearest(stiffness, mass, most, 0.0)
+        if found[2].max() > tolerance:
             # An eigenvalue next to the shift drowns the others; stand off by a fraction of their distance.
-            values, vectors, residuals = _nearest(stiffness, mass, count, -0.1 * float(np.abs(values).max()))
+            found = _nearest(stiffness, mass, most, -0.1 * float(np.abs(found[0]).max()))
+        while True:
+            shift = _below(found[0])
+            below = _nearest(stiffness, mass, 1, shift)
+            if not below[0].real[0] < found[0].real[0] + 1e-6 * shift:
+                break
+            found = [np.concatenate(pair, axis=-1) for pair in zip(below, found)]
     except (spla.ArpackError, ArithmeticError) as error:
         raise SolveError(f"The lowest stiffness eigenvalues at {pressure:.6g} Pa were not found ({error}).") from error
-    if residuals.max() > tolerance:
+    if found[2].max() > tolerance:
         raise SolveError(
             f"The lowest stiffness eigenvalues at {pressure:.6g} Pa were found to a relative residual of "
-            f"{residuals.max():.2g} only, not to {tolerance:.2g}."
+            f"{found[2].max():.2g} only, not to {tolerance:.2g}."
         )
-    return StiffnessSpectrum(values, vectors, stiffness, mass)
+    values, vectors, _ = found
+    return StiffnessSpectrum(values[:count], vectors[:, :count], stiffness, mass)
+
+
+def _among(count: int, matrix) -> int:
+    """How many eigenvalues of a matrix (n, n) are found to take the lowest of."""
+    return min(max(count, _FEWEST), matrix.shape[0] - 2)
+
+
+def _below(values: np.ndarray) -> float:
+    """A shift to look from for eigenvalues below some."""
+    return -2.0 * float(np.abs(values).max())
 
 
 def _nearest(stiffness, mass, count, shift):

@@ -6,11 +6,13 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy.sparse import diags
 
 from dbvfiv.errors import SolveError
 from dbvfiv.model.closed import ClosedValve, Passage, load_steps
 from dbvfiv.model.load_steps import LoadSteps
 from dbvfiv.studies.case import Case, thesis_case
+from dbvfiv.studies.closure.buckling import spectrum_of
 from dbvfiv.studies.session import Session
 from tests.observers import Stop
 from tests.small_valves import EVEN
@@ -145,6 +147,15 @@ def test_stiffness_is_followed_at_every_step(pressed):
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("count", [1, 2, 4])
+@pytest.mark.parametrize("least", [-500.0, -50.0, 10.0])
+def test_the_lowest_eigenvalue_is_found_behind_nearer_ones(least, count):
+    values = np.array([least, 30.0, 32.0, 35.0, 400.0, 500.0, 900.0, 2e3])
+    found = spectrum_of(diags(values).tocsr(), diags(np.ones(8)).tocsr(), 1e3, count)
+    assert found.values.real == pytest.approx(values[:count]) == found.symmetric_values
+    assert found.lowest == pytest.approx(least) and abs(found.shape[0]) == 1.0
+
+
 def test_without_arclength_a_walk_ends_at_its_limit_point(case):
     """A thin wall ends where arclength finds its first limit point, and says where."""
     thin = case.replace({"valve.thickness_factor": 0.25, "closure.max_step": "0.5 kPa"})
