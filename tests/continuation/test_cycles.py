@@ -241,6 +241,33 @@ def test_events_are_located():
     assert np.isclose(again.points[-1].value, tracer.points[-1].value) and len(again.special) == 1
 
 
+def test_a_restored_branch_tells_what_its_last_step_met():
+    """w' = mu w - w^3 + mu |z|^2 w beside a cycle of z: the exponent of w, 2 mu, passes zero at mu = 0."""
+
+    def rate(u, mu):
+        r2 = u[0] ** 2 + u[1] ** 2
+        own = mu["mu"] * (1 + r2)
+        return jnp.stack([u[0] - u[1] - r2 * u[0], u[0] + u[1] - r2 * u[1], own * u[2] - u[2] ** 3])
+
+    guess = PeriodicMotion.of_samples(np.hstack([CIRCLE, np.zeros((64, 1))]), 2, 1.0)
+    options = ContinuationOptions(limits={"mu": (-1.0, 0.5)})
+    tracer, told = begun(periodic.of_first_order(rate, 3), guess, {"mu": -0.5}, -0.45, "mu", options), []
+    steps = {}
+
+    def tell(item):
+        told.append(item)
+        steps[len(tracer.points)] = tracer.next_step
+
+    tracer.run(tell)
+    assert [special.kind for special in tracer.special] == ["branch point"]
+    passed = next(i for i, point in enumerate(tracer.points) if point.value > 0)
+    again = CycleTracer(tracer.solver, "mu", options)
+    again.restore(tracer.points[: passed + 1])
+    again.run(step=steps[passed + 1])
+    assert [special.value for special in again.special] == [special.value for special in tracer.special]
+    assert [point.value for point in again.points] == [point.value for point in tracer.points]
+
+
 def test_an_event_that_ends_a_branch_is_located_from_one_side():
     """Motions that reach x = -0.6 are refused, and the radius sqrt(mu) is that at 0.36."""
 
