@@ -345,8 +345,9 @@ class Session:
             for sentence in oddities(self.case):
                 record.warn(sentence)
             if self.settled is not None:
-                record.note("settled", text=str(self.settled))
-                for sentence in self.settled.warnings:
+                record.note("settled", text=str(self.settled), warnings=[*self.settled.warnings])
+            for note in record.notes("settled")[-1:]:  # of the first attempt where it goes on
+                for sentence in note.get("warnings", ()):
                     record.warn(sentence)
             try:
                 study.run(self, record, **choices)

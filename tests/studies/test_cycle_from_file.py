@@ -2,12 +2,19 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
-from dbvfiv.errors import CaseError
+from continuation.cycle_points import SpecialCycle
+from dbvfiv.errors import CaseError, SolveError
 from dbvfiv.observer import Observer
+from dbvfiv.record.record import GrowingRecord
+from dbvfiv.studies.cycle import study
+from dbvfiv.studies.orbits import Follower
 from dbvfiv.studies.session import load_result, resume_result
+from tests.observers import Stop
 from tests.studies.test_cycle import session_of
 
 
@@ -48,6 +55,37 @@ def test_both_ways_from_a_cycle_and_resumed(file, tmp_path):
     assert np.isclose(again.amplitude, there.amplitude, rtol=1e-4)
     assert np.all(np.diff([p.amplitude for p in whole.points]) > 0)
     assert "branch" in whole.figures()
+
+
+def test_what_an_ended_leg_missed_is_said_again(file, tmp_path, monkeypatch):
+    """Down from the cycle there is none; on the way up a cycle draws in fluid, and the run is interrupted."""
+    near, row = Follower.near, study.cycle_row
+
+    def only_up(follower, guess, value):
+        if value < 230.0:
+            raise SolveError("No cycle was found.")
+        return near(follower, guess, value)
+
+    path = tmp_path / "ways.h5"
+    with monkeypatch.context() as patched:
+        patched.setattr(Follower, "near", only_up)
+        patched.setattr(study, "cycle_row", lambda *given: row(*given) | {"least_speed": -1.0})
+        part = started(file).perform("cycle", path, Stop(2))
+    assert part.interrupted and len(part.failures) == 1 and len(part.warnings) == 1
+    whole = resume_result(path)
+    assert whole.complete and whole.failures == part.failures and set(part.warnings) <= set(whole.warnings)
+    assert whole.points[0].value == 233.0
+
+
+def test_a_special_point_that_is_met_again_is_kept_once(file):
+    result = load_result(file)
+    record = GrowingRecord(result.header, result.mesh, study.tables_of(result.mesh))
+    orbit = SimpleNamespace(lip_extremes=(0.0, 1e-3))
+    keeper = study._Keeper(record, SimpleNamespace(case=result.case, parameter="density", orbit=lambda _: orbit))
+    point = SimpleNamespace(cycle=None, motion=SimpleNamespace(omega=1.0))
+    for value in (240.0, 240.0 + 1e-9, 241.0):
+        keeper.keep(SpecialCycle("fold", point, value, 0.0, True))
+    assert [note["value"] for note in record.notes(study.SPECIAL)] == [240.0, 241.0]
 
 
 def test_over_another_parameter(file):

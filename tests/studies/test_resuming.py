@@ -8,6 +8,7 @@ import subprocess
 import sys
 import time
 from dataclasses import replace
+from types import SimpleNamespace
 
 import h5py
 import pytest
@@ -183,6 +184,15 @@ def test_a_kept_run_that_missed_a_pressure_and_was_interrupted_goes_on(coarse_ca
         kept_run("steady", session, path)
     for _ in range(2):
         assert kept_run("steady", session, path).complete and len(attempts) == 2
+
+
+def test_what_settled_levels_said_is_said_again(coarse_case, tmp_path, attempts):
+    session = Session(coarse_case)
+    session.settled = SimpleNamespace(warnings=("Strain levels did not settle.",))
+    part = session.perform("steady", tmp_path / "steady.h5")
+    whole = resume(tmp_path / "steady.h5")
+    assert part.interrupted and whole.complete and session.settled.warnings[0] in part.warnings
+    assert whole.warnings == part.warnings and len(attempts) == 2
 
 
 def test_kept_runs_are_those_of_the_pressures_that_were_found(coarse_case, tmp_path, attempts, monkeypatch):

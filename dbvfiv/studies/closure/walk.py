@@ -419,8 +419,6 @@ class ClosureWalk:
                     self.record.append(BUCKLING, row | {"nodal": nodal(b.q), "shape": nodal(b.shape)})
                 else:
                     self.record.note(BUCKLED_CLASS, symmetry=name, **row)
-                    words = symmetry_named(name).words
-                    self._warn([f"The wall buckles at {b.pressure:.6g} Pa in class {name}: {words}."])
             self._kept[name] = len(watch.found)
 
     def _keep_state(
@@ -506,6 +504,9 @@ class ClosureWalk:
         for row in range(min(self.record.rows(BUCKLING), 1)):
             pressure, kind = (self.record.value(BUCKLING, name, row) for name in ("pressure", "kind"))
             self._warn([f"The wall buckles at {pressure:.6g} Pa ({kind}); states at higher pressures lie beyond it."])
+        for note in self.record.notes(BUCKLED_CLASS):
+            where = f"at {note['pressure']:.6g} Pa in class {note['symmetry']}"
+            self._warn([f"The wall buckles {where}: {symmetry_named(note['symmetry']).words}."])
         worst = max(found, key=lambda state: state.overlap, default=None)
         held = self.model.supports == HELD_LIPS
         if worst is not None and worst.overlap > (CROSSED * self.model.case.valve.initial_gap if held else np.inf):

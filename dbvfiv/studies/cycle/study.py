@@ -37,6 +37,10 @@ from ..stability.walk import StabilityWalk
 from .start import find_onset, given_motion
 
 CYCLES, SERIES, SPECIAL, ENDED, VERDICT = "cycles", "series", "special", "ended", "verdict"
+#: Notes on cycles beside an onset that were not found, and on the step to take behind a number of cycles.
+MISSED, STEP = "missed", "step"
+#: Difference of two values of special points over the range up to which they are one.
+SAME = 1e-6
 #: Floquet exponents kept of each cycle.
 KEPT = 20
 
@@ -232,6 +236,12 @@ def layer_ranges(orbit: Orbit) -> LayerRanges:
     )
 
 
+def rows_to_keep(known: Record, _case: Case) -> dict[str, int]:
+    """Rows that a run goes on from: the series of the cycles whose rows vouch for them."""
+    count = known.rows(CYCLES)
+    return {CYCLES: count, SERIES: int((known.column(SERIES, "cycle") < count).sum())}
+
+
 #: Distance of the second cycle from one of a file, over the range.
 AWAY = 0.02
 
@@ -241,6 +251,7 @@ def run(session: Session, record: GrowingRecord) -> None:
     case = session.case
     check_periodic(session.model)
     record.begin("cycle", None)
+    _say_again(record)
     walk = StabilityWalk(case, record, session.model)
     if case.cycle.start == "file":
         _from_file(case, walk, record)
@@ -254,11 +265,24 @@ def run(session: Session, record: GrowingRecord) -> None:
     record.note(VERDICT, **verdict.summary())
 
 
+def _say_again(record: GrowingRecord) -> None:
+    """What an earlier attempt found and still holds."""
+    for note in record.notes(MISSED):
+        record.warn(note["text"])
+    for note in record.notes(ENDED):
+        if note.get("failure"):
+            record.fail(note["failure"])
+    if (record.column(CYCLES, "least_speed") < 0).any():
+        record.warn(DRAWN_IN)
+
+
 def _from_onset(case: Case, walk: StabilityWalk, record: GrowingRecord) -> None:
     axis = case.cycle.axis
     onset = find_onset(case, walk, record)
     if not record.notes("onset"):
         record.note("onset", value=onset.value, frequency=onset.eigenvalue.imag / (2 * np.pi))
+    if record.notes(ENDED):
+        return
     follower = Follower(case, walk, onset.place, axis.parameter, onset.spectrum)
     keeper = _Keeper(record, follower)
     known = read_points(record, onset.place.for_system(), follower.name)
@@ -267,6 +291,7 @@ def _from_onset(case: Case, walk: StabilityWalk, record: GrowingRecord) -> None:
         keeper.known = len(known)
         tracer, missed = follower.begin(onset, axis.values, keeper.keep)
         for sentence in missed:
+            record.note(MISSED, text=sentence)
             record.warn(sentence)
     else:
         tracer = follower.tracer(axis.values, known[0].motion)
@@ -305,6 +330,12 @@ def _from_file(case: Case, walk: StabilityWalk, record: GrowingRecord) -> None:
         keeper.follow(tracer)
 
 
+DRAWN_IN = (
+    "Fluid is drawn in during some cycles. Their flow has the law of outward flow, so they are not to be relied on; "
+    "runs in time have a law for either way."
+)
+
+
 class _Keeper:
     """Keeps the cycles of a branch in a record as they are found."""
 
@@ -312,24 +343,33 @@ class _Keeper:
         self.record, self.follower, self.leg = record, follower, leg
         #: Of the cycles to come, how many the record holds already.
         self.known = 0
+        self._tracer: CycleTracer | None = None
 
     def follow(self, tracer: CycleTracer) -> None:
         """Follow a leg to its end."""
-        self.end(tracer, tracer.run(self.keep))
+        self._tracer, now = tracer, {"leg": self.leg, "cycles": self.record.rows(CYCLES)}
+        steps = [note["step"] for note in self.record.notes(STEP) if now.items() <= note.items()]
+        self.end(tracer, tracer.run(self.keep, steps[-1] if steps else None))
 
     def end(self, tracer: CycleTracer, reason: Said) -> None:
         """Note why a leg ended."""
-        self.record.note(ENDED, reason=reason, leg=self.leg)
+        failure = ""
         if reason.kind is Reason.NO_CYCLE:
             at = f"{self.follower.parameter} = {tracer.points[-1].value:.6g}"
-            self.record.fail(f"At {at} the branch {reason.rstrip('.')}.")
+            failure = f"At {at} the branch {reason.rstrip('.')}."
+        self.record.note(ENDED, reason=reason, leg=self.leg, failure=failure)
+        if failure:
+            self.record.fail(failure)
 
     def keep(self, item: CyclePoint | SpecialCycle) -> None:
         """Keep a cycle, or a special point."""
         record, follower = self.record, self.follower
         if isinstance(item, SpecialCycle):
             orbit = follower.orbit(item.point.cycle)
-            record.note(SPECIAL, **special_note(item, follower.parameter, orbit))
+            note, (low, *_, high) = special_note(item, follower.parameter, orbit), follower.case.cycle.axis.values
+            kept = [k["value"] for k in record.notes(SPECIAL) if k["kind"] == note["kind"]]
+            if not any(abs(value - note["value"]) <= SAME * (high - low) for value in kept):
+                record.note(SPECIAL, **note)
             record.progress(f"{item.kind} at {follower.parameter} = {item.value:.6g}")
             return
         if self.known:
@@ -340,11 +380,10 @@ class _Keeper:
         # the series first: the row vouches for it
         record.extend(SERIES, series_rows(record.rows(CYCLES), item.motion, orbit.model.size))
         record.append(CYCLES, row)
+        if self._tracer is not None:
+            record.note(STEP, leg=self.leg, cycles=record.rows(CYCLES), step=self._tracer.next_step)
         if row["least_speed"] < 0:
-            record.warn(
-                "Fluid is drawn in during some cycles. Their flow has the law of outward flow, so they are not to be "
-                "relied on; runs in time have a law for either way."
-            )
+            record.warn(DRAWN_IN)
         record.item(SimpleNamespace(**row))
 
 
@@ -525,5 +564,6 @@ STUDY = Study(
     run,
     CycleResult,
     lambda case: check_scan(case, case.cycle.axis.parameter),
+    rows_to_keep,
     live=lambda case: print_rows(COLUMNS),
 )

@@ -349,6 +349,8 @@ class Runner:
         """Go on from the last restart point of the record, which must hold the rows up to that and no more."""
         self.progress = progress = Progress.read(self.record, wall=self.motion.wall)
         self._begin(progress.steps)
+        for note in self.record.notes(REFUSAL)[-1:]:
+            self.record.warn(note["text"])
         self.control.unpack(progress.control)
         self.stepper.forget()
         if self.motion.outside is not None:

@@ -8,6 +8,7 @@ import signal
 import subprocess
 import sys
 import time
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -15,6 +16,7 @@ import pytest
 from dbvfiv.api import load, resume
 from dbvfiv.errors import CaseError
 from dbvfiv.studies.case import THESIS, thesis_case
+from dbvfiv.studies.closure.walk import BUCKLED_CLASS, ClosureWalk
 from dbvfiv.studies.session import load_result
 from tests.observers import Stop
 from tests.small_valves import FORMER
@@ -73,6 +75,15 @@ def test_a_walk_that_is_stopped_beyond_a_limit_meets_it_again(tmp_path):
 
 
 @pytest.mark.slow
+def test_what_buckles_in_another_class_is_said_again(whole):
+    """By a walk that has seen no state itself."""
+    walk, said = object.__new__(ClosureWalk), []
+    walk.model, notes = whole.model, {BUCKLED_CLASS: [{"pressure": 7e3, "symmetry": "SA"}]}
+    walk.record = SimpleNamespace(rows=lambda _: 0, notes=notes.get, warn=said.append)
+    walk._warn_of_states()
+    assert len(said) == 1 and said[0].startswith("The wall buckles at 7000 Pa in class SA: ")
+
+
 def test_a_killed_run_has_lost_no_finished_state(whole, tmp_path):
     path = tmp_path / "run.h5"
     words = [f"--set={key}={value}" for key, value in (THESIS | COARSE).items()]
