@@ -88,6 +88,16 @@ def test_a_special_point_that_is_met_again_is_kept_once(file):
     assert [note["value"] for note in record.notes(study.SPECIAL)] == [240.0, 241.0]
 
 
+def test_a_series_without_its_cycle_is_cut(file):
+    result = load_result(file)
+    record = GrowingRecord(result.header, result.mesh, study.tables_of(result.mesh))
+    for number, count in enumerate((2, 3)):
+        motion = result.points[0].orbit.motion.resized(count)
+        record.extend(study.SERIES, study.series_rows(number, motion, result.model.size))
+    record.append(study.CYCLES, result.points[0].numbers)
+    assert study.rows_to_keep(record, result.case) == {study.CYCLES: 1, study.SERIES: 5}
+
+
 def test_over_another_parameter(file):
     """From the nearest cycle of a branch over the density to one over the pressure."""
     (there,) = (p for p in load_result(file).points if p.value == 230.0)
