@@ -7,7 +7,7 @@ cycles; a change of stability or an event is a zero of a test function, by false
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -44,6 +44,7 @@ from continuation.options import (
     require,
 )
 from continuation.periodic import PeriodicMotion
+from continuation.tracer import KNOWN
 
 #: Change of the parameter over its unit that is rounding.
 STILL = 1e-9
@@ -94,6 +95,7 @@ class CycleTracer:
         self.reason, self.next_step = Reason.RUNNING(), options.step
         self._origin: list[CyclePoint] = []
         self._doubtful: tuple[CyclePoint, CyclePoint] | None = None
+        self._known: list[tuple[str, float]] = []
         self._weight = 1.0 / (np.asarray(solver.system.scales) * (options.state_scale or 1.0)) ** 2
 
     # -- the branch
@@ -127,11 +129,16 @@ class CycleTracer:
             self._doubtful = self.points[-2], self.points[-1]
 
     def run(
-        self, report: Callable[[CyclePoint | SpecialCycle], None] = lambda item: None, step: float | None = None
+        self,
+        report: Callable[[CyclePoint | SpecialCycle], None] = lambda item: None,
+        step: float | None = None,
+        known: Iterable[tuple[str, float]] = (),
     ) -> Said:
         """Go on until the parameter leaves its limits, the cycles shrink to nothing, the points are used up or no cycle
-        is found; the reason of the end. `step` is the first step, that of the options by default.
+        is found; the reason of the end. `step` is the first step, that of the options by default; `known` are kinds
+        (or titles) and values of special points that an interrupted run has reported, which are not reported again.
         """
+        self._known = list(known)
         self.reason = self._steps(report, self.options.step if step is None else step)
         self._report(report, self._left_over())
         return self.reason
@@ -157,9 +164,11 @@ class CycleTracer:
         return self._limit() if self._is_over() else Reason.POINTS()
 
     def _report(self, report, found: list[SpecialCycle]) -> None:
-        self.special += found
         for special in found:
-            report(special)
+            alike = (value for kind, value in self._known if kind in (special.kind, special.title))
+            if all(abs(value - special.value) > KNOWN * self.scale for value in alike):
+                self.special.append(special)
+                report(special)
 
     def _limit(self) -> Said:
         return Reason.LIMIT(name=self.parameter, value=self.points[-1].value)

@@ -50,7 +50,7 @@ from continuation.options import (
     require,
 )
 from continuation.periodic import PeriodicMotion, peak
-from continuation.tracer import KNOWN, as_observers, notify, run_observed
+from continuation.tracer import as_observers, notify, run_observed
 
 
 class OrbitSolver(CycleSolver):
@@ -371,7 +371,9 @@ def resume(
     follower = _Follower(system, branch.names[0], options, discretisation, branch.fixed)
     follower.restore(branch)
     step = float(np.clip(branch.next_step or follower.options.step, *follower.step_limits))
-    return follower.run(lambda: follower.tracer.run(follower.take, step), observers)
+    # an interruption may have met a special point before the orbit behind it
+    known = [(s.kind, s.mu[follower.parameter]) for s in branch.special if s.index >= len(branch) - 2]
+    return follower.run(lambda: follower.tracer.run(follower.take, step, known), observers)
 
 
 def orbit_at(system, branch: Branch, index: int, discretisation: OrbitOptions | None = None) -> Orbit:
@@ -415,8 +417,6 @@ class _Follower:
         shape = replace(self.shape, exponents=min(self.shape.exponents, max(n - 1, 1)))
         self.parameter, self.tracer = parameter, CycleTracer(OrbitSolver(system, shape), parameter, kept, shape)
         self.observers: list = []
-        # Special points at the end of a branch handed over, which may be found again.
-        self._known: list[SpecialPoint] = []
 
     def second_orbit(self, first: Cycle) -> Cycle:
         """Orbit a first step along the parameter away from the first one."""
@@ -469,7 +469,6 @@ class _Follower:
     def restore(self, branch: Branch) -> None:
         """Take the points of a branch; the last two with their exponents."""
         self.branch = branch.reopen()
-        self._known = [special for special in branch.special if special.index >= len(branch) - 2]
         lengths = np.cumsum([point.step for point in branch.points])
         points = []
         for i, (point, length) in enumerate(zip(branch.points, lengths)):
@@ -491,17 +490,9 @@ class _Follower:
         if isinstance(item, CyclePoint):
             self._add(self._point(item))
             notify(self.observers, "accepted", branch)
-        elif not self._is_known(special := self._special(item)):
-            branch.special.append(special)
-            notify(self.observers, "found", branch, special)
-
-    def _is_known(self, special: SpecialPoint) -> bool:
-        """True for a special point that the branch handed over has in its last step or beyond it."""
-        near = max(self.options.location_tolerance, KNOWN) * self.tracer.scale
-        return any(
-            known.kind == special.kind and abs(known.mu[self.parameter] - special.mu[self.parameter]) <= near
-            for known in self._known
-        )
+        else:
+            branch.special.append(self._special(item))
+            notify(self.observers, "found", branch, branch.special[-1])
 
     def _z(self, cycle: Cycle) -> np.ndarray:
         return np.concatenate([cycle.motion.coefficients.ravel(), [cycle.motion.period, cycle.mu[self.parameter]]])

@@ -39,8 +39,6 @@ from .start import find_onset, given_motion
 CYCLES, SERIES, SPECIAL, ENDED, VERDICT = "cycles", "series", "special", "ended", "verdict"
 #: Notes on cycles beside an onset that were not found, and on the step to take behind a number of cycles.
 MISSED, STEP = "missed", "step"
-#: Difference of two values of special points over the range up to which they are one.
-SAME = 1e-6
 #: Floquet exponents kept of each cycle.
 KEPT = 20
 
@@ -266,7 +264,7 @@ def run(session: Session, record: GrowingRecord) -> None:
 
 
 def _say_again(record: GrowingRecord) -> None:
-    """What an earlier attempt found and still holds."""
+    """Warn again of what an earlier attempt found and still holds."""
     for note in record.notes(MISSED):
         record.warn(note["text"])
     for note in record.notes(ENDED):
@@ -349,7 +347,8 @@ class _Keeper:
         """Follow a leg to its end."""
         self._tracer, now = tracer, {"leg": self.leg, "cycles": self.record.rows(CYCLES)}
         steps = [note["step"] for note in self.record.notes(STEP) if now.items() <= note.items()]
-        self.end(tracer, tracer.run(self.keep, steps[-1] if steps else None))
+        known = [(note["kind"], note["value"]) for note in self.record.notes(SPECIAL)]
+        self.end(tracer, tracer.run(self.keep, steps[-1] if steps else None, known))
 
     def end(self, tracer: CycleTracer, reason: Said) -> None:
         """Note why a leg ended."""
@@ -365,11 +364,7 @@ class _Keeper:
         """Keep a cycle, or a special point."""
         record, follower = self.record, self.follower
         if isinstance(item, SpecialCycle):
-            orbit = follower.orbit(item.point.cycle)
-            note, (low, *_, high) = special_note(item, follower.parameter, orbit), follower.case.cycle.axis.values
-            kept = [k["value"] for k in record.notes(SPECIAL) if k["kind"] == note["kind"]]
-            if not any(abs(value - note["value"]) <= SAME * (high - low) for value in kept):
-                record.note(SPECIAL, **note)
+            record.note(SPECIAL, **special_note(item, follower.parameter, follower.orbit(item.point.cycle)))
             record.progress(f"{item.kind} at {follower.parameter} = {item.value:.6g}")
             return
         if self.known:
