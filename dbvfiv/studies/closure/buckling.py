@@ -13,9 +13,9 @@ each other; lips that move together slide without friction and turn their contac
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -58,15 +58,13 @@ class StiffnessSpectrum:
         symmetric = (0.5 * (self.stiffness + self.stiffness.T)).tocsr()
         symmetric.sort_indices()
 
-        def nearest(count: int, shift: float) -> np.ndarray:
+        def nearest(count: int, shift: float) -> tuple[np.ndarray]:
             look = {"sigma": shift, "OPinv": _inverse(symmetric - shift * self.mass), "v0": _start(symmetric)}
-            return np.sort(spla.eigsh(symmetric, count, self.mass, return_eigenvectors=False, tol=1e-12, **look))
+            return (np.sort(spla.eigsh(symmetric, count, self.mass, return_eigenvectors=False, tol=1e-12, **look)),)
 
         try:
-            values = nearest(_among(len(self.values), symmetric), 0.0)
-            while (below := nearest(1, shift := _below(values))) < values[0] + 1e-6 * shift:
-                values = np.append(below, values)
-            return values[: len(self.values)]
+            found = _with_those_below(nearest(_among(len(self.values), symmetric), 0.0), nearest)
+            return found[0][: len(self.values)]
         except (spla.ArpackError, ArithmeticError) as error:
             raise SolveError(f"The lowest eigenvalues of the symmetric stiffness were not found ({error}).") from error
 
@@ -105,37 +103,38 @@ def spectrum_of(stiffness, mass, pressure: float, count: int = 4, tolerance: flo
     SolveError
         If the eigenvalues did not converge, or did not to the accuracy asked for.
     """
+    nearest, most = partial(_nearest, stiffness, mass), _among(count, stiffness)
     try:
-        most = _among(count, stiffness)
-        found = _nearest(stiffness, mass, most, 0.0)
+        found = nearest(most, 0.0)
         if found[2].max() > tolerance:
             # An eigenvalue next to the shift drowns the others; stand off by a fraction of their distance.
-            found = _nearest(stiffness, mass, most, -0.1 * float(np.abs(found[0]).max()))
-        while True:
-            shift = _below(found[0])
-            below = _nearest(stiffness, mass, 1, shift)
-            if not below[0].real[0] < found[0].real[0] + 1e-6 * shift:
-                break
-            found = [np.concatenate(pair, axis=-1) for pair in zip(below, found)]
+            found = nearest(most, -0.1 * float(np.abs(found[0]).max()))
+        values, vectors, residuals = _with_those_below(found, nearest)
     except (spla.ArpackError, ArithmeticError) as error:
         raise SolveError(f"The lowest stiffness eigenvalues at {pressure:.6g} Pa were not found ({error}).") from error
-    if found[2].max() > tolerance:
+    if residuals.max() > tolerance:
         raise SolveError(
             f"The lowest stiffness eigenvalues at {pressure:.6g} Pa were found to a relative residual of "
-            f"{found[2].max():.2g} only, not to {tolerance:.2g}."
+            f"{residuals.max():.2g} only, not to {tolerance:.2g}."
         )
-    values, vectors, _ = found
     return StiffnessSpectrum(values[:count], vectors[:, :count], stiffness, mass)
 
 
 def _among(count: int, matrix) -> int:
-    """How many eigenvalues of a matrix (n, n) are found to take the lowest of."""
+    """Number of eigenvalues of a matrix (n, n) that are found to take the lowest of."""
     return min(max(count, _FEWEST), matrix.shape[0] - 2)
 
 
-def _below(values: np.ndarray) -> float:
-    """A shift to look from for eigenvalues below some."""
-    return -2.0 * float(np.abs(values).max())
+def _with_those_below(found: Sequence[np.ndarray], nearest: Callable[[int, float], Sequence[np.ndarray]]):
+    """Eigenvalues (k,), ascending, and what else is found of them along last axes, with those below them that a search
+    next to shifts farther down finds.
+    """
+    while True:
+        shift = -2.0 * float(np.abs(found[0]).max())
+        below = nearest(1, shift)
+        if not below[0].real[0] < found[0].real[0] + 1e-6 * shift:
+            return found
+        found = [np.concatenate(pair, axis=-1) for pair in zip(below, found)]
 
 
 def _nearest(stiffness, mass, count, shift):
