@@ -14,7 +14,7 @@ import shlex
 import signal
 import sys
 import threading
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from datetime import UTC, datetime
@@ -386,24 +386,21 @@ class Attachment:
 
 def attachments_of(case: Case) -> tuple[Attachment, ...]:
     """The files that a case names, each once; results of other runs are left where they are."""
-    paths = dict.fromkeys(str(path) for path in _paths(case))
+    paths = dict.fromkeys(str(path) for path in _paths(case) if not h5py.is_hdf5(path))
     found = {path: _contents(Path(path)) for path in paths}
-    return tuple(
-        Attachment(path, data) for path, data in found.items() if data is not None and not data.startswith(_HDF5)
-    )
+    return tuple(Attachment(path, data) for path, data in found.items() if data is not None)
 
 
-def placed(data: Any, attachments: tuple[Attachment, ...]) -> Any:
-    """Plain data of a case with the names of its files replaced by names of files that exist."""
+def renamed(data: Any, names: Mapping[str, str]) -> Any:
+    """Plain data of a case with the names of its files replaced by others."""
     if isinstance(data, dict):
-        return {name: placed(value, attachments) for name, value in data.items()}
+        return {name: renamed(value, names) for name, value in data.items()}
     if isinstance(data, list):
-        return [placed(value, attachments) for value in data]
+        return [renamed(value, names) for value in data]
     if not isinstance(data, str):
         return data
     samples = samples_file(data)
-    name = data if samples is None else str(samples)
-    there = next((a.place() for a in attachments if a.path == name), None)
+    there = names.get(data if samples is None else str(samples))
     return data if there is None else there if samples is None else f"samples({there})"
 
 
@@ -422,10 +419,6 @@ def _paths(value: Any) -> Iterator[Path]:
     elif isinstance(value, (list, tuple)):
         for item in value:
             yield from _paths(item)
-
-
-#: First bytes of HDF5 files.
-_HDF5 = b"\x89HDF\r\n\x1a\n"
 
 
 def _contents(path: Path) -> bytes | None:
@@ -485,7 +478,9 @@ class Header:
         """The case, with files that have gone or changed since put back from the attachments."""
         if not self.attachments:
             return self.case
-        return type(self.case).from_dict(placed(self.case.to_dict(), self.attachments))
+        return type(self.case).from_dict(
+            renamed(self.case.to_dict(), {one.path: one.place() for one in self.attachments})
+        )
 
 
 def versions() -> dict[str, str]:
@@ -532,11 +527,12 @@ def read_header(file: h5py.File, case_model: type[Case]) -> Header:
     attributes = file.attrs
     files = file["case/files"]
     attached = [Attachment(str(files[name].attrs["path"]), _bytes_of(files[name])) for name in sorted(files, key=int)]
+    places = {one.path: one.place() for one in attached}
     return Header(
         kind=str(attributes["dbvfiv_kind"]),
-        case=_case(placed(json.loads(file["case/json"].asstr()[()]), tuple(attached)), case_model),
+        case=_case(renamed(json.loads(file["case/json"].asstr()[()]), places), case_model),
         versions={name: str(version) for name, version in file["versions"].attrs.items()},
-        attachments=tuple(replace(one, path=one.place()) for one in attached),
+        attachments=tuple(replace(one, path=places[one.path]) for one in attached),
         complete=bool(attributes["complete"]),
         layout=int(attributes["layout"]),
         **{name: str(attributes[name]) for name in ("name", "program", "created", "command")},
