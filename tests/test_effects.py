@@ -20,7 +20,7 @@ def of_model(case):
 
 
 def of_spectrum(case):
-    """What the root mean squares are without, of a power that falls by half up to 50 Hz and to nothing at 60 Hz."""
+    """Share left out of root mean squares, of a power that falls by half up to 50 Hz and to nothing at 60 Hz."""
     with NamedTemporaryFile("w", suffix=".csv") as file:
         file.write("10, 4\n50, 2\n60, 0\n")
         file.flush()

@@ -137,17 +137,17 @@ class MaterialDamping:
     @property
     def note(self) -> str | None:
         """A sentence where the fit is poor, or the factor is not met."""
-        if self.fit is None or self.fit.largest_error <= _FAIR:
-            if self.missed <= _FAIR:
-                return None
+        if self.fit is not None and self.fit.largest_error > _FAIR:
+            return (
+                f"{self.name}: the series misses the {self.fit.quantity} by up to {self.fit.largest_error:.0%}; more "
+                "damping.branches or a narrower damping.band help unless the data scatter."
+            )
+        if self.missed > _FAIR:
             return (
                 f"{self.name}: with damping.loss_factor the series misses tan delta by up to {self.missed:.0%} of it; "
                 "more damping.branches or a lower factor help."
             )
-        return (
-            f"{self.name}: the series misses the {self.fit.quantity} by up to {self.fit.largest_error:.0%}; more "
-            "damping.branches or a narrower damping.band help unless the data scatter."
-        )
+        return None
 
 
 def relaxation_from_case(case: Case, name: str) -> Prony | None:

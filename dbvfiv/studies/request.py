@@ -143,6 +143,10 @@ PressureOption = Annotated[
 DensityOption = Annotated[
     str | None, typer.Option("--density", metavar="RHO", help="Fluid density in place of fluid.density.")
 ]
+AnimationOption = Annotated[
+    Path | None,
+    typer.Option("--animate", metavar="FILE.gif", callback=require_gif, help="Write an animation of the last cycle."),
+]
 LawOption = Annotated[
     str | None,
     typer.Option("--law", metavar="LAW", help="Flow model in place of fluid.continuity: quasi-steady or storage."),
@@ -189,9 +193,3 @@ class Request:
     further: Callable[[Any], list[Path]] | None = None
     sheet: Callable[[Sequence[Any]], Path] | None = None
     variants: tuple[dict[str, Any], ...] = ()
-
-
-AnimationOption = Annotated[
-    Path | None,
-    typer.Option("--animate", metavar="FILE.gif", callback=require_gif, help="Write an animation of the last cycle."),
-]

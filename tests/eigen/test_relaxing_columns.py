@@ -161,7 +161,7 @@ def test_columns_carry_certificates_whatever_relaxes():
 
 
 def test_an_uncoupled_column_takes_no_relaxation_for_another():
-    """Of a family that keeps none but the last, so that others may come to lie where it was."""
+    """Relaxation of a family that keeps none but the last, so that others may come to lie where it was."""
 
     class Forgetful(RelaxingFamily):
         def relaxation(self, mu):

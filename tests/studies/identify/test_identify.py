@@ -236,7 +236,7 @@ def found_of(valve, seed, folder):
     "valves, least, most", [(2, 0.75, 1.0), pytest.param(25, 0.90, 0.99, marks=pytest.mark.random)]
 )
 def test_intervals_hold_hidden_inputs_and_onsets(valves, least, most, tmp_path):
-    """Of so many valves under each kind of damping; of few, the binomial distribution leaves more room beside 95 %."""
+    """Shares of valves under each kind of damping; of few, the binomial distribution leaves more room beside 95 %."""
     more = {"identify.samples": 24, "identify.round": 8, "identify.over": "pressure=2000,3000,4000,6000,9000"}
     inputs, begins = [], []
     for names, keys in (RAYLEIGH, ELASTIC):
