@@ -266,6 +266,11 @@ def test_a_restored_branch_tells_what_its_last_step_met():
     again.run(step=steps[passed + 1])
     assert [special.value for special in again.special] == [special.value for special in tracer.special]
     assert [point.value for point in again.points] == [point.value for point in tracer.points]
+    for off, count in ((1e-9, 0), (1e-3, 1)):
+        again.restore(tracer.points[: passed + 1])
+        again.special.clear()
+        again.run(step=steps[passed + 1], known=[("branch point", tracer.special[0].value + off)])
+        assert len(again.special) == count
 
 
 def test_an_event_that_ends_a_branch_is_located_from_one_side():

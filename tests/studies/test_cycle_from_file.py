@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from continuation.cycle_points import SpecialCycle
+from continuation.options import Reason
 from dbvfiv.errors import CaseError, SolveError
 from dbvfiv.observer import Observer
 from dbvfiv.record.record import GrowingRecord
@@ -77,15 +78,20 @@ def test_what_an_ended_leg_missed_is_said_again(file, tmp_path, monkeypatch):
     assert whole.points[0].value == 233.0
 
 
-def test_a_special_point_that_is_met_again_is_kept_once(file):
+def test_special_points_of_the_part_before_are_told_to_the_branch(file):
     result = load_result(file)
     record = GrowingRecord(result.header, result.mesh, study.tables_of(result.mesh))
     orbit = SimpleNamespace(lip_extremes=(0.0, 1e-3))
     keeper = study._Keeper(record, SimpleNamespace(case=result.case, parameter="density", orbit=lambda _: orbit))
     point = SimpleNamespace(cycle=None, motion=SimpleNamespace(omega=1.0))
-    for value in (240.0, 240.0 + 1e-9, 241.0):
+    for value in (240.0, 241.0):
         keeper.keep(SpecialCycle("fold", point, value, 0.0, True))
-    assert [note["value"] for note in record.notes(study.SPECIAL)] == [240.0, 241.0]
+    told = []
+    tracer = SimpleNamespace(
+        next_step=0.01, points=[], run=lambda report, step, known: told.extend(known) or Reason.POINTS()
+    )
+    keeper.follow(tracer)
+    assert told == [("fold", 240.0), ("fold", 241.0)]
 
 
 def test_a_series_without_its_cycle_is_cut(file):
