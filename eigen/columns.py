@@ -342,7 +342,8 @@ def cell_beside(reduction: FamilyReduction, mu: Hashable, error: float, safety: 
     values = model.eigenvalues(mu)
     places = family.reach(mu).leading(values)[: OPTIONS.beside]
     change = reduction.correction(model.near(mu, places), mu)
-    leading = places + change
+    order = np.argsort(-(places + change).real)
+    leading, change = (places + change)[order], change[order]
     doubt = np.maximum(np.abs(change), error * np.abs(leading)) / np.abs(leading.real)
     clear = bool(np.isfinite(leading).all() and doubt.max(initial=0.0) <= 1.0 / safety)
     band = _counted_band(family, mu)
@@ -413,7 +414,8 @@ def _corrected(model: ReducedColumn, points, leading: list[np.ndarray]) -> tuple
         listed = leading[i][: OPTIONS.held]
         exact = listed + change(i)
         if error(i) <= np.sqrt(OPTIONS.tolerance) and ((exact.real > 0) == (listed.real > 0)).all():
-            found[i], trusted[i] = np.concatenate([exact, leading[i][OPTIONS.held :]]), True
+            row = np.concatenate([exact, leading[i][OPTIONS.held :]])
+            found[i], trusted[i] = row[np.argsort(-row.real)], True
     return found, trusted
 
 

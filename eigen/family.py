@@ -29,18 +29,21 @@ SAMPLED = (0.0, 0.9, 2.0, 5.0, 20.0, 100.0, 1e3)
 class Reach(NamedTuple):
     """Region in which leading modes lie: growth rates above `floor` (1/s), angular frequencies up to `band` (rad/s).
 
-    Left of `creep` (1/s), which is minus infinity for an elastic wall, strongly damped and slow eigenvalues do not
-    count.
+    Left of `creep` (1/s), which is minus infinity for an elastic wall, strongly damped eigenvalues do not count, nor do
+    those slower than `lowest` (rad/s), a share of the band unless it is given.
     """
 
     floor: float
     band: float
     creep: float = -np.inf
+    lowest: float | None = None
 
     def is_mode(self, values: np.ndarray) -> np.ndarray:
         """Mask of eigenvalues that are modes and no relaxation."""
         values = np.asarray(values)
-        lowest = LOWEST * self.band if np.isfinite(self.band) else 0.0
+        lowest = self.lowest
+        if lowest is None:
+            lowest = LOWEST * self.band if np.isfinite(self.band) else 0.0
         high = np.abs(values.imag)
         return (values.real > self.creep) | ((-values.real <= SLOPE * high) & (high >= lowest))
 
@@ -126,7 +129,8 @@ class PencilFamily(ABC):
         options = self.search(mu)
         floor = -np.inf if options.limit_point is None else CLEAR * options.limit_point
         band = np.inf if options.max_frequency is None else 2 * np.pi * options.max_frequency
-        return Reach(floor, band, edge_of(self.relaxation(mu)))
+        lowest = None if options.lowest is None else 2 * np.pi * options.lowest
+        return Reach(floor, band, edge_of(self.relaxation(mu)), lowest)
 
 
 class Pairs(NamedTuple):

@@ -101,7 +101,9 @@ def plan_shifts(pencil, count, options, workspace):
         return options, None
     if pencil.relaxation is not None:
         # all from the lowest frequency to the highest lie as high above the real axis of 1 / (lambda - shift)
-        return options, 0.9 * LOWEST**-0.5 * lowest_sought(pencil, count, options, workspace)
+        lowest = lowest_sought(pencil, count, options, workspace)
+        highest = lowest / LOWEST if options.max_frequency is None else 2 * np.pi * options.max_frequency
+        return options, 0.9 * np.sqrt(lowest * highest)
     first = first_shift(pencil, max(count, options.least), options, workspace)
     if options.limit_point is None:
         return options, first
@@ -121,6 +123,8 @@ def holding_shift(options, growth) -> float:
 
 def lowest_sought(pencil, count, options, workspace) -> float:
     """Angular frequency above which a search where the stiffness relaxes has to be complete, rad/s."""
+    if options.lowest is not None:
+        return 2 * np.pi * options.lowest
     if options.max_frequency is not None:
         return LOWEST * 2 * np.pi * options.max_frequency
     return LOWEST * first_shift(pencil, max(count, options.least), options, workspace)

@@ -11,8 +11,9 @@ import numpy as np
 CLEAR = 0.8
 #: Share of it at which a search ends: nearer to it no number of restarts helps.
 END = 0.97
-#: Lowest frequency searched where the stiffness relaxes, over the highest, and decay over angular frequency down to
-#: which such a search goes at most; slower and more strongly damped motions shade off into relaxation.
+#: Lowest frequency searched where the stiffness relaxes, over the highest unless it is given, and decay over angular
+#: frequency down to which such a search goes at most; slower and more strongly damped motions shade off into
+#: relaxation.
 LOWEST, SLOPE = 0.05, 0.75
 
 
@@ -54,6 +55,8 @@ class SearchOptions:
     resolved : float
         Hz, up to which the pencil stands for what it is made of, such as the waves of a line of elements; eigenvalues
         above it say nothing and are not counted.
+    lowest : float or None
+        Hz, from which a search is complete where the stiffness relaxes; by default a share of `max_frequency`.
     inside : float
         Share of a band, or of what is resolved, up to which eigenvalues are counted, clear of those at its end.
     """
@@ -68,6 +71,7 @@ class SearchOptions:
     least: int = 6
     max_shifts: int = 4
     resolved: float = math.inf
+    lowest: float | None = None
     inside: float = 0.999
 
     @property

@@ -226,7 +226,8 @@ def require_equilibrium(model: ValveModel, state: SteadyState) -> None:
         )
     scale = model.force_scale(state.q, state.pressure)
     unbalanced = float(np.linalg.norm(model.residual(state.q, state.pressure)))
-    allowed = max(_UNBALANCED * scale, 1e3 * model.rounding(state.q, model.tangent(state.q, state.pressure)))
+    share = max(_UNBALANCED, model.case.steady.tolerance)
+    allowed = max(share * scale, 1e3 * model.rounding(state.q, model.tangent(state.q, state.pressure)))
     if not unbalanced <= allowed:
         raise SolveError(
             f"The state at {state.pressure:.6g} Pa is no equilibrium of this model: its unbalanced force is "

@@ -8,14 +8,14 @@ from enum import Enum
 
 import numpy as np
 
-from eigen.spectrum import CLEAR, SearchOptions
+from eigen.spectrum import CLEAR, LOWEST, SearchOptions
 
 from ..case.model import Case
 from ..case.parameters import Mu
 from ..texts import digits
 
-#: Room above the highest structural frequency that a band is made for.
-ROOM = 1.05
+#: Room above the highest structural frequency that a band is made for, and the least of these that it holds.
+ROOM, LEAST_MODES = 1.05, 10
 #: What is left out of lists of modes where materials relax.
 CREEP = (
     "Materials with loss factors creep: after a push a part of the deflection dies out slowly, without swinging. Such "
@@ -145,7 +145,9 @@ def select_search(
     Stiffness damping orders modes by frequency until they reach the limit point -1/beta: leading modes are those of
     largest growth rate, right of it. Without it growth rates of high modes do not fall, so that "leading" has a meaning
     within a band of frequencies only: the one asked for, or one that holds as many structural frequencies in vacuo as
-    modes are wanted. Loss factors do not order modes either. A band that was asked for is respected under any damping.
+    modes are wanted. Loss factors do not order modes either: slow motions shade off into relaxation, and the lower end
+    of the search goes by the first structural frequencies, however wide the band. A band that was asked for is
+    respected under any damping.
 
     Parameters
     ----------
@@ -155,7 +157,8 @@ def select_search(
         Only the stiffness damping and the factor on the loss factors matter.
     structural_frequencies : callable
         From a number to that many lowest frequencies of the undamped structure in vacuo at the state, Hz, ascending;
-        fewer where there are no more; not called where a band was asked for. `eigen.lowest_frequencies` computes them.
+        fewer where there are no more; not called where a band was asked for without loss factors.
+        `eigen.lowest_frequencies` computes them.
     count : int
         Modes wanted, a conjugate pair being one.
     resolved : float
@@ -179,6 +182,10 @@ def select_search(
         found = replace(found, options=replace(found.options, resolved=resolved))
     if found.band > resolved:
         found = replace(found, options=replace(found.options, max_frequency=resolved), origin=BandOrigin.LINE)
+    if found.creeps and np.isfinite(found.band):
+        first = ROOM * np.asarray(structural_frequencies(LEAST_MODES), float)[:LEAST_MODES].max(initial=0.0)
+        if 0 < first < found.band:
+            found = replace(found, options=replace(found.options, lowest=LOWEST * first))
     return replace(found, claimed=min(wanted, resolved), wanted=wanted)
 
 

@@ -1,5 +1,6 @@
 """Columns: one family of pencils under many conditions, against dense eigenvalues."""
 
+from types import SimpleNamespace
 from typing import NamedTuple
 
 import numpy as np
@@ -8,7 +9,7 @@ import scipy.linalg as la
 import scipy.sparse as sp
 
 from eigen import Certificate, ColumnSolver, PencilFamily, SearchOptions, certified_spectrum
-from eigen.columns import DIRECT, REDUCED
+from eigen.columns import DIRECT, REDUCED, _corrected
 from eigen.operator import FLUID_PARTS
 from eigen.reduction import FamilyReduction
 
@@ -128,3 +129,11 @@ def test_counts_need_no_damping_at_all():
     reduced = FamilyReduction(family).wide
     counts = [reduced.count(mu) for mu in conditions(0.0, 0.0, 0.0)]
     assert all(count.line > 0 and count.certain for count in counts)
+
+
+def test_corrected_eigenvalues_are_sorted_by_growth_rate():
+    """Corrections of 5e-4 of the size exchange the first two."""
+    change = np.array([-0.05, 0.05])
+    model = SimpleNamespace(error=0.0, corrected=lambda point, values: change)
+    (found,), trusted = _corrected(model, [None], [np.array([-1.0 + 100j, -1.01 + 101j])])
+    assert trusted.all() and found == pytest.approx([-0.96 + 101j, -1.05 + 100j])

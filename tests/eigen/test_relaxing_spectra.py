@@ -69,6 +69,17 @@ def test_each_mode_of_a_beam_has_its_own_equation(method):
     assert modes.biorthogonality < 1e-7 and modes.residual.max() < 1e-8
 
 
+def test_a_lower_end_that_is_given_keeps_slow_modes_in_a_wide_band():
+    """The slowest mode leads a band of 40 times its frequency, of which it lies below the share that is searched."""
+    pencil, _, roots = relaxing_beam(24)
+    first = roots[np.argmin(roots.imag)]
+    slow = first.imag / (2 * np.pi)
+    options = SearchOptions(max_frequency=40 * slow, lowest=0.8 * slow)
+    modes = leading_modes(pencil, 6, options)
+    assert np.abs(modes.eigenvalues - first).min() < 1e-9 * abs(first)
+    assert modes.region.lowest == pytest.approx(2 * np.pi * 0.8 * slow)
+
+
 @pytest.mark.parametrize("shifts", [(30.0,), (20.0, 120.0), (15 + 60j,), (40.0, 10 + 120j)])
 def test_any_shift_gives_the_same_modes(shifts):
     pencil, _, roots = relaxing_beam(24)

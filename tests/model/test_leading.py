@@ -75,9 +75,18 @@ def test_loss_factors_do_not_order_the_modes(beta):
     assert found.options.limit_point is None and np.isinf(found.floor)
     assert "Loss factors" in found.note and len(found.notes) == 2 and "creep" in found.notes[1]
     asked = select_search(
-        SearchOptions(max_frequency=60.0), Mu(density=10.0, alpha=0.0, beta=beta, loss_factor=1.0), never, 3
+        SearchOptions(max_frequency=60.0), Mu(density=10.0, alpha=0.0, beta=beta, loss_factor=1.0), lowest, 3
     )
     assert asked.band == 60.0 and asked.note is None and "creep" in asked.notes[0]
+
+
+@pytest.mark.parametrize("band, share", [(20.0, None), (400.0, 0.05 * 1.05 * 41.0)])
+def test_the_lower_end_of_a_wide_band_goes_by_the_first_frequencies(band, share):
+    """Where loss factors damp, slow modes lead however high a search goes."""
+    asked = select_search(SearchOptions(max_frequency=band), Mu(density=10.0, loss_factor=1.0), lowest, 3)
+    assert asked.band == band and asked.options.lowest == pytest.approx(share)
+    many = select_search(SearchOptions(), Mu(density=10.0, loss_factor=1.0), lambda n: 4.0 * np.arange(1.0, n + 1), 50)
+    assert many.band == pytest.approx(210.0) and many.options.lowest == pytest.approx(0.05 * 42.0)
 
 
 def test_what_a_band_left_open():

@@ -401,7 +401,7 @@ def run_modes(
     notes = (*search.notes, *certified.spectrum.notes)
     if symmetry.of_equilibria and not (model.mesh.part.is_quarter or in_vacuo):
         notes = (*notes, _NO_PLUG)
-    searched = family.is_searched(certified.spectrum.eigenvalues, place, search.band)
+    searched = family.is_searched(certified.spectrum.eigenvalues, place, search)
     verdict = _verdict(certified, searched, search, linear.seal is not None)
     if verdict.outcome == STABLE and certified.count.band < asked.whole:
         beyond = missing_pairs(

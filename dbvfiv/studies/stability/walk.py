@@ -24,7 +24,7 @@ from ...errors import CaseError, NotValidError, SolveError
 from ...model.classes import linearise_class
 from ...model.dynamics import LinearisedState
 from ...model.equilibria import LoadPath, SteadyOptions
-from ...model.leading import LeadingSearch, select_search
+from ...model.leading import LEAST_MODES, LeadingSearch, select_search
 from ...model.material_stability import material_stability
 from ...model.state import SteadyState
 from ...model.symmetry import Symmetry, equilibria_of
@@ -41,8 +41,6 @@ _KEPT = 256
 _STATES = 400
 #: Relative accuracy of the pressure at which valve and pump meet.
 MET = 1e-10
-#: Structural frequencies in vacuo that a band holds at least.
-LEAST_MODES = 10
 
 
 class ValveFamily(PencilFamily):
@@ -103,13 +101,15 @@ class ValveFamily(PencilFamily):
             self._searches[key] = select_search(asked, mu, self._lowest, self.modes, resolved)
         return self._searches[key]
 
-    def is_searched(self, values: np.ndarray, mu: Mu, band: float) -> np.ndarray:
+    def is_searched(self, values: np.ndarray, mu: Mu, search: LeadingSearch) -> np.ndarray:
         """Eigenvalues in the region that every study searches, (k,) bool: beside it lie relaxations of the wall, and
-        modes of it that are slow and strongly damped; `band` is in Hz.
+        modes of it that are slow and strongly damped.
         """
         if not mu.loss_factor:
             return np.ones(len(values), bool)
-        return Reach(-np.inf, 2 * np.pi * band, edge_of(self.relaxation(mu))).is_mode(values)
+        lowest = search.options.lowest
+        lowest = None if lowest is None else 2 * np.pi * lowest
+        return Reach(-np.inf, 2 * np.pi * search.band, edge_of(self.relaxation(mu)), lowest).is_mode(values)
 
     def relaxation(self, mu: Mu) -> Relaxation | None:
         """Viscoelastic part of the stiffness, with the factor on all loss factors; None for an elastic wall."""
