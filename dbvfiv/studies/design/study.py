@@ -101,7 +101,8 @@ def run(session: Session, record: GrowingRecord, cases: Path | None = None) -> N
                 share = search.share(best)
             design = search.from_start(share, case.design.evaluations)
             if design is None:
-                record.fail(f"From start {i + 1} no valve could be computed. {tried[-1]}")
+                why = next((one for one in reversed(tried) if isinstance(one, str)), "")
+                record.fail(f"From start {i + 1} no valve could be computed. {why}".rstrip())
                 continue
             found.append(design)
             record.note(_DESIGN, design=number, start=i, **asdict(design))
@@ -112,7 +113,7 @@ def run(session: Session, record: GrowingRecord, cases: Path | None = None) -> N
             continue
         if not best.holds:
             record.warn(
-                f"No design holds all constraints{_for(bound, bounds)}: the nearest misses one by {best.violation:.2%}."
+                f"No design holds all constraints{_for(bound, bounds)}: the nearest misses one {_missed(best)}."
             )
         if cases is not None:
             _write(problem.case_at(best.values), cases / f"design-{number + 1}.toml")
@@ -122,6 +123,11 @@ def run(session: Session, record: GrowingRecord, cases: Path | None = None) -> N
 
 def _for(bound: float, bounds) -> str:
     return f" with the bound {bound:g}" if len(bounds) > 1 else ""
+
+
+def _missed(design: Design) -> str:
+    """By how much a design misses a constraint."""
+    return f"by {design.violation:.2%}" if np.isfinite(design.violation) else "at a head where it has no state"
 
 
 def _tell(record: GrowingRecord, tried: list[Design | str], one: Design | str) -> None:
@@ -380,9 +386,7 @@ class DesignResult(StudyResult):
             lines.append(_line(aim.quantity, start, _shown(aim.quantity, design.aim), "", _changed(own, design.aim)))
             for one, value in zip(constraints, design.constraints):
                 lines.append(f"  {one.text:<60} {_shown(one.quantity, value)}")
-            lines.append(
-                f"  {'all constraints hold' if design.holds else f'a constraint is missed by {design.violation:.2%}'}"
-            )
+            lines.append(f"  {'all constraints hold' if design.holds else f'a constraint is missed {_missed(design)}'}")
             lines.append(f"  held back by: {', '.join(self.active(number)) or 'nothing'}")
             if self.case.design.starts > 1:
                 ends = (f"{_shown(aim.quantity, end)}{f' ({n} starts)' * (n > 1)}" for end, n in self.optima(number))
