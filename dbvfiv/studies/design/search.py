@@ -247,7 +247,7 @@ class Search:
             if one.quantity == "margin":
                 values_ = values_ - np.array([self.reserves[p] for p in one.pressures])
             (bound,) = one.bounds
-            size = self._sizes.setdefault(one.text, max(abs(bound), float(np.abs(values_).max())))
+            size = self._sizes.setdefault(one.text, max(abs(bound), float(np.abs(values_).max())) or 1.0)
             missed += list(one.sign * (bound - values_) / size)
             slopes += [-one.sign * at.slopes[one.quantity] * widths / size for at in here]
             worst.append(float(one.sign * np.min(one.sign * values_)))

@@ -159,3 +159,15 @@ def test_a_design_without_a_state_between_the_heads_asked_does_not_hold():
     found, _ = search(problem, "mass down", SPANNED)
     design = found.from_start(np.array([0.2]), 20)
     assert design.values[0] == pytest.approx(0.5) and design.violation == np.inf and not design.holds
+
+
+def test_a_gap_that_is_nothing_at_the_start_still_counts():
+    """A section that is shut up to a thickness: the bound and its value at the start are both 0."""
+
+    def gap(x, _pressure):
+        return {"mass": x[0], "gap left": max(x[0] - 1.0, 0.0)}, {"mass": [1.0], "gap left": [float(x[0] > 1.0)]}
+
+    problem = Analytic((Variable("h", 0.5, 3.0, 0.8, "m"),), gap)
+    found, _ = search(problem, "mass up", "gap left at 5 m at most 0 %")
+    design = found.from_start(problem.start, 40)
+    assert design.holds and 0.8 < design.values[0] <= 1.0 + 1e-4
