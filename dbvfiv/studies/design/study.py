@@ -275,7 +275,9 @@ class DesignResult(StudyResult):
 
     @cached_property
     def aim_of_case(self) -> float | None:
-        """Aim of the case itself, on the mesh of the search; None where it has no state."""
+        """Aim of the case itself, on the mesh of the search, margins less their reserve; None where it has no
+        state.
+        """
         aim, starts = self.statements[0], [one.start for one in self.variables]
         known = {
             pressure: found
@@ -283,7 +285,7 @@ class DesignResult(StudyResult):
             if isinstance(found, AtHead) and aim.quantity in found.values and np.allclose(values, starts, 1e-12, 0.0)
         }
         here = [known.get(p) for p in aim.pressures] or [*known.values()][:1]
-        return together(aim, here)[0] if here and None not in here else None
+        return together(aim, here, [one.reserve for one in here])[0] if here and None not in here else None
 
     def optima(self, number: int = 0) -> list[tuple[float, int]]:
         """Aims at which starts ended with all constraints held, the best first, and the number of starts for each."""
@@ -410,7 +412,7 @@ def _line(name: str, before: str, after: str, unit: str, change: str) -> str:
 
 
 def _changed(before: float | None, after: float) -> str:
-    return f"{100 * (after / before - 1):+.1f} %" if before else ""
+    return f"{100 * (after / before - 1):+.1f} %" if before and before > 0 else ""
 
 
 def _shown(quantity: str, value: float) -> str:
