@@ -398,12 +398,26 @@ class DesignResult(StudyResult):
             lines.append(f"The case itself on the finer mesh: {self.evidence(CASE)}.")
         return lines
 
+    def _is_verified(self, number: int) -> bool:
+        shut = {note["pressure"] for note in self.record.notes(_SHUT) if note["design"] == number}
+        return len(self.verified(number)["pressure"]) + len(shut) >= len(self.pressures)
+
+    def _is_unstable(self, number: int) -> bool:
+        """True where a design is not stable on the finer mesh at a head of a margin that may not be below 0."""
+        margins = (one for one in self.statements if one.quantity == "margin" and min(one.bounds, default=0.0) >= 0)
+        asked, rows = {p for one in margins for p in one.between(LOOK)}, self.verified(number)
+        return any(p in asked and OUTCOMES[k] != STABLE for p, k in zip(rows["pressure"], rows["outcome"]))
+
     def shortfall(self) -> str | None:
-        missed = [number for number, design in self.best.items() if not design.holds]
-        missing = len(self.bounds) - len(self.best)
-        if self.complete and missing:
-            return f"{missing} of {len(self.bounds)} designs were not found"
-        return f"{len(missed)} of {len(self.bounds)} designs miss a constraint" if missed else None
+        best = self.best
+        count = {
+            "were not found": (len(self.bounds) - len(best)) * self.complete,
+            "miss a constraint": sum(not design.holds for design in best.values()),
+            "were not verified at all heads": sum(not self._is_verified(number) for number in best) * self.complete,
+            "are not stable on the finer mesh": sum(map(self._is_unstable, best)),
+        }
+        said = [f"{number} of {len(self.bounds)} designs {what}" for what, number in count.items() if number]
+        return "; ".join(said) or super().shortfall()
 
 
 def _line(name: str, before: str, after: str, unit: str, change: str) -> str:

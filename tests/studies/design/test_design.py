@@ -12,6 +12,7 @@ from dbvfiv.studies.design.problem import DesignProblem, Variable, statements_of
 from dbvfiv.studies.design.study import CASE, DesignResult, _changed
 from dbvfiv.studies.inputs import Plan, quasi_random
 from dbvfiv.studies.stability.place import redesigned
+from dbvfiv.studies.stability.verdict import OUTCOMES
 from tests.observers import Stop
 from tests.small_valves import load_small
 
@@ -206,6 +207,24 @@ def test_the_margin_of_the_case_is_told_less_its_reserve():
     aim = kept("margin at 6 kPa up", notes=[state]).aim_of_case
     assert aim == pytest.approx(0.041, rel=1e-12) and _changed(aim, 0.049) == "+19.5 %"
     assert _changed(-0.012, 0.049) == ""
+
+
+@pytest.mark.parametrize(
+    ("outcomes", "failures", "said"),
+    [
+        (("stable", "stable"), (), None),
+        (("stable", "flutters"), (), "1 of 1 designs are not stable on the finer mesh"),
+        (("flutters", "stable"), (), None),  # where no margin is asked
+        (("stable",), ("Design 1 could not be verified: no state.",), "1 of 1 designs were not verified at all heads"),
+        (("stable", "stable"), ("From start 2 no valve could be computed.",), "Not everything was reached"),
+    ],
+)
+def test_a_design_that_does_not_stand_on_the_finer_mesh_falls_short(outcomes, failures, said):
+    rows = [{"pressure": p, "outcome": OUTCOMES.index(one)} for p, one in zip((6e3, 9e3), outcomes)]
+    design = {"what": "design", "design": 0, "start": 0, "values": [1.0], "aim": 1.0, "constraints": [0.05]}
+    design["violation"] = 0.0
+    asked = "loss coefficient at 6 kPa down", "margin at 9 kPa at least 5 %"
+    assert kept(*asked, notes=[design], rows=rows, failures=failures).shortfall() == said
 
 
 def test_seals_is_what_closure_finds():
