@@ -60,13 +60,21 @@ def rows_to_keep(known: Record, _case: Case) -> dict[str, int]:
 
 
 def check(case: Case) -> None:
-    """Refuse a range of what the case does not have, a pump, and a case without records."""
-    check_scan(case, Places(case).parameter)
+    """Refuse a range of what the case does not have or without the last record, a pump, and a case without records."""
+    places = Places(case)
+    check_scan(case, places.parameter)
     require_head(case)
     if not case.identify.records:
         raise CaseError(
             "There is no record to identify the valve from; give RECORD.csv and --at, or identify.records.",
             key="identify.records",
+        )
+    if case.identify.axis is not None and places.now is not None and not places.hold_last:
+        row, (first, last) = PARAMETERS[places.parameter], (places.values[0], places.values[-1])
+        raise CaseError(
+            f"identify.over goes from {row.amount(first)} to {row.amount(last)}, and the last record was taken at "
+            f"{row.amount(places.now)}, about which onsets are sought; give a range that holds it.",
+            key="identify.over",
         )
 
 

@@ -123,6 +123,12 @@ class Places:
         ends = max(min(known) / BEYOND, 1.01 * self.case.downstream.pressure), max(known) * BEYOND
         return tuple(np.geomspace(*ends, VALUES).tolist())
 
+    @property
+    def hold_last(self) -> bool:
+        """True where the last record lies within the range."""
+        near = 1e-9 * abs(self.now)
+        return self.values[0] - near <= self.now <= self.values[-1] + near
+
     def _point(self, moved: dict[str, float]) -> Mu:
         return Mu.of(self.case).at(**moved)
 

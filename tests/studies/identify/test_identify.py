@@ -252,7 +252,7 @@ def test_intervals_hold_hidden_inputs_and_onsets(valves, least, most, tmp_path):
     ("records", "words"),
     [
         ([], "no record to identify"),
-        ([{"at": "pressure=1 kPa"}], "names no file"),
+        ([{"at": "pressure=3 kPa"}], "names no file"),
         ([{"frequency": 20.0}], "needs frequency and frequency_interval"),
         ([{"frequency": 20.0, "frequency_interval": 0.1, "damping_ratio": 0.1}], "give both"),
         ([{"frequency": 20.0, "frequency_interval": 0.1, "at": "head=1 m"}], "must be such as 'pressure=1 m'"),
@@ -279,6 +279,15 @@ def test_a_range_over_what_has_no_one_value_is_refused(one_sentence):
     with pytest.raises(CaseError, match="identify.over moves angle, of which .* no one value") as caught:
         valve.identify([{"frequency": 20.0, "frequency_interval": 0.1}])
     assert one_sentence(str(caught.value))
+
+
+@pytest.mark.parametrize("over", ["pressure=4000,9000", "pressure=1000,2000"])
+def test_a_range_that_does_not_hold_the_last_record_is_refused(over, one_sentence):
+    """Beyond its end nothing is computed, and the verdict at the last record would be that at the end."""
+    record = {"frequency": 20.0, "frequency_interval": 0.1, "at": "pressure=3 kPa"}
+    with pytest.raises(CaseError, match="identify.over goes from .* last record was taken at 3 kPa") as caught:
+        load(**{"identify.over": over}).identify([record])
+    assert one_sentence(str(caught.value)) and caught.value.key == "identify.over"
 
 
 def test_a_record_without_a_mode_is_refused(tmp_path):
