@@ -116,7 +116,7 @@ def run(session: Session, record: GrowingRecord, cases: Path | None = None) -> N
                 f"No design holds all constraints{_for(bound, bounds)}: the nearest misses one {_missed(best)}."
             )
         if cases is not None:
-            _write(problem.case_at(best.values), cases / f"design-{number + 1}.toml")
+            _write(problem.case_at(best.values), cases / _MADE.replace("*", str(number + 1)))
     for number, design in [(CASE, None), *result.best.items()]:
         _verify(problem, case, number, design, result.pressures, record)
 
@@ -167,6 +167,8 @@ def _write(case: Case, path: Path) -> None:
     path.write_text(case_toml(case, comments=False) + "\n")
 
 
+#: Names of the case files of designs.
+_MADE = "design-*.toml"
 #: Share of a range or a bound within which it is what holds a design back; of an aim, within which optima are one.
 ACTIVE = 1e-3
 #: Difference of an opening between the meshes above which it is said.
@@ -435,7 +437,15 @@ def _shown(quantity: str, value: float) -> str:
     return text if isinstance(text, str) and row.shown else f"{value:.5g}"
 
 
-STUDY = Study("design", lambda _mesh: _TABLES, run, DesignResult, check, rows_to_keep=lambda _known, _case: _NO_ROWS)
+STUDY = Study(
+    "design",
+    lambda _mesh: _TABLES,
+    run,
+    DesignResult,
+    check,
+    rows_to_keep=lambda _known, _case: _NO_ROWS,
+    files={"cases": _MADE},
+)
 
 
 #: Columns of verdicts that are drawn, their labels and factors.

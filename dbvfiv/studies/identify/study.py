@@ -541,4 +541,12 @@ def onset(result: StudyResult) -> Figure:
     return figure
 
 
-STUDY = Study("identify", lambda _mesh: TABLES, run, IdentifyResult, check, rows_to_keep=rows_to_keep)
+STUDY = Study(
+    "identify",
+    lambda _mesh: TABLES,
+    run,
+    IdentifyResult,
+    check,
+    rows_to_keep=rows_to_keep,
+    files={"posterior": ""},
+)
