@@ -27,7 +27,7 @@ class Reading:
     columns : sequence of str
         Columns by name or number from 1; all where empty.
     time : str
-        Column of the times, by name or number.
+        Column of the times, by name or number; the first where empty.
     rate : float, optional, Hz
         Sampling rate, where no column holds times.
     unit : str, optional
@@ -41,7 +41,7 @@ class Reading:
     """
 
     columns: Sequence[str] = ()
-    time: str = "1"
+    time: str = ""
     rate: float | None = None
     unit: str | None = None
     skip_bad: bool = False
@@ -171,7 +171,7 @@ _NUMBERED, _DATES = ("sample", "samples", "index", "no", "no.", "nr", "#", "n"),
 
 
 def _signals_of(table: Table, reading: Reading) -> list[Signal]:
-    at = None if reading.rate is not None else table.index(reading.time)
+    at = None if reading.rate is not None else table.index(reading.time) if reading.time else 0
     wanted = [table.index(name) for name in reading.columns] or [i for i in range(len(table.names)) if i != at]
     if not wanted:
         raise ValueError("it has a single column; give the sampling rate with --rate")
