@@ -228,7 +228,7 @@ def _recognise(files: list[Path], columns: Sequence[str], within: float) -> Reco
     """A measured record beside a result."""
     from ..studies.recognition import Recognition
     from ..studies.session import load_result
-    from ..verdict.reading import Reading, judge_file
+    from ..verdict.reading import PLAIN, Reading, judge_file
 
     if len(files) != 2:
         raise CaseError(
@@ -237,7 +237,8 @@ def _recognise(files: list[Path], columns: Sequence[str], within: float) -> Reco
         )
     if not 0 < within < 100:
         raise CaseError(f"--within is {within:g}; it must be greater than 0 and less than 100.")
-    return Recognition(judge_file(files[0], Reading(columns)), load_result(files[1]), 0.01 * within)
+    measured = judge_file(files[0], Reading(columns, hints=PLAIN))
+    return Recognition(measured, load_result(files[1]), 0.01 * within)
 
 
 def life(

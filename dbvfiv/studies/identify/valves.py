@@ -17,7 +17,7 @@ from ...case.axis import parse_point
 from ...case.parameters import PARAMETERS, Mu
 from ...case.quantity import head_of
 from ...errors import CaseError, SolveError
-from ...verdict.reading import Reading, judge_file
+from ...verdict.reading import PLAIN, Reading, judge_file
 from ..case import Case
 from ..inputs import Plan
 from ..stability.place import design_value
@@ -78,7 +78,7 @@ def measured_of(case: Case, record: int) -> tuple[list[Measured], str]:
         return [one], f"a mode of {one.frequency:.5g} Hz"
     found, said = [], []
     columns = [given.column] if given.column else []
-    for judged in judge_file(given.file, Reading(columns, rate=given.rate)):
+    for judged in judge_file(given.file, Reading(columns, rate=given.rate, hints=PLAIN)):
         for line in judged.verdict.lines:
             if line.get("rate") and line["called"] in ("", "resonance") and line["damping_ratio_interval"]:
                 numbers = (line[key] for key in ("frequency", "frequency_interval", "damping_ratio"))

@@ -290,6 +290,21 @@ def test_a_range_that_does_not_hold_the_last_record_is_refused(over, one_sentenc
     assert one_sentence(str(caught.value)) and caught.value.key == "identify.over"
 
 
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("time,lip\n0,1\n0.1,\n0.2,2\n", "line 3 holds nothing .*; take such rows out"),
+        ("time [parsec],lip\n0,1\n0.1,2\n0.2,2\n", "parsec"),
+        ("lip\n1\n2\n3\n", "single column; give the sampling rate"),
+    ],
+)
+def test_a_record_that_cannot_be_read_is_refused_without_options_of_another_command(text, words, tmp_path):
+    (tmp_path / "tap.csv").write_text(text)
+    with pytest.raises(CaseError, match=words) as caught:
+        load().identify([{"file": str(tmp_path / "tap.csv")}])
+    assert "--" not in str(caught.value)
+
+
 def test_a_record_without_a_mode_is_refused(tmp_path):
     time = np.arange(0.0, 4.0, 4e-3)
     path = tmp_path / "line.csv"
