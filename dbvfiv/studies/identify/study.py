@@ -49,6 +49,8 @@ UNLIKELY = 3.0
 INTERVAL, STEPS = (0.025, 0.5, 0.975), 41
 #: Probability below which nothing is said of what may be.
 RARE = 0.025
+#: Relative width of a distribution that the records leave one value of.
+NARROW = 2e-6
 #: Distance of the distribution function of a posterior from that of its form up to which the form stands for it, and
 #: least correlation that is kept.
 FORM, KEPT = 0.06, 0.05
@@ -479,7 +481,11 @@ def distribution_text(prior: Distribution, scores: np.ndarray) -> str:
         if b**spread > 1.0 + 1e-6:
             return f"lognormal({a * b**mean:.8g}, {b**spread:.8g})"
     steps = prior.at(np.quantile(scores, (np.arange(STEPS) + 0.5) / STEPS))
-    return f"samples({', '.join(f'{value:.8g}' for value in steps)})"
+    values = [f"{value:.8g}" for value in steps]
+    if values[0] == values[-1]:  # one of the samples of the prior: a distribution has some width
+        narrow = f"lognormal({values[0]}, {1 + NARROW})", f"normal({values[0]}, {NARROW * prior.scale:.6g})"
+        return narrow[0 if steps[0] > 0 else 1]
+    return f"samples({', '.join(values)})"
 
 
 def draw(result: StudyResult) -> Iterator[tuple[str, Callable[[], Figure]]]:
