@@ -21,7 +21,7 @@ from ...errors import CaseError, SolveError
 from ...record.record import GrowingRecord, Record
 from ...texts import digits
 from ..case import Case
-from ..inputs import Plan
+from ..inputs import Plan, correlation_of
 from ..result import StudyResult
 from ..session import Session, Study
 from ..stability.place import check_scan, describe_fixed, require_head
@@ -191,8 +191,8 @@ class IdentifyResult(StudyResult):
 
     @cached_property
     def learned(self) -> Learned:
-        """Covariance of the inputs' independent scores."""
-        return Learned(self.scores)
+        """Covariance of the inputs' scores, beside their correlation before."""
+        return Learned(self.plan.scores_of(self.scores), correlation_of(self.case, self.plan.inputs))
 
     @cached_property
     def learning(self) -> Learning:
@@ -307,7 +307,7 @@ class IdentifyResult(StudyResult):
         """Best further measurement for each confounded input and for the onset: where, of which mode, and the share of
         the standard deviation expected to remain.
         """
-        targets = {self.plan.inputs[i].name: self.scores[:, i] for i, _ in self.learned.confounded()}
+        targets = {self.plan.inputs[i].name: self.learned.scores[:, i] for i, _ in self.learned.confounded()}
         if self._onsets is not None:
             for name, at in zip(("onset below", "onset above"), self._onsets):
                 begins = np.where(self._onsets[2] >= 0, at, np.nan)

@@ -79,6 +79,23 @@ def test_inputs_that_only_a_sum_is_known_of_are_confounded():
     assert np.abs(learned.directions()[0][1]) == pytest.approx([np.sqrt(0.5), np.sqrt(0.5), 0.0], abs=0.02)
 
 
+@pytest.mark.parametrize("size", [1.0, 0.05])
+def test_inputs_that_are_correlated_before_are_told_by_their_own_scores(size):
+    """Scores t = L z of a correlation of 0.8, of whose half sum (t1 + t2)/2 records leave a share of the spread."""
+    root, random = np.linalg.cholesky([[1.0, 0.8], [0.8, 1.0]]), np.random.default_rng(4)
+    total, apart = size * np.sqrt(0.9) * random.standard_normal(8000), np.sqrt(0.1) * random.standard_normal(8000)
+    learned = Learned(np.column_stack([total + apart, total - apart]), root)
+    variances = 0.9 * size**2, 0.1
+    correlation = (variances[0] - variances[1]) / sum(variances)
+    assert learned.correlation[0, 1] == pytest.approx(correlation, abs=0.02)
+    assert learned.inflation[0] == pytest.approx(1 / (1 - correlation**2), rel=0.05)
+    assert learned.confounded() == ([] if size == 1.0 else [(0, [1]), (1, [0])])
+    best, combined = learned.directions()[0]
+    assert best == pytest.approx(size, rel=0.05)
+    if size < 1.0:  # of unit variance before: (t1 + t2)/2 over sqrt(0.9)
+        assert np.abs(combined) == pytest.approx([0.5 / np.sqrt(0.9)] * 2, abs=0.02)
+
+
 def test_the_variance_left_by_a_further_measurement():
     """Variance of z1 left by a measurement of z1 + z2 with a standard error s: 1 - 1 / (2 + s^2)."""
     z = np.random.default_rng(5).standard_normal((20000, 2))
