@@ -304,15 +304,17 @@ class IdentifyResult(StudyResult):
 
     @cached_property
     def further(self) -> list[dict[str, Any]]:
-        """Best further measurement for each confounded input and for the onset: where, of which mode, and the share of
-        the standard deviation expected to remain.
+        """Best further measurement for each confounded input, and for the onset or the end of flutter: where, of which
+        mode, and the share of the standard deviation expected to remain.
         """
         targets = {self.plan.inputs[i].name: self.learned.scores[:, i] for i, _ in self.learned.confounded()}
         if self._onsets is not None:
-            for name, at in zip(("onset below", "onset above"), self._onsets):
-                begins = np.where(self._onsets[2] >= 0, at, np.nan)
-                if np.isfinite(begins).mean() > 0.5:
-                    targets[name] = begins
+            *sides, present = self._onsets
+            for word, among in (("onset", present >= 0), ("end", present < 0)):
+                for side, at in zip(("below", "above"), sides):
+                    here = np.where(among, at, np.nan)
+                    if np.isfinite(here).mean() > 0.5:
+                        targets[f"{word} {side}"] = here
         return self.learning.further(self.samples, targets)
 
     @cached_property

@@ -132,6 +132,16 @@ def test_flutter_at_the_last_record_ends_and_does_not_begin(ends):
     assert now == 1.0 or 4e3 < begins["median"] < 8e3
 
 
+@pytest.mark.parametrize(("present", "names"), [(0.01, ["onset above"]), (-0.01, ["end above"])])
+def test_a_further_measurement_is_sought_for_where_flutter_begins_or_ends(present, names):
+    found, above = object.__new__(IdentifyResult), np.array([4.0, 5.0, np.nan])
+    learning = SimpleNamespace(further=lambda _samples, targets: targets)
+    learned, onsets_ = SimpleNamespace(confounded=list), (np.full(3, np.nan), above, np.full(3, present))
+    vars(found).update(learned=learned, learning=learning, samples=np.zeros((3, 3)), _onsets=onsets_)
+    assert list(found.further) == names
+    np.testing.assert_array_equal(found.further[names[0]], above)
+
+
 def test_modes_are_followed_by_their_shapes():
     eigenvalues = np.array([[-1 + 20j, -2 + 30j, -5.0], [-3 + 28j, -1 + 22j, np.nan]])
     alike = np.zeros((2, 3, 3))
