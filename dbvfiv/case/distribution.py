@@ -68,7 +68,10 @@ class Distribution:
         if form == "samples":
             if len(parts) < 2:
                 raise ValueError("which names no file and fewer than two values")
-            return cls(form, tuple(sorted(quantity.parse(number_or_text(part)) for part in parts)))
+            values = tuple(sorted(quantity.parse(number_or_text(part)) for part in parts))
+            if values[0] == values[-1]:
+                raise ValueError("whose values are all the same")
+            return cls(form, values)
         if not 1 <= len(parts) <= 2 or (form == "uniform" and len(parts) == 1):
             raise ValueError(f"which has {len(parts)} arguments")
         if own is None and (len(parts) == 1 or any(map(_PERCENT.fullmatch, parts)) and quantity.shown != "%"):

@@ -228,7 +228,7 @@ def _recognise(files: list[Path], columns: Sequence[str], within: float) -> Reco
     """A measured record beside a result."""
     from ..studies.recognition import Recognition
     from ..studies.session import load_result
-    from ..verdict.reading import Reading, judge_file
+    from ..verdict.reading import PLAIN, Reading, judge_file
 
     if len(files) != 2:
         raise CaseError(
@@ -237,7 +237,8 @@ def _recognise(files: list[Path], columns: Sequence[str], within: float) -> Reco
         )
     if not 0 < within < 100:
         raise CaseError(f"--within is {within:g}; it must be greater than 0 and less than 100.")
-    return Recognition(judge_file(files[0], Reading(columns)), load_result(files[1]), 0.01 * within)
+    measured = judge_file(files[0], Reading(columns, hints=PLAIN))
+    return Recognition(measured, load_result(files[1]), 0.01 * within)
 
 
 def life(
@@ -453,7 +454,10 @@ def verdict(
             "--column", "-c", metavar="NAME", help="Column by name or number from 1; may be repeated; all by default."
         ),
     ] = None,
-    time: Annotated[str, typer.Option("--time", metavar="NAME", help="Column of the times, by name or number.")] = "1",
+    time: Annotated[
+        str | None,
+        typer.Option("--time", metavar="NAME", help="Column of the times, by name or number; the first without it."),
+    ] = None,
     rate: Annotated[
         float | None, typer.Option("--rate", metavar="HZ", help="Sampling rate, where no column holds times.")
     ] = None,
@@ -502,7 +506,7 @@ def verdict(
     from ..verdict import JudgeOptions
     from ..verdict.reading import Reading, judge_file, judge_signals
 
-    reading = Reading(columns or (), time, rate, time_unit, skip_bad, since, until, detrend)
+    reading = Reading(columns or (), time or "", rate, time_unit, skip_bad, since, until, detrend)
     if not 0 < steady < 1:
         raise CaseError(f"--steady is {steady:g}; it must be greater than 0 and less than 1.")
     options = JudgeOptions(steady=steady)

@@ -168,7 +168,9 @@ class TableSpec:
     def stored(self, column: Column, values: np.ndarray) -> np.ndarray:
         """Values of a column as they lie in a file."""
         if column.dtype == TEXT:
-            return np.array([str(value).encode()[:TEXT_BYTES] for value in values], self.dtype(column))
+            cut = (str(value).encode()[:TEXT_BYTES] for value in values)
+            whole = [text.decode(errors="ignore").encode() for text in cut]  # no part of a letter
+            return np.array(whole, self.dtype(column))
         return np.asarray(values, self.dtype(column))
 
 
@@ -183,7 +185,9 @@ def read_column(group: h5py.Group, column: Column, rows: slice | int) -> Any:
     """Rows of a column of an open file; texts as str."""
     values = group[column.name][rows]
     if column.dtype == TEXT:
-        return values.decode() if isinstance(values, bytes) else np.array([value.decode() for value in values], object)
+        if isinstance(values, bytes):
+            return values.decode(errors="ignore")
+        return np.array([value.decode(errors="ignore") for value in values], object)
     return values
 
 

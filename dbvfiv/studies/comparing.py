@@ -138,9 +138,9 @@ class Comparison:
         return cls(results, labels(results, quiet), quantities, picture, pressure, values, said, remark)
 
     def difference(self, quantity: Compared) -> np.ndarray:
-        """(runs, k) numbers less those of the first run, SI, or over these less 1."""
+        """(runs, k) numbers less those of the first run, SI, or over these less 1; NaN over one of 0."""
         values = self.values[quantity.column]
-        return values / values[0] - 1.0 if quantity.share else values - values[0]
+        return values / np.where(values[0] == 0, np.nan, values[0]) - 1.0 if quantity.share else values - values[0]
 
     def summary(self) -> list[dict[str, Any]]:
         """One entry for each pressure, SI; None where a run has nothing."""

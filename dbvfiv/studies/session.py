@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from importlib import import_module
 from pathlib import Path
@@ -63,6 +63,9 @@ class Study:
         the head of the table above it. Without it everything is printed at the end.
     compare : callable, optional
         From results to what tells them apart: ``labels``, ``lines()``, ``document()`` and the figure, ``draw()``.
+    files : mapping
+        Choices that are names of what a run writes besides its result: of a file, with an empty text, or of a folder,
+        with a pattern of the files in it.
     """
 
     kind: str
@@ -74,6 +77,7 @@ class Study:
     extends: bool = False
     live: Callable[[Case], Callable[[Any], str]] | None = None
     compare: Callable[[Sequence[Any]], Any] | None = None
+    files: Mapping[str, str] = field(default_factory=dict)
 
 
 def print_rows(columns: Iterable[Column]) -> Callable[[Any], str]:
@@ -304,7 +308,10 @@ class Session:
             If nothing can be found at all.
         """
         require_consistent(self.case, kind)
-        find_study(kind).check(self.case)
+        study = find_study(kind)
+        for name in study.files:
+            _require_new(choices.get(name), study.files[name])
+        study.check(self.case)
         session = self.asked(kind, observer)
         if session is not self:
             return session.perform(kind, output, observer, **choices)
@@ -350,7 +357,7 @@ class Session:
                 for sentence in note.get("warnings", ()):
                     record.warn(sentence)
             try:
-                study.run(self, record, **choices)
+                study.run(self, record, **_with_files(study, record, choices))
                 complete = True
             except KeyboardInterrupt:
                 record.end(True)
@@ -358,6 +365,39 @@ class Session:
                 record.end(False)
             record.conclude(complete)
         return study.result(record, self)
+
+
+#: Note of files that a run writes besides its result.
+_FILES = "files"
+
+
+def _require_new(path: Path | None, pattern: str) -> None:
+    """Refuse a name that is taken or cannot be written, before anything is computed.
+
+    Parameters
+    ----------
+    pattern : str
+        Of the files that are written into it, of a folder, which may be there.
+
+    Raises
+    ------
+    CaseError
+    """
+    if path is None:
+        return
+    taken = next(path.glob(pattern), None) if pattern else path if path.exists() else None
+    if taken is not None:
+        raise CaseError(f"{str(taken)!r} exists already and is not overwritten; choose another name.")
+    check_writable(path / pattern if pattern else path)
+
+
+def _with_files(study: Study, record: GrowingRecord, choices: Mapping[str, Any]) -> dict[str, Any]:
+    """Choices of a run, whose files the record keeps: a run that goes on has them from there."""
+    given = {name: str(choices[name].absolute()) for name in study.files if choices.get(name) is not None}
+    if given:
+        record.note(_FILES, given=given)
+    kept = {name: Path(path) for note in record.notes(_FILES)[-1:] for name, path in note["given"].items()}
+    return kept | dict(choices)
 
 
 def _attempt(work: Callable[[], Any]) -> Any:

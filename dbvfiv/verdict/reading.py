@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +17,10 @@ from .motion import judge_record
 from .series import Series, in_steps, spectrum
 from .table import Table, read_table, seconds_in
 
+#: What mends a record, by what is wrong with it, in options of `dbvfiv verdict`; and where there are no options.
+OPTIONS = {"rows": " (--skip-bad leaves such rows out)", "unit": " (or give --time-unit)", "rate": " with --rate"}
+PLAIN = {"rows": "; take such rows out", "unit": "", "rate": ""}
+
 
 @dataclass(frozen=True)
 class Reading:
@@ -27,7 +31,7 @@ class Reading:
     columns : sequence of str
         Columns by name or number from 1; all where empty.
     time : str
-        Column of the times, by name or number.
+        Column of the times, by name or number; the first where empty.
     rate : float, optional, Hz
         Sampling rate, where no column holds times.
     unit : str, optional
@@ -38,16 +42,19 @@ class Reading:
         Times before and after which samples are left out.
     detrend : bool
         Take the level off a measured record.
+    hints : mapping
+        `OPTIONS` or `PLAIN`.
     """
 
     columns: Sequence[str] = ()
-    time: str = "1"
+    time: str = ""
     rate: float | None = None
     unit: str | None = None
     skip_bad: bool = False
     since: float | None = None
     until: float | None = None
     detrend: bool = True
+    hints: Mapping[str, str] = field(default_factory=lambda: OPTIONS)
 
 
 @dataclass(frozen=True)
@@ -171,16 +178,17 @@ _NUMBERED, _DATES = ("sample", "samples", "index", "no", "no.", "nr", "#", "n"),
 
 
 def _signals_of(table: Table, reading: Reading) -> list[Signal]:
-    at = None if reading.rate is not None else table.index(reading.time)
+    at = None if reading.rate is not None else table.index(reading.time) if reading.time else 0
     wanted = [table.index(name) for name in reading.columns] or [i for i in range(len(table.names)) if i != at]
     if not wanted:
-        raise ValueError("it has a single column; give the sampling rate with --rate")
+        raise ValueError(f"it has a single column; give the sampling rate{reading.hints['rate']}")
     if at is None:
         time = np.arange(len(table.values)) / reading.rate
     elif reading.unit is None and table.names[at].strip().lower() in _NUMBERED:
-        raise ValueError(f"its first column {table.names[at]!r} numbers the samples; give their rate with --rate")
+        numbers = f"its first column {table.names[at]!r} numbers the samples"
+        raise ValueError(f"{numbers}; give their rate{reading.hints['rate']}")
     else:
-        factor = seconds_in(reading.unit) if reading.unit is not None else _seconds(table, at)
+        factor = seconds_in(reading.unit) if reading.unit is not None else _seconds(table, at, reading)
         time = factor * table.values[:, at]
         if np.isfinite(time).any() and np.nanmin(time) > _DATES:  # times of day, which start with the record
             time = time - np.nanmin(time)
@@ -189,17 +197,17 @@ def _signals_of(table: Table, reading: Reading) -> list[Signal]:
         needed = [i] if at is None else [at, i]
         bad = table.bad_rows(needed)
         if bad.any() and not reading.skip_bad:
-            raise ValueError(f"{table.describe_bad(needed)} (--skip-bad leaves such rows out)")
+            raise ValueError(f"{table.describe_bad(needed)}{reading.hints['rows']}")
         found.append(Signal(table.names[i], time[~bad], table.values[~bad, i], int(bad.sum())))
     return found
 
 
-def _seconds(table: Table, column: int) -> float:
+def _seconds(table: Table, column: int, reading: Reading) -> float:
     try:
         return table.seconds(column)
     except ValueError as error:
         raise ValueError(
-            f"its times stand in the column {table.names[column]!r}, but {error} (or give --time-unit)"
+            f"its times stand in the column {table.names[column]!r}, but {error}{reading.hints['unit']}"
         ) from None
 
 

@@ -62,6 +62,7 @@ def test_samples_come_from_a_list_or_a_file(tmp_path):
         ("uniform(2)", 1.0, "1 arguments"),
         ("samples(missing.txt)", 1.0, "does not exist"),
         ("samples(1,)", 1.0, "fewer than two"),
+        ("samples(1, 1)", 1.0, "all the same"),
         ("normal(1 kg, 2)", 1.0, "not"),
         (7, 1.0, "no distribution"),
     ],

@@ -2,6 +2,7 @@
 
 import json
 import os
+import re
 import subprocess
 import sys
 import types
@@ -211,3 +212,20 @@ def test_a_result_that_cannot_be_written_is_refused_before_the_work(tmp_path, ca
     assert run(["modes", "-o", str(notes / "a.h5")]) == 2
     assert "a.h5" in capsys.readouterr().err
     assert [path.name for path in tmp_path.iterdir()] == ["notes.md"]
+
+
+@pytest.mark.parametrize(
+    ("command", "words"),
+    [
+        (("identify", "--case", "{}/mine.toml"), "mine.toml.* exists already and is not overwritten"),
+        (("identify", "--case", "{}/mine.toml/known.toml"), "known.toml.* cannot be written"),
+        (("design", "--cases", "{}/designs"), "design-1.toml.* exists already and is not overwritten"),
+        (("design", "--cases", "{}/mine.toml"), "cannot be written"),
+    ],
+)
+def test_a_case_file_that_cannot_be_written_is_refused_before_the_work(tmp_path, command_line, command, words):
+    for path in (tmp_path / "mine.toml", tmp_path / "designs" / "design-1.toml"):
+        path.parent.mkdir(exist_ok=True)
+        path.write_text("# of one's own\n")
+    told = command_line(*(part.format(tmp_path) for part in command))
+    assert told.status == 2 and re.search(words, told.err) and not told.out

@@ -7,6 +7,7 @@ import sys
 import time
 from pathlib import Path
 
+import h5py
 import numpy as np
 import pytest
 
@@ -67,6 +68,17 @@ def check_whole(path):
     assert [note["number"] for note in found.notes("thing")] == list(range(len(found.notes("thing"))))
     assert count - len(found.notes("thing")) in (0, 1) or not found.complete
     return count
+
+
+def test_a_long_text_ends_with_a_whole_letter(tmp_path):
+    path, text = tmp_path / "a.h5", "a" + 400 * "ü"
+    with GrowingRecord(header(), None, tables(), path) as record:
+        record.append("states", row(0) | {"why": text})
+    (kept,) = StoredRecord(path, tables, Case).column("states", "why")
+    assert kept == text[:200]
+    with h5py.File(path, "r+") as file:  # as earlier versions cut it
+        file["tables/states/why"][0] = text.encode()[:400]
+    assert StoredRecord(path, tables, Case).value("states", "why", 0) == kept
 
 
 def test_rows_and_notes_come_back(tmp_path):

@@ -8,6 +8,7 @@ import subprocess
 import sys
 import time
 from dataclasses import replace
+from pathlib import Path
 from types import SimpleNamespace
 
 import h5py
@@ -193,6 +194,24 @@ def test_what_settled_levels_said_is_said_again(coarse_case, tmp_path, attempts)
     whole = resume(tmp_path / "steady.h5")
     assert part.interrupted and whole.complete and session.settled.warnings[0] in part.warnings
     assert whole.warnings == part.warnings and len(attempts) == 2
+
+
+@pytest.mark.parametrize(("kind", "name"), [("design", "cases"), ("identify", "posterior")])
+def test_a_run_that_goes_on_writes_the_files_that_were_asked_for(coarse_case, tmp_path, monkeypatch, kind, name):
+    asked = []
+
+    def run(_session, record, **choices):
+        asked.append(choices)
+        record.begin(kind, 1)
+        if len(asked) == 1:
+            raise KeyboardInterrupt
+
+    other = replace(find_study(kind), run=run, check=lambda _case: None, rows_to_keep=None)
+    monkeypatch.setattr(sessions, "find_study", lambda _kind: other)
+    monkeypatch.chdir(tmp_path)
+    Session(coarse_case).perform(kind, tmp_path / "run.h5", **{name: Path("written")})
+    monkeypatch.chdir("/")
+    assert resume(tmp_path / "run.h5").complete and asked[1] == {name: tmp_path / "written"}
 
 
 def test_kept_runs_are_those_of_the_pressures_that_were_found(coarse_case, tmp_path, attempts, monkeypatch):

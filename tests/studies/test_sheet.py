@@ -1,11 +1,14 @@
 """The catalogue sheet against the states it is made of."""
 
 import csv
+from types import SimpleNamespace
 
 import pytest
 
 import dbvfiv
+from dbvfiv.studies.case import load_case
 from dbvfiv.studies.session import Session
+from dbvfiv.studies.steady import sheet_rows
 from tests.small_valves import THESIS_SET
 
 OPTIONS = (*THESIS_SET, "--set", "mesh.around=4", "--set", "mesh.along=6")
@@ -40,6 +43,22 @@ def test_a_sheet_of_two_sizes_in_units_of_choice(command_line, tmp_path):
     assert float(rows[2]["bore [in]"]) == pytest.approx(2 * float(rows[0]["bore [in]"]), rel=1e-5)
     # lengths twice as large at the same head: four times the flow
     assert float(rows[2]["flow [gpm]"]) == pytest.approx(4 * float(rows[0]["flow [gpm]"]), rel=1e-4)
+
+
+@pytest.mark.parametrize("length", [None, 20.0])
+def test_static_head_and_pressure_are_those_at_the_flange(length):
+    """Behind a line, which takes 0.8 m of 2 m, the head that is asked at its far end stands beside them."""
+    hydraulics = SimpleNamespace(flange_velocity=1.0, head_loss=1.25, loss_coefficient=24.5, kv=1.0, cv=1.0)
+    case = load_case(None, [] if length is None else [f"upstream.length={length}"])
+    flange = 9806.65 * (2.0 if length is None else 1.2)
+    state = SimpleNamespace(
+        results=SimpleNamespace(case=case), hydraulics=hydraulics, head=2.0, flange_pressure=flange, volume_flow=0.1,
+        outlet_velocity=2.0, lip_opening=0.02,
+    )  # fmt: skip
+    titles, row = sheet_rows([state], case.units)
+    told = dict(zip(titles, row))
+    assert told["static head [m]"] == pytest.approx(told["static pressure [kPa]"] / 9.80665, rel=1e-5)
+    assert told.get("head at the far end [m]") == (None if length is None else 2.0)
 
 
 def test_a_later_size_of_a_sheet_that_falls_short_is_told(command_line, tmp_path, monkeypatch):

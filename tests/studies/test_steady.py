@@ -15,6 +15,7 @@ from dbvfiv.model.newton import NewtonOptions
 from dbvfiv.model.state import LipCentre, describe_state
 from dbvfiv.record.states import summarise
 from dbvfiv.studies.case import Case, load_case, thesis_case
+from dbvfiv.studies.comparing import Compared, Comparison
 from dbvfiv.studies.session import Session
 from dbvfiv.studies.stability.place import redesigned
 from dbvfiv.studies.steady import study
@@ -171,6 +172,14 @@ def test_a_load_meets_limit_points_beyond_those_before():
     limits = [LimitPoint(pressure, highest=i % 2 == 0) for i, pressure in enumerate(pressures)]
     assert _met(limits, rising=True) == [1018.0, 1073.0]
     assert _met(limits, rising=False) == [985.0, 871.0, 831.0]
+
+
+def test_runs_are_compared_with_a_first_one_that_is_sealed():
+    quantity = Compared("flow", share=True, unit="m3/s")
+    values = {"flow": np.array([[0.0, 2.0], [1.0, 3.0]])}
+    with np.errstate(all="raise"):
+        found = Comparison((), ["sealed", "open"], (quantity,), None, np.array([1e3, 2e3]), values)
+        assert found.lines()[-2].split() == ["1", "0", "1", "-"] and found.lines()[-1].split()[-1] == "+50.000"
 
 
 def test_what_a_curve_holds_is_kept_once(tmp_path, monkeypatch):

@@ -102,6 +102,13 @@ def test_rows_without_a_number_are_named_or_skipped(command_line, tmp_path, one_
     assert "3 of 2001 rows" in command_line("verdict", file, "--skip-bad").out
 
 
+def test_times_are_in_the_first_column_also_where_channels_have_numbers_for_names(command_line, tmp_path):
+    file = record(tmp_path, text_of(np.column_stack([T, SINE, 0 * T]), "time,1,2"))
+    found = judged(command_line, file)
+    assert [one["name"] for one in found] == ["1", "2"]
+    assert found[0]["frequency"] == pytest.approx(3.0, rel=1e-5)
+
+
 def test_missing_values_of_other_columns_do_not_matter(command_line, tmp_path):
     lines = [f"{t:.6g},{x:.6g},{'' if i % 7 else 1}" for i, (t, x) in enumerate(zip(T, SINE))]
     file = record(tmp_path, "t,p,rare\n" + "\n".join(lines))

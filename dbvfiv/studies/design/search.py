@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -48,7 +48,7 @@ class Design:
         Least favourable value of each.
     violation : float
         Largest share of a bound, or of the value at the start where that is larger, by which it is missed; 0 where all
-        hold.
+        hold, infinite of a valve without a state at one of the heads.
     """
 
     values: tuple[float, ...]
@@ -92,18 +92,28 @@ class Search:
         self._latest: tuple | None = None  # valve of the last step that was one
 
     def from_start(self, share: np.ndarray, evaluations: int) -> Design | None:
-        """Best design found from a start, given by shares (n,); None where no valve could be computed. Each round may
-        try so many valves.
+        """Best design found from a start, given by shares (n,), as it is at all heads and with the reserves that were
+        added last; None where no valve could be computed. Each round may try so many valves.
         """
         best, tried = None, [share]
         self.reserves.clear()
         for _ in range(ROUNDS):
             self._seen.clear()
-            best = self._held(self._first_that_holds(tried), evaluations)
-            if best is None or not (self._renew_reserves(best) | self._add_worst_heads(best)):
+            found = self._held(self._first_that_holds(tried), evaluations)
+            if found is None:
                 break
+            best = found
+            if not (self._renew_reserves(best) | self._add_worst_heads(best)):
+                return best
             tried = [self.share(found[4]) for found in self._by_aim()] + [share]
-        return best
+        return None if best is None else self._counted(best)
+
+    def _counted(self, design: Design) -> Design:
+        """A design with its aim and constraints at the heads and with the reserves of now."""
+        try:
+            return self._compute(design.values)[4]
+        except SolveError:
+            return replace(design, violation=np.inf)
 
     def _by_aim(self) -> list[tuple]:
         """Evaluations that were tried and held, the best aim first."""
@@ -125,9 +135,9 @@ class Search:
         """As `_optimised`; a search that ends where constraints fail begins again halfway from its start to the case,
         and one that holds from its end, where aim and curvature have another size, until that gains nothing.
         """
-        best = None
+        best, again = None, len(self._seen)  # designs of the round before, with what was added to it
         for _ in range(BACK):
-            left = evaluations - len(self._seen)
+            left = evaluations - (len(self._seen) - again)
             ends = np.array_equal(share, self.problem.start)
             found = self._optimised(share, left, left if ends else (left + 1) // 2) if left > 0 else None
             if found is None:
@@ -237,7 +247,7 @@ class Search:
             if one.quantity == "margin":
                 values_ = values_ - np.array([self.reserves[p] for p in one.pressures])
             (bound,) = one.bounds
-            size = self._sizes.setdefault(one.text, max(abs(bound), float(np.abs(values_).max())))
+            size = self._sizes.setdefault(one.text, max(abs(bound), float(np.abs(values_).max())) or 1.0)
             missed += list(one.sign * (bound - values_) / size)
             slopes += [-one.sign * at.slopes[one.quantity] * widths / size for at in here]
             worst.append(float(one.sign * np.min(one.sign * values_)))

@@ -101,7 +101,8 @@ def run(session: Session, record: GrowingRecord, cases: Path | None = None) -> N
                 share = search.share(best)
             design = search.from_start(share, case.design.evaluations)
             if design is None:
-                record.fail(f"From start {i + 1} no valve could be computed. {tried[-1]}")
+                why = next((one for one in reversed(tried) if isinstance(one, str)), "")
+                record.fail(f"From start {i + 1} no valve could be computed. {why}".rstrip())
                 continue
             found.append(design)
             record.note(_DESIGN, design=number, start=i, **asdict(design))
@@ -112,16 +113,21 @@ def run(session: Session, record: GrowingRecord, cases: Path | None = None) -> N
             continue
         if not best.holds:
             record.warn(
-                f"No design holds all constraints{_for(bound, bounds)}: the nearest misses one by {best.violation:.2%}."
+                f"No design holds all constraints{_for(bound, bounds)}: the nearest misses one {_missed(best)}."
             )
         if cases is not None:
-            _write(problem.case_at(best.values), cases / f"design-{number + 1}.toml")
+            _write(problem.case_at(best.values), cases / _MADE.replace("*", str(number + 1)))
     for number, design in [(CASE, None), *result.best.items()]:
         _verify(problem, case, number, design, result.pressures, record)
 
 
 def _for(bound: float, bounds) -> str:
     return f" with the bound {bound:g}" if len(bounds) > 1 else ""
+
+
+def _missed(design: Design) -> str:
+    """By how much a design misses a constraint."""
+    return f"by {design.violation:.2%}" if np.isfinite(design.violation) else "at a head where it has no state"
 
 
 def _tell(record: GrowingRecord, tried: list[Design | str], one: Design | str) -> None:
@@ -161,6 +167,8 @@ def _write(case: Case, path: Path) -> None:
     path.write_text(case_toml(case, comments=False) + "\n")
 
 
+#: Names of the case files of designs.
+_MADE = "design-*.toml"
 #: Share of a range or a bound within which it is what holds a design back; of an aim, within which optima are one.
 ACTIVE = 1e-3
 #: Difference of an opening between the meshes above which it is said.
@@ -269,7 +277,9 @@ class DesignResult(StudyResult):
 
     @cached_property
     def aim_of_case(self) -> float | None:
-        """Aim of the case itself, on the mesh of the search; None where it has no state."""
+        """Aim of the case itself, on the mesh of the search, margins less their reserve; None where it has no
+        state.
+        """
         aim, starts = self.statements[0], [one.start for one in self.variables]
         known = {
             pressure: found
@@ -277,7 +287,7 @@ class DesignResult(StudyResult):
             if isinstance(found, AtHead) and aim.quantity in found.values and np.allclose(values, starts, 1e-12, 0.0)
         }
         here = [known.get(p) for p in aim.pressures] or [*known.values()][:1]
-        return together(aim, here)[0] if here and None not in here else None
+        return together(aim, here, [one.reserve for one in here])[0] if here and None not in here else None
 
     def optima(self, number: int = 0) -> list[tuple[float, int]]:
         """Aims at which starts ended with all constraints held, the best first, and the number of starts for each."""
@@ -380,9 +390,7 @@ class DesignResult(StudyResult):
             lines.append(_line(aim.quantity, start, _shown(aim.quantity, design.aim), "", _changed(own, design.aim)))
             for one, value in zip(constraints, design.constraints):
                 lines.append(f"  {one.text:<60} {_shown(one.quantity, value)}")
-            lines.append(
-                f"  {'all constraints hold' if design.holds else f'a constraint is missed by {design.violation:.2%}'}"
-            )
+            lines.append(f"  {'all constraints hold' if design.holds else f'a constraint is missed {_missed(design)}'}")
             lines.append(f"  held back by: {', '.join(self.active(number)) or 'nothing'}")
             if self.case.design.starts > 1:
                 ends = (f"{_shown(aim.quantity, end)}{f' ({n} starts)' * (n > 1)}" for end, n in self.optima(number))
@@ -392,12 +400,26 @@ class DesignResult(StudyResult):
             lines.append(f"The case itself on the finer mesh: {self.evidence(CASE)}.")
         return lines
 
+    def _is_verified(self, number: int) -> bool:
+        shut = {note["pressure"] for note in self.record.notes(_SHUT) if note["design"] == number}
+        return len(self.verified(number)["pressure"]) + len(shut) >= len(self.pressures)
+
+    def _is_unstable(self, number: int) -> bool:
+        """True where a design is not stable on the finer mesh at a head of a margin that may not be below 0."""
+        margins = (one for one in self.statements if one.quantity == "margin" and min(one.bounds, default=0.0) >= 0)
+        asked, rows = {p for one in margins for p in one.between(LOOK)}, self.verified(number)
+        return any(p in asked and OUTCOMES[k] != STABLE for p, k in zip(rows["pressure"], rows["outcome"]))
+
     def shortfall(self) -> str | None:
-        missed = [number for number, design in self.best.items() if not design.holds]
-        missing = len(self.bounds) - len(self.best)
-        if self.complete and missing:
-            return f"{missing} of {len(self.bounds)} designs were not found"
-        return f"{len(missed)} of {len(self.bounds)} designs miss a constraint" if missed else None
+        best = self.best
+        count = {
+            "were not found": (len(self.bounds) - len(best)) * self.complete,
+            "miss a constraint": sum(not design.holds for design in best.values()),
+            "were not verified at all heads": sum(not self._is_verified(number) for number in best) * self.complete,
+            "are not stable on the finer mesh": sum(map(self._is_unstable, best)),
+        }
+        said = [f"{number} of {len(self.bounds)} designs {what}" for what, number in count.items() if number]
+        return "; ".join(said) or super().shortfall()
 
 
 def _line(name: str, before: str, after: str, unit: str, change: str) -> str:
@@ -406,7 +428,7 @@ def _line(name: str, before: str, after: str, unit: str, change: str) -> str:
 
 
 def _changed(before: float | None, after: float) -> str:
-    return f"{100 * (after / before - 1):+.1f} %" if before else ""
+    return f"{100 * (after / before - 1):+.1f} %" if before and before > 0 else ""
 
 
 def _shown(quantity: str, value: float) -> str:
@@ -415,7 +437,15 @@ def _shown(quantity: str, value: float) -> str:
     return text if isinstance(text, str) and row.shown else f"{value:.5g}"
 
 
-STUDY = Study("design", lambda _mesh: _TABLES, run, DesignResult, check, rows_to_keep=lambda _known, _case: _NO_ROWS)
+STUDY = Study(
+    "design",
+    lambda _mesh: _TABLES,
+    run,
+    DesignResult,
+    check,
+    rows_to_keep=lambda _known, _case: _NO_ROWS,
+    files={"cases": _MADE},
+)
 
 
 #: Columns of verdicts that are drawn, their labels and factors.

@@ -131,14 +131,21 @@ INFLATED, CORRELATED = 2.0, 0.3
 
 @dataclass(frozen=True)
 class Learned:
-    """Knowledge of independent inputs, whose prior is standard normal, by samples of their posterior.
+    """Knowledge of inputs, whose prior is normal with unit variances, by samples of their posterior.
 
     Attributes
     ----------
     scores : (n, d) array
+    root : (d, d) array, optional
+        Lower triangle of the correlation that they have before anything is measured; none without it.
     """
 
     scores: np.ndarray
+    root: np.ndarray | None = None
+
+    @property
+    def _root(self) -> np.ndarray:
+        return np.eye(self.scores.shape[1]) if self.root is None else self.root
 
     @cached_property
     def covariance(self) -> np.ndarray:
@@ -158,9 +165,11 @@ class Learned:
         return np.diag(self.covariance) * np.diag(np.linalg.inv(self.covariance))
 
     def confounded(self) -> list[tuple[int, list[int]]]:
-        """Inputs that others would sharpen, each with those by falling correlation."""
-        found = []
-        for i, inflation in enumerate(self.inflation):
+        """Inputs that others would sharpen more than before anything was measured, each with those by falling
+        correlation.
+        """
+        found, before = [], np.diag(np.linalg.inv(self._root @ self._root.T))
+        for i, inflation in enumerate(self.inflation / before):
             row = np.abs(self.correlation[i]) * (np.arange(len(self.correlation)) != i)
             partners = [int(j) for j in np.argsort(-row) if row[j] >= CORRELATED]
             if inflation >= INFLATED and partners:
@@ -171,7 +180,9 @@ class Learned:
         """Standard deviations of combinations of scores, over those of the prior, with the combinations: what is known
         best first.
         """
-        variance, vectors = np.linalg.eigh(self.covariance)
+        root = self._root
+        variance, vectors = np.linalg.eigh(np.linalg.solve(root, np.linalg.solve(root, self.covariance).T))
+        vectors = np.linalg.solve(root.T, vectors)  # whose variance was 1
         return [(float(np.sqrt(max(v, 0.0))), vectors[:, k]) for k, v in enumerate(variance)]
 
 

@@ -21,7 +21,7 @@ from ...errors import CaseError, SolveError
 from ...record.record import GrowingRecord, Record
 from ...texts import digits
 from ..case import Case
-from ..inputs import Plan
+from ..inputs import Plan, correlation_of
 from ..result import StudyResult
 from ..session import Session, Study
 from ..stability.place import check_scan, describe_fixed, require_head
@@ -49,6 +49,8 @@ UNLIKELY = 3.0
 INTERVAL, STEPS = (0.025, 0.5, 0.975), 41
 #: Probability below which nothing is said of what may be.
 RARE = 0.025
+#: Relative width of a distribution that the records leave one value of.
+NARROW = 2e-6
 #: Distance of the distribution function of a posterior from that of its form up to which the form stands for it, and
 #: least correlation that is kept.
 FORM, KEPT = 0.06, 0.05
@@ -60,13 +62,21 @@ def rows_to_keep(known: Record, _case: Case) -> dict[str, int]:
 
 
 def check(case: Case) -> None:
-    """Refuse a range of what the case does not have, a pump, and a case without records."""
-    check_scan(case, Places(case).parameter)
+    """Refuse a range of what the case does not have or without the last record, a pump, and a case without records."""
+    places = Places(case)
+    check_scan(case, places.parameter)
     require_head(case)
     if not case.identify.records:
         raise CaseError(
             "There is no record to identify the valve from; give RECORD.csv and --at, or identify.records.",
             key="identify.records",
+        )
+    if case.identify.axis is not None and places.now is not None and not places.hold_last:
+        row, (first, last) = PARAMETERS[places.parameter], (places.values[0], places.values[-1])
+        raise CaseError(
+            f"identify.over goes from {row.amount(first)} to {row.amount(last)}, and the last record was taken at "
+            f"{row.amount(places.now)}, about which onsets are sought; give a range that holds it.",
+            key="identify.over",
         )
 
 
@@ -181,8 +191,8 @@ class IdentifyResult(StudyResult):
 
     @cached_property
     def learned(self) -> Learned:
-        """Covariance of the inputs' independent scores."""
-        return Learned(self.scores)
+        """Covariance of the inputs' scores, beside their correlation before."""
+        return Learned(self.plan.scores_of(self.scores), correlation_of(self.case, self.plan.inputs))
 
     @cached_property
     def learning(self) -> Learning:
@@ -294,15 +304,17 @@ class IdentifyResult(StudyResult):
 
     @cached_property
     def further(self) -> list[dict[str, Any]]:
-        """Best further measurement for each confounded input and for the onset: where, of which mode, and the share of
-        the standard deviation expected to remain.
+        """Best further measurement for each confounded input, and for the onset or the end of flutter: where, of which
+        mode, and the share of the standard deviation expected to remain.
         """
-        targets = {self.plan.inputs[i].name: self.scores[:, i] for i, _ in self.learned.confounded()}
+        targets = {self.plan.inputs[i].name: self.learned.scores[:, i] for i, _ in self.learned.confounded()}
         if self._onsets is not None:
-            for name, at in zip(("onset below", "onset above"), self._onsets):
-                begins = np.where(self._onsets[2] >= 0, at, np.nan)
-                if np.isfinite(begins).mean() > 0.5:
-                    targets[name] = begins
+            *sides, present = self._onsets
+            for word, among in (("onset", present >= 0), ("end", present < 0)):
+                for side, at in zip(("below", "above"), sides):
+                    here = np.where(among, at, np.nan)
+                    if np.isfinite(here).mean() > 0.5:
+                        targets[f"{word} {side}"] = here
         return self.learning.further(self.samples, targets)
 
     @cached_property
@@ -471,7 +483,11 @@ def distribution_text(prior: Distribution, scores: np.ndarray) -> str:
         if b**spread > 1.0 + 1e-6:
             return f"lognormal({a * b**mean:.8g}, {b**spread:.8g})"
     steps = prior.at(np.quantile(scores, (np.arange(STEPS) + 0.5) / STEPS))
-    return f"samples({', '.join(f'{value:.8g}' for value in steps)})"
+    values = [f"{value:.8g}" for value in steps]
+    if values[0] == values[-1]:  # one of the samples of the prior: a distribution has some width
+        narrow = f"lognormal({values[0]}, {1 + NARROW})", f"normal({values[0]}, {NARROW * prior.scale:.6g})"
+        return narrow[0 if steps[0] > 0 else 1]
+    return f"samples({', '.join(values)})"
 
 
 def draw(result: StudyResult) -> Iterator[tuple[str, Callable[[], Figure]]]:
@@ -533,4 +549,12 @@ def onset(result: StudyResult) -> Figure:
     return figure
 
 
-STUDY = Study("identify", lambda _mesh: TABLES, run, IdentifyResult, check, rows_to_keep=rows_to_keep)
+STUDY = Study(
+    "identify",
+    lambda _mesh: TABLES,
+    run,
+    IdentifyResult,
+    check,
+    rows_to_keep=rows_to_keep,
+    files={"posterior": ""},
+)

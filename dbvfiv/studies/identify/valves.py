@@ -17,12 +17,14 @@ from ...case.axis import parse_point
 from ...case.parameters import PARAMETERS, Mu
 from ...case.quantity import head_of
 from ...errors import CaseError, SolveError
-from ...verdict.reading import Reading, judge_file
+from ...verdict.reading import PLAIN, Reading, judge_file
 from ..case import Case
 from ..inputs import Plan
 from ..stability.place import design_value
 from ..stability.walk import StabilityWalk
 
+#: Keys of a record that is a mode and no file.
+OF_A_MODE = "frequency", "frequency_interval", "damping_ratio", "damping_ratio_interval"
 #: Leading modes taken of a valve at a place.
 MODES = 12
 #: Least likeness of shapes, the modal assurance criterion, of a mode and that of the case itself.
@@ -57,12 +59,12 @@ class Measured:
 
 
 def measured_of(case: Case, record: int) -> tuple[list[Measured], str]:
-    """Oscillations of a record that are modes, and a sentence on it.
+    """Oscillations of a record that are modes, each once, and a sentence on it.
 
     Raises
     ------
     CaseError
-        For a record that cannot be read, or says neither file nor mode.
+        For a record that cannot be read, or says neither file nor mode, or both.
     """
     given, name = case.identify.records[record], f"identify.records.{record}"
     if given.file is None:
@@ -76,15 +78,43 @@ def measured_of(case: Case, record: int) -> tuple[list[Measured], str]:
         numbers = given.frequency, given.frequency_interval, given.damping_ratio, given.damping_ratio_interval
         one = Measured(record, *(np.nan if number is None else number for number in numbers))
         return [one], f"a mode of {one.frequency:.5g} Hz"
+    for key in OF_A_MODE:
+        if getattr(given, key) is not None:
+            raise CaseError(
+                f"{name} names a file and has {key}, which is of a mode in place of one; give one of them.", name
+            )
     found, said = [], []
     columns = [given.column] if given.column else []
-    for judged in judge_file(given.file, Reading(columns, rate=given.rate)):
+    for judged in judge_file(given.file, Reading(columns, rate=given.rate, hints=PLAIN)):
+        own = []
         for line in judged.verdict.lines:
             if line.get("rate") and line["called"] in ("", "resonance") and line["damping_ratio_interval"]:
                 numbers = (line[key] for key in ("frequency", "frequency_interval", "damping_ratio"))
-                found.append(Measured(record, *numbers, line["damping_ratio_interval"]))
+                own.append(Measured(record, *numbers, line["damping_ratio_interval"]))
+        found = _each_once(found, own, case.identify.error)
         said.append(f"{judged.signal.name}: {judged.verdict.name}")
     return found, "; ".join(said)
+
+
+def _each_once(found: Sequence[Measured], more: Sequence[Measured], error: float) -> list[Measured]:
+    """Oscillations of a record and of a further column of it. A mode that both have is that of the smaller interval:
+    what moved it, and what the model is off by, is the same in both.
+
+    Parameters
+    ----------
+    error : float
+        Relative error of computed frequencies, within which two are one as two with intervals that overlap are.
+    """
+    kept = [*found]
+    for one in more:
+        near = min(found, key=lambda other: abs(other.frequency - one.frequency), default=None)
+        if near is None or abs(near.frequency - one.frequency) > (
+            near.frequency_error + one.frequency_error + error * one.frequency
+        ):
+            kept.append(one)
+        elif one.frequency_error < near.frequency_error and near in kept:
+            kept[kept.index(near)] = one
+    return kept
 
 
 @dataclass(frozen=True)
@@ -122,6 +152,12 @@ class Places:
         known = [self._point(one)["pressure"] for one in self.of_records]
         ends = max(min(known) / BEYOND, 1.01 * self.case.downstream.pressure), max(known) * BEYOND
         return tuple(np.geomspace(*ends, VALUES).tolist())
+
+    @property
+    def hold_last(self) -> bool:
+        """True where the last record lies within the range."""
+        near = 1e-9 * abs(self.now)
+        return self.values[0] - near <= self.now <= self.values[-1] + near
 
     def _point(self, moved: dict[str, float]) -> Mu:
         return Mu.of(self.case).at(**moved)

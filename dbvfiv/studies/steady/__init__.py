@@ -17,7 +17,7 @@ from ...case.axis import parse_axis
 from ...case.measured import AREA, DISCHARGE, MEASURED_FILES, SHAPE, TAPS, find_measured
 from ...case.model import Case
 from ...case.physics import LoadPressure
-from ...case.quantity import Number, Quantity, number_or_text
+from ...case.quantity import Number, Quantity, head_of, number_or_text
 from ...case.section import Section, key
 from ...case.units import Units, factor_of
 from ...errors import CaseError
@@ -153,7 +153,7 @@ def _range(text: str, density: float) -> tuple[float, ...]:
 
 @dataclass(frozen=True)
 class SheetColumn:
-    """A column of the sheet.
+    """A column of the sheet; heads and pressures but `FAR` are those at the flange.
 
     Attributes
     ----------
@@ -174,7 +174,7 @@ class SheetColumn:
 
 COLUMNS = (
     SheetColumn("bore", "size", "mm", lambda s: 2 * _bore(s)),
-    SheetColumn("static head", "head", "m", lambda s: s.head),
+    SheetColumn("static head", "head", "m", lambda s: head_of(s.flange_pressure, s.results.case.fluid.density)),
     SheetColumn("static pressure", "pressure", "kPa", lambda s: s.flange_pressure),
     SheetColumn("flow", "flow", "L/s", lambda s: s.volume_flow),
     SheetColumn("velocity", "velocity", "m/s", lambda s: s.hydraulics.flange_velocity),
@@ -185,6 +185,8 @@ COLUMNS = (
     SheetColumn("Cv", "", "gpm", lambda s: s.hydraulics.cv),
     SheetColumn("opening", "size", "mm", lambda s: s.lip_opening),
 )
+#: Column behind the bore, of a valve behind a line.
+FAR = SheetColumn("head at the far end", "head", "m", lambda s: s.head)
 
 
 def _bore(state: Any) -> float:
@@ -207,16 +209,18 @@ def require_sheet(path: Path) -> None:
         raise CaseError(f"{str(path)!r} cannot be written: it is a folder, or its folder does not exist.")
 
 
-def sheet_rows(states: Iterable[Any], units: Units) -> list[list[str | float | None]]:
+def sheet_rows(states: Sequence[Any], units: Units) -> list[list[str | float | None]]:
     """Head line and one row for each state that flows; a number that is not finite is left blank."""
-    names = [_unit(column, units) for column in COLUMNS]
-    factors = [factor_of(column.kind, name) if column.kind else 1.0 for column, name in zip(COLUMNS, names)]
+    far = [FAR] if any(state.results.case.has_line for state in states) else []
+    columns = [*COLUMNS[:1], *far, *COLUMNS[1:]]
+    names = [_unit(column, units) for column in columns]
+    factors = [factor_of(column.kind, name) if column.kind else 1.0 for column, name in zip(columns, names)]
     rows: list[list[str | float | None]] = [
-        [f"{column.title} [{name}]" if name else column.title for column, name in zip(COLUMNS, names)]
+        [f"{column.title} [{name}]" if name else column.title for column, name in zip(columns, names)]
     ]
     for state in states:
         if state.hydraulics is not None:
-            values = (column.value(state) / factor for column, factor in zip(COLUMNS, factors))
+            values = (column.value(state) / factor for column, factor in zip(columns, factors))
             rows.append([float(f"{value:.6g}") if math.isfinite(value) else None for value in values])
     return rows
 

@@ -184,21 +184,21 @@ def weighted(weights: np.ndarray, hits: np.ndarray, undecided: np.ndarray) -> Pr
     weights of hits, by Student's distribution.
     """
     value, low, _ = _mean(weights * hits)
-    _, _, high = _mean(weights * (hits | undecided))
+    _, _, high = _mean(weights * (hits | undecided), largest=float(weights.max(initial=0.0)))
     return Probability(value, max(low, 0.0), min(high, 1.0))
 
 
-def _mean(terms: np.ndarray, least: float = 0.0) -> tuple[float, float, float]:
+def _mean(terms: np.ndarray, least: float = 0.0, largest: float = 1.0) -> tuple[float, float, float]:
     """Mean of independent terms, not negative, with the interval that holds those of Student for it and for its
     logarithm: few large weights make its distribution skew, between normal and lognormal. Their coefficient of
-    variation is `least` at least.
+    variation is `least` at least, and one that is not 0 is `largest` at most.
     """
     from scipy.stats import t
 
     mean = float(terms.mean())
     if mean <= 0:
-        # none of n samples: three over the number of samples, were they of the density of the inputs
-        return 0.0, 0.0, 1 - (0.5 * (1 - CONFIDENCE)) ** (1 / len(terms))
+        # none of n samples: three over the number of samples, by what each may stand for
+        return 0.0, 0.0, largest * (1 - (0.5 * (1 - CONFIDENCE)) ** (1 / len(terms)))
     freedom = max(float(terms.sum() ** 2 / (terms**2).sum()) - 1, 1.0)  # hits of equal weight that tell as much
     variation = max(float(terms.std(ddof=1)) / mean, least)
     reach = float(t.ppf(0.5 * (1 + CONFIDENCE), freedom)) * variation / np.sqrt(len(terms))

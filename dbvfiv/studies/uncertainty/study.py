@@ -442,7 +442,7 @@ class UncertaintyResult(StudyResult):
         return sorted(rows, key=lambda row: -(row["share"] or 0.0))
 
     def measured(self, value: float, name: str, accuracy: float) -> tuple[Any, Any] | None:
-        """Percentiles of the least damping ratio at a value now, and if an input were known to an accuracy (0.1 for
+        """Percentiles of the least damping ratio at a value now, and if an input were measured to an accuracy (0.1 for
         10 % at 95 %) and had its median; None where too few samples lie there, as about a median of 0.
         """
         found, number = self.at(value), [one.name for one in self.plan.inputs].index(name)
@@ -451,9 +451,7 @@ class UncertaintyResult(StudyResult):
         if not own.median:
             return None
         apart = (found["inputs"][plain, number] - own.median) / (accuracy * abs(own.median) / 1.96)
-        # weights that turn the distribution of the input into a narrower normal one
-        scores = own.score(found["inputs"][plain, number])
-        log = -0.5 * apart**2 + 0.5 * scores**2 + np.log(_stretch(own, found["inputs"][plain, number]))
+        log = -0.5 * apart**2  # likelihood of the measurement: what is known of the input besides stays
         weights = np.exp(log - log.max(initial=-np.inf))
         if not len(weights) or weights.sum() ** 2 / (weights**2).sum() < _ENOUGH:
             return None
@@ -557,13 +555,6 @@ class UncertaintyResult(StudyResult):
 
 #: Samples of equal weight that tell as much, below which nothing is said of percentiles.
 _ENOUGH = 30.0
-
-
-def _stretch(distribution, values: np.ndarray) -> np.ndarray:
-    """Change of an input with its score, up to a factor."""
-    step = 1e-4
-    scores = distribution.score(values)
-    return np.maximum(np.abs(distribution.at(scores + step) - distribution.at(scores - step)) / (2 * step), 1e-300)
 
 
 def _percentiles(values: np.ndarray, weights: np.ndarray | None = None) -> list[float | None]:

@@ -1,14 +1,18 @@
 """Designs of a small valve: gradients of margin, loss and mass; run, file, interruption, case file, sentences."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
 import dbvfiv
+from dbvfiv.case.statement import parse_statement
 from dbvfiv.errors import CaseError
-from dbvfiv.studies.design.problem import DesignProblem, statements_of, together
-from dbvfiv.studies.design.study import CASE
+from dbvfiv.studies.design.problem import DesignProblem, Variable, statements_of, together
+from dbvfiv.studies.design.study import CASE, DesignResult, _changed
 from dbvfiv.studies.inputs import Plan, quasi_random
 from dbvfiv.studies.stability.place import redesigned
+from dbvfiv.studies.stability.verdict import OUTCOMES
 from tests.observers import Stop
 from tests.small_valves import load_small
 
@@ -179,6 +183,48 @@ def test_a_robust_design_keeps_its_reserve(valve):
     at = problem.at(robust.best[0].values, 6e3, True)
     assert robust.best[0].holds and at.reserve > 5e-4
     assert at.values["margin"] - at.reserve == pytest.approx(0.05, abs=1e-3)
+
+
+def kept(aim, *constraints, notes=(), rows=(), failures=()):
+    """A complete result of a record with these notes and rows of verdicts."""
+    columns = {name: np.array([row.get(name, 0) for row in rows]) for name in ("design", "pressure", "outcome")}
+    record = SimpleNamespace(
+        complete=True,
+        failures=failures,
+        notes=lambda what: [note for note in notes if note["what"] == what],
+        column=lambda _table, name: columns.get(name, np.zeros(len(rows))),
+    )
+    found = DesignResult(record)
+    statements = (parse_statement(aim, True, 1e3), *(parse_statement(text, False, 1e3) for text in constraints))
+    vars(found).update(statements=statements, variables=(Variable("thickness", 0.7, 1.4, 1.0, ""),))
+    return found
+
+
+def test_the_margin_of_the_case_is_told_less_its_reserve():
+    """As that of designs, so that their change from it is what was gained; none is told of a margin below 0."""
+    state = {"what": "state", "values": [1.0], "pressure": 6e3, "margin": True, "found": {"margin": 0.052}}
+    state |= {"slopes": {"margin": [0.1]}, "reserve": 0.011, "band": None}
+    aim = kept("margin at 6 kPa up", notes=[state]).aim_of_case
+    assert aim == pytest.approx(0.041, rel=1e-12) and _changed(aim, 0.049) == "+19.5 %"
+    assert _changed(-0.012, 0.049) == ""
+
+
+@pytest.mark.parametrize(
+    ("outcomes", "failures", "said"),
+    [
+        (("stable", "stable"), (), None),
+        (("stable", "flutters"), (), "1 of 1 designs are not stable on the finer mesh"),
+        (("flutters", "stable"), (), None),  # where no margin is asked
+        (("stable",), ("Design 1 could not be verified: no state.",), "1 of 1 designs were not verified at all heads"),
+        (("stable", "stable"), ("From start 2 no valve could be computed.",), "Not everything was reached"),
+    ],
+)
+def test_a_design_that_does_not_stand_on_the_finer_mesh_falls_short(outcomes, failures, said):
+    rows = [{"pressure": p, "outcome": OUTCOMES.index(one)} for p, one in zip((6e3, 9e3), outcomes)]
+    design = {"what": "design", "design": 0, "start": 0, "values": [1.0], "aim": 1.0, "constraints": [0.05]}
+    design["violation"] = 0.0
+    asked = "loss coefficient at 6 kPa down", "margin at 9 kPa at least 5 %"
+    assert kept(*asked, notes=[design], rows=rows, failures=failures).shortfall() == said
 
 
 def test_seals_is_what_closure_finds():

@@ -115,3 +115,59 @@ def test_a_span_of_heads_is_held_between_those_asked_first():
     assert len(found.constraints[0].pressures) > 6
     deepest = max(0.04 * np.exp(-(((np.log10(p) - 4.3) / 0.05) ** 2)) for p in found.constraints[0].between(13))
     assert design.holds and design.values[0] == pytest.approx(deepest / 0.02, rel=2e-2)
+
+
+#: Valleys of a margin, each at one of the heads between those of a span that are asked first, by a variable of its own.
+VALLEYS = 5
+
+
+def valleys(x, pressure):
+    """Margin with narrow valleys over the head, the first the deepest, each of which one thickness lifts."""
+    looked = np.log10(parse_statement(SPANNED, False, 1000.0).between(13))[[1, 3, 5, 7, 9]]
+    dips = (0.04 - 1e-3 * np.arange(VALLEYS)) * np.exp(-(((np.log10(pressure) - looked) / 0.01) ** 2))
+    return {"mass": x.sum(), "margin": 0.06 - (dips / x).sum()}, {"mass": np.ones(VALLEYS), "margin": dips / x**2}
+
+
+SPANNED = "margin from 10 kPa to 40 kPa at least 4 %"
+
+
+def test_a_design_that_fails_at_a_head_added_last_does_not_hold():
+    problem = Analytic(tuple(Variable(f"x{i}", 0.5, 3.0, 1.0, "m") for i in range(VALLEYS)), valleys)
+    found, _ = search(problem, "mass down", SPANNED)
+    design = found.from_start(np.full(VALLEYS, 0.2), 60)
+    least = min(valleys(np.array(design.values), p)[0]["margin"] for p in found.constraints[0].between(13))
+    assert least < 0.03 and not design.holds and design.violation == pytest.approx((0.04 - least) / 0.06, rel=1e-4)
+
+
+def test_a_design_that_was_found_is_not_lost_where_heads_are_added():
+    """As many valves held as may be tried, and all of them fail at the new head."""
+    problem = Analytic((Variable("h", 0.5, 3.0, 1.0, "m"),), bump)
+    found, _ = search(problem, "mass down", SPANNED)
+    design = found.from_start(np.array([0.2]), 2)
+    assert design is not None and not design.holds and design.values[0] < 1.9
+
+
+def fading(x, pressure):
+    """A valve that has no state at a head between those asked first, but for thick walls that are never tried."""
+    if np.isclose(pressure, parse_statement(SPANNED, False, 1000.0).between(13)[1]) and x[0] < 2.9:
+        raise SolveError("There is no state.")
+    return {"mass": x[0], "margin": 0.06}, {"mass": [1.0], "margin": [0.0]}
+
+
+def test_a_design_without_a_state_between_the_heads_asked_does_not_hold():
+    problem = Analytic((Variable("h", 0.5, 3.0, 1.0, "m"),), fading)
+    found, _ = search(problem, "mass down", SPANNED)
+    design = found.from_start(np.array([0.2]), 20)
+    assert design.values[0] == pytest.approx(0.5) and design.violation == np.inf and not design.holds
+
+
+def test_a_gap_that_is_nothing_at_the_start_still_counts():
+    """A section that is shut up to a thickness: the bound and its value at the start are both 0."""
+
+    def gap(x, _pressure):
+        return {"mass": x[0], "gap left": max(x[0] - 1.0, 0.0)}, {"mass": [1.0], "gap left": [float(x[0] > 1.0)]}
+
+    problem = Analytic((Variable("h", 0.5, 3.0, 0.8, "m"),), gap)
+    found, _ = search(problem, "mass up", "gap left at 5 m at most 0 %")
+    design = found.from_start(problem.start, 40)
+    assert design.holds and 0.8 < design.values[0] <= 1.0 + 1e-4

@@ -8,7 +8,7 @@ import pytest
 
 import dbvfiv
 from dbvfiv.errors import CaseError
-from dbvfiv.studies.identify.valves import Places, least_damping, onsets
+from dbvfiv.studies.identify.valves import Places, least_damping, measured_of, onsets
 from dbvfiv.studies.inputs import Plan
 from dbvfiv.studies.response.study import Transfer
 from dbvfiv.studies.stability.walk import StabilityWalk
@@ -252,7 +252,7 @@ def test_intervals_hold_hidden_inputs_and_onsets(valves, least, most, tmp_path):
     ("records", "words"),
     [
         ([], "no record to identify"),
-        ([{"at": "pressure=1 kPa"}], "names no file"),
+        ([{"at": "pressure=3 kPa"}], "names no file"),
         ([{"frequency": 20.0}], "needs frequency and frequency_interval"),
         ([{"frequency": 20.0, "frequency_interval": 0.1, "damping_ratio": 0.1}], "give both"),
         ([{"frequency": 20.0, "frequency_interval": 0.1, "at": "head=1 m"}], "must be such as 'pressure=1 m'"),
@@ -260,12 +260,30 @@ def test_intervals_hold_hidden_inputs_and_onsets(valves, least, most, tmp_path):
         ([{"frequency": 20.0, "frequency_interval": 0.1, "at": "pressure=1 kg"}], "pressure=1 kg.* is not a pressure"),
         ([{"frequency": 20.0, "frequency_interval": 0.1, "at": "thickness=1"}], "must be such as"),
         ([{"file": "none.csv"}], "does not exist"),
+        ([{"file": "README.md", "frequency": 20.0}], "names a file and has frequency, .* one of them"),
     ],
 )
 def test_records_that_cannot_be_used_are_answered_by_a_sentence(records, words, one_sentence):
     with pytest.raises(CaseError, match=words) as caught:
         load().identify(records)
     assert one_sentence(str(caught.value))
+
+
+def test_a_mode_in_several_columns_is_measured_once(tmp_path):
+    """A ring in three columns, of which one is noisier, and another ring: the same errors tell no more."""
+    time, random = np.arange(0.0, 6.0, 4e-3), np.random.default_rng(8)
+    slow, quick = (np.exp(-decay * time) * np.cos(2 * np.pi * f * time) for decay, f in ((1.0, 12.0), (1.4, 31.0)))
+    noise = 0.01 * random.standard_normal(len(time))
+    columns = np.column_stack([time, slow + noise, 2 * (slow + noise), slow + 5 * noise, quick + noise])
+    np.savetxt(tmp_path / "tap.csv", columns, delimiter=",", header="time [s],lip,pressure,flow,wall", comments="")
+
+    def of(column):
+        records = [{"file": str(tmp_path / "tap.csv"), "column": column}]
+        return measured_of(load(**{"identify.records": records, "identify.error": 0.01}).case, 0)
+
+    (one, other), said = of("")
+    (alone,), _ = of("lip")
+    assert one == alone and other.frequency == pytest.approx(31.0, rel=1e-3) and said.count("decayed") == 4
 
 
 @pytest.mark.parametrize(("over", "own"), [("thickness=0.8,1.2", 1.0), ("angle=30,60", 54.0), ("beta=1e-4,1e-3", 5e-4)])
@@ -279,6 +297,30 @@ def test_a_range_over_what_has_no_one_value_is_refused(one_sentence):
     with pytest.raises(CaseError, match="identify.over moves angle, of which .* no one value") as caught:
         valve.identify([{"frequency": 20.0, "frequency_interval": 0.1}])
     assert one_sentence(str(caught.value))
+
+
+@pytest.mark.parametrize("over", ["pressure=4000,9000", "pressure=1000,2000"])
+def test_a_range_that_does_not_hold_the_last_record_is_refused(over, one_sentence):
+    """Beyond its end nothing is computed, and the verdict at the last record would be that at the end."""
+    record = {"frequency": 20.0, "frequency_interval": 0.1, "at": "pressure=3 kPa"}
+    with pytest.raises(CaseError, match="identify.over goes from .* last record was taken at 3 kPa") as caught:
+        load(**{"identify.over": over}).identify([record])
+    assert one_sentence(str(caught.value)) and caught.value.key == "identify.over"
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("time,lip\n0,1\n0.1,\n0.2,2\n", "line 3 holds nothing .*; take such rows out"),
+        ("time [parsec],lip\n0,1\n0.1,2\n0.2,2\n", "parsec"),
+        ("lip\n1\n2\n3\n", "single column; give the sampling rate"),
+    ],
+)
+def test_a_record_that_cannot_be_read_is_refused_without_options_of_another_command(text, words, tmp_path):
+    (tmp_path / "tap.csv").write_text(text)
+    with pytest.raises(CaseError, match=words) as caught:
+        load().identify([{"file": str(tmp_path / "tap.csv")}])
+    assert "--" not in str(caught.value)
 
 
 def test_a_record_without_a_mode_is_refused(tmp_path):

@@ -79,6 +79,23 @@ def test_inputs_that_only_a_sum_is_known_of_are_confounded():
     assert np.abs(learned.directions()[0][1]) == pytest.approx([np.sqrt(0.5), np.sqrt(0.5), 0.0], abs=0.02)
 
 
+@pytest.mark.parametrize("size", [1.0, 0.05])
+def test_inputs_that_are_correlated_before_are_told_by_their_own_scores(size):
+    """Scores t = L z of a correlation of 0.8, of whose half sum (t1 + t2)/2 records leave a share of the spread."""
+    root, random = np.linalg.cholesky([[1.0, 0.8], [0.8, 1.0]]), np.random.default_rng(4)
+    total, apart = size * np.sqrt(0.9) * random.standard_normal(8000), np.sqrt(0.1) * random.standard_normal(8000)
+    learned = Learned(np.column_stack([total + apart, total - apart]), root)
+    variances = 0.9 * size**2, 0.1
+    correlation = (variances[0] - variances[1]) / sum(variances)
+    assert learned.correlation[0, 1] == pytest.approx(correlation, abs=0.02)
+    assert learned.inflation[0] == pytest.approx(1 / (1 - correlation**2), rel=0.05)
+    assert learned.confounded() == ([] if size == 1.0 else [(0, [1]), (1, [0])])
+    best, combined = learned.directions()[0]
+    assert best == pytest.approx(size, rel=0.05)
+    if size < 1.0:  # of unit variance before: (t1 + t2)/2 over sqrt(0.9)
+        assert np.abs(combined) == pytest.approx([0.5 / np.sqrt(0.9)] * 2, abs=0.02)
+
+
 def test_the_variance_left_by_a_further_measurement():
     """Variance of z1 left by a measurement of z1 + z2 with a standard error s: 1 - 1 / (2 + s^2)."""
     z = np.random.default_rng(5).standard_normal((20000, 2))
@@ -115,6 +132,16 @@ def test_flutter_at_the_last_record_ends_and_does_not_begin(ends):
     assert now == 1.0 or 4e3 < begins["median"] < 8e3
 
 
+@pytest.mark.parametrize(("present", "names"), [(0.01, ["onset above"]), (-0.01, ["end above"])])
+def test_a_further_measurement_is_sought_for_where_flutter_begins_or_ends(present, names):
+    found, above = object.__new__(IdentifyResult), np.array([4.0, 5.0, np.nan])
+    learning = SimpleNamespace(further=lambda _samples, targets: targets)
+    learned, onsets_ = SimpleNamespace(confounded=list), (np.full(3, np.nan), above, np.full(3, present))
+    vars(found).update(learned=learned, learning=learning, samples=np.zeros((3, 3)), _onsets=onsets_)
+    assert list(found.further) == names
+    np.testing.assert_array_equal(found.further[names[0]], above)
+
+
 def test_modes_are_followed_by_their_shapes():
     eigenvalues = np.array([[-1 + 20j, -2 + 30j, -5.0], [-3 + 28j, -1 + 22j, np.nan]])
     alike = np.zeros((2, 3, 3))
@@ -138,3 +165,11 @@ def test_a_posterior_is_written_as_a_distribution(text):
             np.testing.assert_allclose(found.at(ask), expected, rtol=0.02)
         else:
             assert set(found.numbers) <= set(prior.numbers)
+
+
+@pytest.mark.parametrize(("text", "value"), [("samples(1, 2, 4, 8)", 4.0), ("samples(-1, 0, 1)", 0.0)])
+def test_a_posterior_of_one_value_is_written_as_a_narrow_distribution(text, value):
+    prior = Distribution.parse(text, Quantity(""))
+    scores = prior.score(np.array([value])) + 0.01 * np.random.default_rng(6).standard_normal(400)
+    found = Distribution.parse(distribution_text(prior, scores), Quantity(""))
+    assert found.at(np.array([-2.0, 0.0, 2.0])) == pytest.approx([value] * 3, rel=1e-5, abs=1e-5) and found.scale > 0

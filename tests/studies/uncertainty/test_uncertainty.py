@@ -93,10 +93,12 @@ def test_figures_of_samples_without_a_damping_ratio_are_drawn(refused):
     assert set(refused.figures()) == {"margin"}
 
 
-@pytest.mark.parametrize("mean", [0.0, 40.0])
-def test_a_measurement_of_an_input_narrows_the_margin_by_a_share_of_its_median(mean):
-    """A ratio that is a twentieth of the input in per cent: 10 % of 40 are 4; of 0 there is no share."""
-    own, result = Distribution("normal", (mean, 8.0)), object.__new__(UncertaintyResult)
+@pytest.mark.parametrize(("mean", "spread"), [(0.0, 8.0), (40.0, 8.0), (40.0, 1.0)])
+def test_a_measurement_of_an_input_narrows_the_margin_by_a_share_of_its_median(mean, spread):
+    """A ratio that is a twentieth of the input in per cent: 10 % of 40 are 4, beside what is known of it; of 0 there is
+    no share.
+    """
+    own, result = Distribution("normal", (mean, spread)), object.__new__(UncertaintyResult)
     inputs = own.at(quasi_random(4096, 1, 1))
     rows = {"damping_ratio": inputs[:, 0] / 2000, "inputs": inputs, "stage": np.zeros(4096, int)}
     vars(result).update(plan=SimpleNamespace(inputs=[SimpleNamespace(name="x", distribution=own)]), at=lambda _: rows)
@@ -105,7 +107,9 @@ def test_a_measurement_of_an_input_narrows_the_margin_by_a_share_of_its_median(m
         assert known is None
     else:
         now, then = (np.ptp(row) for row in known)
-        assert then == pytest.approx(2 * 4.0 / 2000, rel=0.05) and now == pytest.approx(2 * 1.96 * 8.0 / 2000, rel=0.05)
+        left = 1.96 / np.hypot(1 / spread, 1.96 / 4.0)
+        assert then == pytest.approx(2 * left / 2000, rel=0.02) and then < now
+        assert now == pytest.approx(2 * 1.96 * spread / 2000, rel=0.02)
 
 
 def test_flow_models_are_compared_by_the_same_samples():
