@@ -14,6 +14,7 @@ import numpy as np
 
 from ..materials.shipped import shipped_loss, shipped_loss_names
 from ..studies.closure.safety import BUCKLING, CROSSING, END, SEAL, rated_verdict
+from ..studies.stability.verdict import DIVERGES
 from ..texts import digits, listed
 from .gather import Gathered, second_mesh
 
@@ -155,22 +156,24 @@ def _onsets(found: Gathered) -> str:
 
 
 def _factor(found: Gathered) -> str:
-    """Margin in damping: the factor on the damping of the wall at which the verdict changes, at the worst head; empty
-    where a head has no verdict.
+    """Margin in damping: the factor on the damping of the wall at which the verdict changes, at the worst head, or the
+    last one that was looked at; empty where a head has no verdict, or nothing is known of that.
     """
     verdicts = [result.verdict for result in found.modes.values()]
-    unstable = [v.critical_damping_factor for v in verdicts if v.stable is False]
-    if unstable:
-        quiet = f"quiet with {digits(max(unstable), 2)} times the damping"
-        return quiet if np.isfinite(unstable).all() else "no damping in reach quiets it"
+    if unstable := [v for v in verdicts if v.stable is False]:
+        if any(v.outcome == DIVERGES for v in unstable):
+            return "no damping quiets what diverges"
+        if sought := [v.damping_sought for v in unstable if np.isfinite(v.damping_sought)]:
+            return f"chatters up to {digits(max(sought), 2)} times the damping"
+        most = np.max([v.critical_damping_factor for v in unstable])
+        return f"quiet with {digits(most, 2)} times the damping" if np.isfinite(most) else ""
     if len(verdicts) < len(found.heads) or any(v.stable is None for v in verdicts):
         return ""
     factors = [v.critical_damping_factor for v in verdicts if np.isfinite(v.critical_damping_factor)]
-    return (
-        f"chatter begins at {digits(max(factors), 2)} times the damping"
-        if factors
-        else "stable down to 0.05 times the damping"
-    )
+    if factors:
+        return f"chatter begins at {digits(max(factors), 2)} times the damping"
+    least = np.max([v.damping_sought for v in verdicts])
+    return f"stable down to {digits(least, 2)} times the damping" if np.isfinite(least) else ""
 
 
 def _sure(found: Gathered, verdicts: dict) -> tuple[str, ...]:

@@ -220,6 +220,7 @@ def heads_part(found: Gathered) -> Part:
         sealed = state is not None and case.valve.is_preset and state.hydraulics is None
         numbers = (v.growth_rate, v.frequency, 100 * v.damping_ratio, v.critical_damping_factor, v.band)
         said = [f"{x:.3g}" if np.isfinite(x) else "-" for x in numbers]
+        said[3] = f"none to {v.damping_sought:.3g}" if np.isfinite(v.damping_sought) else said[3]
         rows.append((shown, v.outcome + " (sealed)" * sealed, *said, "yes" if v.certain else "no"))
     missing = [
         f"{units.pressure(found.heads[int(n.split('-')[1]) - 1])}: {why}"
@@ -232,7 +233,8 @@ def heads_part(found: Gathered) -> Part:
     sentences = (
         f"Modes about the steady state at each head, in all symmetry classes: {classes}.",
         f"The factor is that on the {factor} at which chatter begins, or ends where the valve chatters, in the first "
-        "and the last of the classes; - where none between 0.05 and 10 makes the difference.",
+        "and the last of the classes; none to the last one that was looked at where none is found, - where that is not "
+        "known.",
         *missing,
     )
     caption = (

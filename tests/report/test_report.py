@@ -24,7 +24,8 @@ from dbvfiv.model import ValveModel
 from dbvfiv.model.material_stability import material_stability
 from dbvfiv.report import gather, write_page, write_pdf
 from dbvfiv.report.answers import UNKNOWN, answers, opens
-from dbvfiv.report.gather import following, heads_of, planned
+from dbvfiv.report.figures import vibration_figure
+from dbvfiv.report.gather import Gathered, following, heads_of, planned
 from dbvfiv.report.parts import heads_part, steady_part
 from dbvfiv.studies.case import load_case
 from dbvfiv.studies.stability.verdict import Verdict
@@ -129,35 +130,67 @@ def test_each_head_without_a_verdict_has_its_own_reason(made, monkeypatch, reaso
 @pytest.mark.parametrize(
     "verdicts, margin",
     [
-        ((("stable", 0.3), ("stable", np.nan)), "chatter begins at 0.3 times the damping"),
-        ((("stable", np.nan), ("stable", np.nan)), "stable down to 0.05 times the damping"),
+        ((("stable", 0.3), ("stable", np.nan, 0.05)), "chatter begins at 0.3 times the damping"),
+        ((("stable", np.nan, 0.05), ("stable", np.nan, 0.2)), "stable down to 0.2 times the damping"),
+        ((("stable", np.nan, 0.05), ("stable", np.nan)), ""),
         ((("stable", 0.3), ("undecided", np.nan)), ""),
         ((("flutters", 1.4), ("flutters", 1.2)), "quiet with 1.4 times the damping"),
-        ((("flutters", 1.4), ("flutters", np.nan)), "no damping in reach quiets it"),
-        ((("diverges", np.nan), ("stable", 0.3)), "no damping in reach quiets it"),
+        ((("flutters", 1.4), ("flutters", np.nan, 10.0)), "chatters up to 10 times the damping"),
+        ((("flutters", 1.4), ("flutters", np.nan)), ""),
+        ((("diverges", np.nan), ("stable", 0.3)), "no damping quiets what diverges"),
         ((("stable", 0.3),), ""),
     ],
 )
-def test_the_margin_in_damping_is_that_of_all_heads(made, monkeypatch, verdicts, margin):
-    found, _ = made
-    given = [Verdict(name, "", 1.0, 9.0, 0.02, factor, True) for name, factor in verdicts]
-    results = {p: SimpleNamespace(verdict=verdict, warnings=()) for p, verdict in zip(found.heads, given)}
-    monkeypatch.setattr(type(found), "modes", property(lambda _: results))
-    assert next(one for one in answers(found) if "chatter" in one.question).margin == margin
+def test_the_margin_in_damping_is_that_of_all_heads(verdicts, margin):
+    assert on_chatter(with_verdicts(*(damped(*given) for given in verdicts))).margin == margin
+
+
+def damped(outcome, factor, sought=np.nan):
+    """A verdict with a multiple of the damping, and the last one that was looked at."""
+    return Verdict(outcome, "", 1.0, 9.0, 0.02, factor, True, 90.0, sought)
+
+
+def with_verdicts(*verdicts, keys=(), heads=(2e3, 6e3)):
+    """A report on nothing but verdicts at its heads."""
+    found = Gathered(load_case(None, [*KEYS, *keys]), "valve", heads, None)
+    for i, verdict in enumerate(verdicts, 1):
+        given = {"verdict": verdict, "stable": verdict.stable, "warnings": (), "failures": (), "certificates": {}}
+        found.results[f"heads-{i}"] = SimpleNamespace(**given)
+    return found
+
+
+def on_chatter(found):
+    return next(one for one in answers(found) if "chatter" in one.question)
+
+
+def test_a_multiple_of_the_damping_that_is_not_known_is_none_that_was_looked_at():
+    found = with_verdicts(damped("stable", np.nan, 0.05), damped("stable", np.nan))
+    assert [row[5] for row in heads_part(found).tables[0].rows] == ["none to 0.05", "-"]
+    found = with_verdicts(damped("stable", 0.4), damped("flutters", np.nan, 10.0))
+    lines = {line.get_label(): line.get_xydata() for line in vibration_figure(found).axes[1].lines}
+    assert lines["none found up to here"].tolist() == [[6.0, 10.0]] and "none found down to here" not in lines
+    np.testing.assert_allclose(lines["chatter below"], [[2.0, 0.4], [6.0, np.nan]])
 
 
 @pytest.mark.parametrize(
-    "classes, factor",
+    "classes, factor, sought",
     [
-        ({"SS": ("stable", 0.46), "SA": ("stable", np.nan), "AA": ("stable", 0.6)}, 0.6),
-        ({"SS": ("flutters", 1.3), "SA": ("stable", 0.6)}, 1.3),
-        ({"SS": ("flutters", 1.3), "SA": ("flutters", np.nan)}, np.nan),
-        ({"SS": ("stable", 0.5), "SA": ("undecided", np.nan)}, np.nan),
+        ({"SS": ("stable", 0.46), "SA": ("stable", np.nan, 0.05), "AA": ("stable", 0.6)}, 0.6, np.nan),
+        ({"SS": ("stable", np.nan, 0.05), "SA": ("stable", np.nan, 0.1)}, np.nan, 0.1),
+        ({"SS": ("stable", np.nan, 0.05), "SA": ("stable", np.nan)}, np.nan, np.nan),
+        ({"SS": ("flutters", 1.3), "SA": ("stable", 0.6)}, 1.3, np.nan),
+        ({"SS": ("flutters", 1.3), "SA": ("flutters", np.nan)}, np.nan, np.nan),
+        ({"SS": ("flutters", 1.3), "SA": ("flutters", np.nan, 8.0), "AA": ("stable", np.nan, 0.05)}, np.nan, 8.0),
+        ({"SS": ("stable", 0.5), "SA": ("undecided", np.nan)}, np.nan, np.nan),
     ],
 )
-def test_the_multiple_of_the_damping_is_that_of_all_classes(classes, factor):
-    parts = {name: Verdict(outcome, "", -1.0, 9.0, 0.02, x, True) for name, (outcome, x) in classes.items()}
-    assert Verdict.joined(parts).critical_damping_factor == pytest.approx(factor, nan_ok=True)
+def test_the_multiple_of_the_damping_is_that_of_all_classes(classes, factor, sought):
+    joined = Verdict.joined({name: damped(*given) for name, given in classes.items()})
+    found = joined.critical_damping_factor, joined.damping_sought
+    assert found == pytest.approx((factor, sought), nan_ok=True)
+    again = Verdict.read(json.loads(json.dumps(joined.summary())))
+    assert (again.critical_damping_factor, again.damping_sought) == pytest.approx(found, nan_ok=True)
+    assert ("damping_sought" in joined.summary()) == np.isfinite(sought)  # as in results that know of none
 
 
 def test_heads_at_which_a_verdict_is_one_on_the_fit_of_the_rubber_are_named(tmp_path):
