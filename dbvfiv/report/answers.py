@@ -14,7 +14,7 @@ import numpy as np
 
 from ..materials.shipped import shipped_loss, shipped_loss_names
 from ..studies.closure.safety import BUCKLING, CROSSING, END, SEAL, rated_verdict
-from ..studies.stability.verdict import DIVERGES
+from ..studies.stability.verdict import DIVERGES, Verdict
 from ..texts import digits, listed
 from .gather import Gathered, second_mesh
 
@@ -187,13 +187,8 @@ def _sure(found: Gathered, verdicts: dict) -> tuple[str, ...]:
         theirs, ours = (digits(100 * found.damping_ratio, 2) for found in (other.verdict, own))
         said.append(f"second mesh ({_mesh(found)}): {_verdict(other.verdict)}, damping ratio {theirs} against {ours} %")
     spread = loss_range(found.case)
-    factors = [v.critical_damping_factor for v in verdicts.values() if np.isfinite(v.critical_damping_factor)]
     if spread is not None:
-        low, high = spread
-        always = any(v.stable is False for v in verdicts.values()) and max(factors, default=0.0) > high
-        holds = always or not any(low <= factor <= high for factor in factors)  # one head that chatters is enough
-        word = "holds" if holds else "does not hold"
-        said.append(f"over the range of the loss factors, {low:.2g} to {high:.2g} times: the verdict {word}")
+        said.append(_over_losses(verdicts.values(), *spread))
     else:
         said.append("range of the damping: not examined (none is known of given constants)")
     for level in _by_level(found, "modes"):
@@ -201,6 +196,23 @@ def _sure(found: Gathered, verdicts: dict) -> tuple[str, ...]:
     if (chance := _chance(found)) is not None:
         said.append(chance)
     return tuple(said)
+
+
+def _over_losses(verdicts: Iterable[Verdict], low: float, high: float) -> str:
+    """Whether the verdict on all heads holds to that end of a range of multiples of the damping which multiples were
+    looked at to: the low one of a stable valve, the high one of a valve that chatters, for which one head is enough.
+    """
+    bad = [v for v in verdicts if v.stable is False]
+    if bad:
+        end, examined = f"up to {high:.2g}", high > 1
+        holds = any(v.outcome == DIVERGES or v.critical_damping_factor >= high or v.damping_sought >= high for v in bad)
+        fails = all(v.critical_damping_factor < high for v in bad)
+    else:
+        end, examined = f"down to {low:.2g}", low < 1
+        holds = all(v.critical_damping_factor < low or v.damping_sought <= low for v in verdicts)
+        fails = any(v.critical_damping_factor >= low for v in verdicts)
+    word = "the verdict holds" if holds else "the verdict does not hold" if fails else "not examined"
+    return f"over the range of the loss factors, {end} times: {word if examined else 'not examined'}"
 
 
 def _fits(found: Gathered) -> Iterable[str]:
@@ -231,13 +243,14 @@ def _chance(found: Gathered) -> str | None:
 
 def loss_range(case) -> tuple[float, float] | None:
     """Ends of the range of the shipped loss factors over those of the case; None where it has none of them."""
-    if not case.damping.relaxes:
+    own = case.damping.loss_factor if case.damping.relaxes else 0.0
+    data = [case.materials.loss(layer.material) for layer in case.layers]
+    known = [
+        shipped_loss(one.loss_factor) for one in data if one is not None and one.loss_factor in shipped_loss_names()
+    ]
+    if not (own and known):
         return None
-    known = [shipped_loss(layer.material) for layer in case.layers if layer.material in shipped_loss_names()]
-    rubbers = [one for one in known if one.value]
-    if not rubbers:
-        return None
-    return min(one.range[0] / one.value for one in rubbers), max(one.range[1] / one.value for one in rubbers)
+    return min(one.range[0] / one.value for one in known) / own, max(one.range[1] / one.value for one in known) / own
 
 
 def closes(found: Gathered) -> Answer:

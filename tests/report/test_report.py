@@ -23,7 +23,7 @@ from dbvfiv.errors import CaseError
 from dbvfiv.model import ValveModel
 from dbvfiv.model.material_stability import material_stability
 from dbvfiv.report import gather, write_page, write_pdf
-from dbvfiv.report.answers import UNKNOWN, answers, opens
+from dbvfiv.report.answers import UNKNOWN, answers, loss_range, opens
 from dbvfiv.report.figures import vibration_figure
 from dbvfiv.report.gather import Gathered, following, heads_of, planned
 from dbvfiv.report.parts import heads_part, steady_part
@@ -161,6 +161,41 @@ def with_verdicts(*verdicts, keys=(), heads=(2e3, 6e3)):
 
 def on_chatter(found):
     return next(one for one in answers(found) if "chatter" in one.question)
+
+
+@pytest.mark.parametrize(
+    "verdicts, told",
+    [
+        ((("stable", 0.3), ("stable", np.nan, 0.05)), "down to 0.5 times: the verdict holds"),
+        ((("stable", 0.3), ("stable", 0.7)), "down to 0.5 times: the verdict does not hold"),
+        ((("stable", 0.3), ("stable", np.nan, 0.6)), "down to 0.5 times: not examined"),
+        ((("flutters", np.nan, 10.0), ("flutters", 1.3)), "up to 1.5 times: the verdict holds"),
+        ((("flutters", 1.2), ("flutters", 1.3)), "up to 1.5 times: the verdict does not hold"),
+        ((("flutters", 1.2), ("flutters", np.nan)), "up to 1.5 times: not examined"),
+        ((("diverges", np.nan), ("stable", 0.7)), "up to 1.5 times: the verdict holds"),
+    ],
+)
+def test_a_verdict_over_the_range_of_the_loss_factors_is_on_what_was_looked_at(monkeypatch, verdicts, told):
+    monkeypatch.setattr("dbvfiv.report.answers.loss_range", lambda _: (0.5, 1.5))
+    (line,) = (x for x in on_chatter(with_verdicts(*(damped(*v) for v in verdicts))).uncertainty if "loss factors" in x)
+    assert line == f"over the range of the loss factors, {told}"
+
+
+@pytest.mark.parametrize(
+    "keys, expected",
+    [
+        ([], (0.4, 2.0)),  # that of the fibre
+        (["damping.loss_factor=2"], (0.2, 1.0)),
+        (["damping.loss_factor=0"], None),
+        ([f"materials.{name}.loss_factor=0.3" for name in ("CR", "SBR", "EPDM", "fibre")], None),
+        (
+            ["materials.CR.loss_factor=NBR", *(f"materials.{x}.loss_factor=1" for x in ("SBR", "EPDM", "fibre"))],
+            (0.5, 1.5),
+        ),
+    ],
+)
+def test_the_range_of_the_loss_factors_is_that_of_the_shipped_ones_that_the_case_has(keys, expected):
+    assert loss_range(load_case(None, keys)) == (None if expected is None else pytest.approx(expected))
 
 
 def test_a_multiple_of_the_damping_that_is_not_known_is_none_that_was_looked_at():
