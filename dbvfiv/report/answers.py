@@ -6,6 +6,7 @@ with a reason anywhere else.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable
 from dataclasses import asdict, dataclass
 from typing import Any
@@ -14,7 +15,8 @@ import numpy as np
 
 from ..materials.shipped import shipped_loss, shipped_loss_names
 from ..studies.closure.safety import BUCKLING, CROSSING, END, SEAL, rated_verdict
-from ..studies.stability.verdict import DIVERGES, Verdict
+from ..studies.onset.search import NO_ONSET
+from ..studies.stability.verdict import DIVERGES, FLUTTERS, Verdict
 from ..texts import digits, listed
 from .gather import Gathered, second_mesh
 
@@ -119,22 +121,27 @@ def chatters(found: Gathered) -> Answer:
         f"No certain verdict at {listed(units.pressure(p, 3) for p in at)}: {why}" for why, at in reasons.items()
     ]
     if bad:
-        worst = verdicts[max(bad, key=lambda p: verdicts[p].growth_rate)]
-        kind = "flutters" if worst.outcome == "flutters" else "diverges, without oscillating,"
-        text = f"It {kind} at {listed(units.pressure(p, 3) for p in bad)}"
-        swings = [verdicts[p].frequency for p in bad if verdicts[p].frequency > 0]
-        ends = dict.fromkeys(digits(end(swings)) for end in (min, max)) if swings else ()
-        text += f", at {' to '.join(ends)} Hz" if ends else ""
-        text = " ".join(filter(None, (f"{text}.", _onsets(found), *open_heads)))
+        text = " ".join(filter(None, (*_unstable(found, verdicts), _onsets(found), *open_heads)))
         return Answer(question, YES, text, _factor(found), _sure(found, verdicts))
     if unknown:
         return Answer(question, UNKNOWN, " ".join(open_heads), _factor(found))
-    least = min(verdicts.values(), key=lambda v: v.damping_ratio)
-    text = (
-        f"Stable at all {len(verdicts)} heads in every symmetry class; the least damped mode has a damping ratio of "
-        f"{digits(100 * least.damping_ratio, 2)} %, at {units.pressure(found.worst, 3)}."
-    )
-    return Answer(question, NO, text, _factor(found), _sure(found, verdicts))
+    text, least = f"Stable at all {len(verdicts)} heads in every symmetry class", verdicts[found.worst].damping_ratio
+    if np.isfinite(least):
+        text += f"; the least damped mode has a damping ratio of {digits(100 * least, 2)} %, "
+        text += f"at {units.pressure(found.worst, 3)}"
+    return Answer(question, NO, f"{text}.", _factor(found), _sure(found, verdicts))
+
+
+def _unstable(found: Gathered, verdicts: dict[float, Verdict]) -> Iterable[str]:
+    """Sentences on the heads at which the valve flutters, with its frequencies, and on those at which it diverges."""
+    for outcome, words in ((FLUTTERS, "It flutters"), (DIVERGES, "It diverges, without oscillating,")):
+        heads = [p for p, verdict in verdicts.items() if verdict.outcome == outcome]
+        swings = [verdicts[p].frequency for p in heads if verdicts[p].frequency > 0]
+        ends = dict.fromkeys(digits(end(swings)) for end in (min, max)) if swings else ()
+        at = listed(found.case.units.pressure(p, 3) for p in heads)
+        at += f", at {' to '.join(ends)} Hz" if ends else ""
+        if heads:
+            yield f"{words} at {at}."
 
 
 def _missing_head(found: Gathered, pressure: float) -> str:
@@ -145,14 +152,22 @@ def _onsets(found: Gathered) -> str:
     onset = found.get("onset")
     if onset is None or not onset.points:
         return "" if "onset" not in found.missing else f"Where it begins is not examined: {found.missing['onset']}"
-    units, said = found.case.units, []
+    units, said = found.case.units, {"Chatter": [], "Divergence": []}
     for point in (p for p in onset.points if p["edge"]):
         sure = "" if not point["uncertainty"] else f" ± {units.pressure(point['uncertainty'], 1)} (second mesh)"
-        if point["uncertainty"] is None and onset.case.onset.coarse_mesh:
-            sure = " (the second mesh has no onset like it)"
-        word = "begins" if point["gains"] else "ends"
-        said.append(f"{word} at {units.pressure(point['value'], 3)}{sure}, {digits(point['frequency'])} Hz")
-    return f"Chatter {listed(said)}." if said else ""
+        sure += f" (the second mesh {lacks})" if (lacks := lacking(point)) else ""
+        sure += "" if point["confirmed"] else " (not confirmed)"
+        at = f"{'begins' if point['gains'] else 'ends'} at {units.pressure(point['value'], 3)}{sure}"
+        oscillates = point["frequency"] > 0
+        at += f", {digits(point['frequency'])} Hz" if oscillates else ""
+        said["Chatter" if oscillates else "Divergence"].append(at)
+    return " ".join(f"{kind} {listed(points)}." for kind, points in said.items() if points)
+
+
+def lacking(point: dict[str, Any]) -> str:
+    """What the second mesh lacks, "has no onset like it"; empty of an onset that was found on both, or on one alone."""
+    found = re.search(f"{NO_ONSET}[^,]*", point["note"] or "")
+    return found[0] if found else ""
 
 
 def _factor(found: Gathered) -> str:
@@ -184,8 +199,10 @@ def _sure(found: Gathered, verdicts: dict) -> tuple[str, ...]:
     if other is None:
         said.append(_not_there(found, "mesh-modes", "mesh"))
     else:
-        theirs, ours = (digits(100 * found.damping_ratio, 2) for found in (other.verdict, own))
-        said.append(f"second mesh ({_mesh(found)}): {_verdict(other.verdict)}, damping ratio {theirs} against {ours} %")
+        theirs, ours = (100 * verdict.damping_ratio for verdict in (other.verdict, own))
+        known = np.isfinite([theirs, ours]).all()
+        ratios = f", damping ratio {digits(theirs, 2)} against {digits(ours, 2)} %" if known else ""
+        said.append(f"second mesh ({_mesh(found)}): {_verdict(other.verdict)}{ratios}")
     spread = loss_range(found.case)
     if spread is not None:
         said.append(_over_losses(verdicts.values(), *spread))

@@ -25,6 +25,7 @@ from ..observer import Observer, is_watched
 from ..studies.case import Case
 from ..studies.session import Session, kept_run, load_result
 from ..studies.stability.place import why_it_moves
+from ..studies.stability.verdict import DIVERGES
 from ..studies.workers import Lost, Work, Workers
 
 #: What a report can leave out.
@@ -144,9 +145,11 @@ def is_on_own_mesh(name: str) -> bool:
     return name.partition("-")[0] not in ("mesh", "levels")
 
 
-def _nearness(verdict) -> float:
-    """Nearness of a state to chatter: negative least damping ratio."""
-    return -verdict.damping_ratio if np.isfinite(verdict.damping_ratio) else -np.inf
+def _nearness(verdict) -> tuple[bool, float]:
+    """Nearness of a state to chatter: growth rate of one that diverges, else the negative least damping ratio."""
+    diverges = verdict.outcome == DIVERGES
+    size = verdict.growth_rate if diverges else -verdict.damping_ratio
+    return diverges, size if np.isfinite(size) else -np.inf
 
 
 def heads_of(case: Case) -> tuple[float, ...]:

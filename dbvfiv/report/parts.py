@@ -22,7 +22,7 @@ from ..materials.stability import StableRange, stable_range
 from ..model.symmetry import symmetry_named
 from ..record.mesh import MeshData
 from ..texts import digits, listed
-from .answers import loss_range
+from .answers import lacking, loss_range
 from .figures import closure_figure, headloss_figure, live_valve, pipe_figure, vibration_figure
 from .gather import Gathered, is_on_own_mesh
 
@@ -254,13 +254,16 @@ def onset_part(found: Gathered) -> Part | None:
     kinds = {"super": "softly (supercritical)", "sub": "hard (subcritical)"}
 
     def apart(p) -> str:
-        return "no such onset there" if p["uncertainty"] is None else f"{p['uncertainty'] / row.scale:.2g}"
+        unknown = "no such onset there" if lacking(p) else "-"
+        return unknown if p["uncertainty"] is None else f"{p['uncertainty'] / row.scale:.2g}"
 
     columns = {
         f"{_pressure_title(found)}, {row.shown_unit}": lambda p: f"{p['value'] / row.scale:.4g}",
         f"+- (second mesh), {row.shown_unit}": apart,
         "frequency, Hz": lambda p: f"{p['frequency']:.4g}",
-        "what changes": lambda p: ("unstable" if p["gains"] else "stable") + " above",
+        "what changes": lambda p: (
+            ("unstable" if p["gains"] else "stable") + " above" + ("" if p["confirmed"] else ", not confirmed")
+        ),
         "how": lambda p: kinds.get(p["criticality"], "-"),
     }
     tables = (Table.of(result.points, columns),) if result.points else ()

@@ -26,8 +26,9 @@ from dbvfiv.report import gather, write_page, write_pdf
 from dbvfiv.report.answers import UNKNOWN, answers, loss_range, opens
 from dbvfiv.report.figures import vibration_figure
 from dbvfiv.report.gather import Gathered, following, heads_of, planned
-from dbvfiv.report.parts import heads_part, steady_part
+from dbvfiv.report.parts import heads_part, onset_part, steady_part
 from dbvfiv.studies.case import load_case
+from dbvfiv.studies.onset.search import NO_ONSET
 from dbvfiv.studies.stability.verdict import Verdict
 from dbvfiv.studies.steady.study import Cracking
 from dbvfiv.studies.workers import Lost, Workers
@@ -196,6 +197,44 @@ def test_a_verdict_over_the_range_of_the_loss_factors_is_on_what_was_looked_at(m
 )
 def test_the_range_of_the_loss_factors_is_that_of_the_shipped_ones_that_the_case_has(keys, expected):
     assert loss_range(load_case(None, keys)) == (None if expected is None else pytest.approx(expected))
+
+
+def test_heads_that_flutter_and_heads_that_diverge_are_told_apart():
+    flutters = Verdict("flutters", "", 3.0, 31.0, -0.015, certain=True)
+    diverges = Verdict("diverges", "", 0.5, 0.0, 0.03, certain=True)
+    found = with_verdicts(flutters, diverges)
+    assert on_chatter(found).text == "It flutters at 2 kPa, at 31 Hz. It diverges, without oscillating, at 6 kPa."
+    assert found.worst == 6e3  # the second mesh has a look at that, and not at a stable head or a lesser evil
+    assert on_chatter(with_verdicts(diverges, diverges)).text == "It diverges, without oscillating, at 2 kPa and 6 kPa."
+
+
+def test_the_least_damped_mode_is_that_of_a_head_that_has_modes():
+    still, rings = Verdict("stable", "", certain=True), Verdict("stable", "", -2.0, 9.0, 0.04, certain=True)
+    told = "Stable at all 2 heads in every symmetry class"
+    said = on_chatter(with_verdicts(still, rings)).text
+    assert said == f"{told}; the least damped mode has a damping ratio of 4 %, at 6 kPa."
+    assert on_chatter(with_verdicts(still, still)).text == f"{told}."
+
+
+def test_onsets_are_told_with_their_kind_and_with_what_speaks_against_them():
+    found = with_verdicts(damped("stable", np.nan), damped("flutters", np.nan))
+    own = {"edge": True, "gains": True, "uncertainty": None, "confirmed": True, "note": None, "criticality": None}
+    note = f"The mesh of 6 x 6 {NO_ONSET}{{}}, so its uncertainty is unknown."
+    points = [
+        own | {"value": 3e3, "frequency": 31.0},
+        own | {"value": 4e3, "frequency": 30.0, "gains": False, "confirmed": False},
+        own | {"value": 5e3, "frequency": 29.0, "note": note.format("")},
+        own | {"value": 6e3, "frequency": 0.0, "note": note.format(" that was solved")},
+    ]
+    found.results["onset"] = SimpleNamespace(points=points, failures=(), case=found.case)
+    assert on_chatter(found).text.partition("Hz. ")[2] == (
+        "Chatter begins at 3 kPa, 31 Hz, ends at 4 kPa (not confirmed), 30 Hz and begins at 5 kPa (the second mesh "
+        "has no onset like it), 29 Hz. "
+        "Divergence begins at 6 kPa (the second mesh has no onset like it that was solved)."
+    )
+    rows = onset_part(found).tables[0].rows
+    assert [row[1] for row in rows] == ["-", "-", "no such onset there", "no such onset there"]
+    assert [row[3] for row in rows][:2] == ["unstable above", "stable above, not confirmed"]
 
 
 def test_a_multiple_of_the_damping_that_is_not_known_is_none_that_was_looked_at():
