@@ -23,6 +23,7 @@ from ..errors import CaseError, SolveError
 from ..model.sizes import ValveSizes
 from ..observer import Observer, is_watched
 from ..studies.case import Case
+from ..studies.inputs import Plan
 from ..studies.session import Session, kept_run, load_result
 from ..studies.stability.place import why_it_moves
 from ..studies.stability.verdict import DIVERGES
@@ -233,7 +234,7 @@ def following(found: Gathered) -> Iterator[Run]:
             keys = quick | {"drive.pressure": pressure, "sweep.over": span}
             yield Run(f"pipe-{i}", "sweep", f"length of the pipe at {case.units.pressure(pressure)}", keys, 5)
     if case.uncertainty.model_fields_set:
-        over = {} if case.uncertainty.over else {"drive.pressure": worst}
+        over = {} if case.uncertainty.over else {"drive.pressure": _drawn_about(case, worst)}
         yield Run("chance", "uncertainty", "probability of chatter", over, 1.0 * case.uncertainty.samples)
     changed = [
         pair
@@ -242,8 +243,22 @@ def following(found: Gathered) -> Iterator[Run]:
     ]
     if changed:
         low, high = changed[0][0][0], changed[-1][1][0]
-        keys = {"onset.over": f"pressure={low:.9g}:{high:.9g}:{2 + len(changed)}", "onset.continuity": "case"}
+        between = [p for p in found.modes if low < p < high] or [0.5 * (low + high)]  # what is known of them stays so
+        over = ",".join(f"{p:.9g}" for p in (low, *between, high))
+        keys = {"onset.over": f"pressure={over}", "onset.continuity": "case"}
         yield Run("onset", "onset", "head at which chatter begins", keys | {"onset.symmetry": "all"}, 40)
+
+
+def _drawn_about(case: Case, pressure: float) -> float:
+    """Pressure, Pa, that samples of a case are told at: one that is asked for, or the median of the pressures that the
+    case says it has whatever it is driven by.
+    """
+    medians = set()
+    with suppress(CaseError):  # of inputs that cannot be used, which the study refuses
+        for own in (pressure, 1.01 * pressure):
+            inputs = Plan(case.replace({"drive.pressure": own})).inputs
+            medians |= {one.distribution.median for one in inputs if one.name == "pressure"}
+    return medians.pop() if len(medians) == 1 else pressure
 
 
 def cycle_run(found: Gathered) -> Iterator[Run]:

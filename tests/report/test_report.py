@@ -18,6 +18,7 @@ import pytest
 from PIL import Image
 
 from dbvfiv.api import Valve
+from dbvfiv.case.axis import parse_axis
 from dbvfiv.case.units import UNITS
 from dbvfiv.errors import CaseError
 from dbvfiv.model import ValveModel
@@ -411,6 +412,32 @@ def test_lengths_of_the_pipe_are_fewer_where_each_has_a_curve_of_equilibria(name
     (pipe,) = (run.changes for run in following(found) if run.part == "pipe")
     assert pipe["sweep.over"] == f"pipe_length={span}" and pipe["drive.pressure"] == 2e3
     assert pipe.get("mesh.along") == along
+
+
+@pytest.mark.parametrize(
+    "stable, over",
+    [
+        ((True, False, True, True, True, False), (2e3, 5e3, 1e4, 2e4, 4e4, 7e4)),
+        ((True, True, False, True, True, True), (5e3, 1e4, 2e4)),
+        ((True, False, False, False, False, False), (2e3, 3.5e3, 5e3)),
+    ],
+)
+def test_onsets_are_sought_between_the_heads_that_differ(stable, over):
+    heads = (2e3, 5e3, 1e4, 2e4, 4e4, 7e4)
+    found = with_verdicts(*(damped("stable" if one else "flutters", np.nan) for one in stable), heads=heads)
+    (run,) = (run for run in following(found) if run.name == "onset")
+    assert parse_axis(run.changes["onset.over"]).values == over
+
+
+@pytest.mark.parametrize(
+    "pressure, told", [("normal(20 kPa, 1 kPa)", 20e3), ("normal(5 %)", 2e3), ("uniform(0 %, 10 %)", 2e3), (None, 2e3)]
+)
+def test_samples_are_told_at_the_pressure_that_they_are_drawn_about(pressure, told):
+    inputs = {"thickness": "lognormal(1.1)"} | ({"pressure": pressure} if pressure else {})
+    keys = [f"uncertainty.inputs.{name}={text}" for name, text in inputs.items()]
+    found = SimpleNamespace(case=load_case(None, [*KEYS, *keys]), worst=2e3, heads=(2e3, 6e3), modes={})
+    (run,) = (run for run in following(found) if run.name == "chance")
+    assert run.changes == {"drive.pressure": pytest.approx(told)}
 
 
 def test_heads_are_those_asked_or_shares_of_the_largest_pressure():
