@@ -318,13 +318,15 @@ def gather(
     bar.expect(list(planned(session.case)))
     if case.seeks_levels or case.valve.cracking_head:
         bar.expect([Run("settled", "levels", "strain levels" if case.seeks_levels else "cracking head", {}, 12)])
-        session = session.settle(bar.of("settled")).at_cracking(bar.of("settled"))
+        session = session.settle(bar.of("settled"))
+        session.at_cracking(bar.of("settled"))
         bar.done("settled")
+    given, session = session, session.at_cracking()
     sizes = ValveSizes.of(session.described)
     found = Gathered(session.case, name, heads_of(session.case), sizes, levels=str(session.settled or ""))
     found.missing = dict.fromkeys(leave_out, "It was left out.")
     found.not_asked = set(leave_out)
-    studies = _Studies(found, session, folder, workers, bar)
+    studies = _Studies(found, session, folder, workers, bar, given)
     for runs in (planned, following, cycle_run):
         asked = runs(found.case if runs is planned else found)
         studies.make([run for run in asked if not {*run.name.split("-")} & {*leave_out}])
@@ -340,13 +342,17 @@ def _processor_time() -> float:
 
 @dataclass
 class _Studies:
-    """Runs of one report, from their files where these are there."""
+    """Runs of one report, from their files where these are there; `given` has a cracking head in place of the sealing
+    pressure that was found for it.
+    """
 
     found: Gathered
     session: Session
     folder: Path
     workers: int
     bar: Bar
+    given: Session
+    _cracking: dict[str, Session] = field(default_factory=dict)
 
     def make(self, runs: list[Run]) -> None:
         """Make runs; the steady states first, from which modes start, and the others by several processes."""
@@ -364,11 +370,20 @@ class _Studies:
 
     def _asked(self, run: Run) -> Session:
         """Session of a run, with the steady state it starts from where that is known."""
-        asked = self.session.replace(run.changes)
+        asked = self._walled(run.changes).replace(run.changes)
         if "mesh.around" not in run.changes and "drive.pressure" in run.changes:
             state = self.found.state(run.changes["drive.pressure"])
             asked.start = None if state is None else state.solution()
         return asked
+
+    def _walled(self, changes: dict[str, Any]) -> Session:
+        """Session of the case; on another mesh, or with other constants, one that cracks at the same head."""
+        wall = {key: value for key, value in changes.items() if key.startswith(("mesh.", "materials."))}
+        if not (wall and self.given.case.valve.cracking_head):
+            return self.session
+        if str(wall) not in self._cracking:
+            self._cracking[str(wall)] = self.given.replace(wall).at_cracking()
+        return self._cracking[str(wall)]
 
     def _path(self, run: Run) -> Path:
         return self.folder / f"{self.found.name}-{run.name}.h5"
@@ -394,7 +409,7 @@ class _Studies:
         """
         asked = {}
         for run in sorted(runs, key=lambda run: -run.share):  # longest first
-            with suppress(CaseError):
+            with suppress(CaseError, SolveError):
                 asked[run.name] = Work(_fill, (run.kind, self._asked(run), self._path(run)))
         with Workers(min(self.workers, len(asked)), str, (), self.bar.warn) as team:
             lost = []

@@ -26,10 +26,11 @@ from dbvfiv.model.material_stability import material_stability
 from dbvfiv.report import gather, write_page, write_pdf
 from dbvfiv.report.answers import UNKNOWN, answers, loss_range, opens
 from dbvfiv.report.figures import vibration_figure
-from dbvfiv.report.gather import Gathered, following, heads_of, planned
+from dbvfiv.report.gather import Gathered, Run, _Studies, following, heads_of, planned, second_mesh
 from dbvfiv.report.parts import heads_part, onset_part, steady_part
 from dbvfiv.studies.case import load_case
 from dbvfiv.studies.onset.search import NO_ONSET
+from dbvfiv.studies.session import Session
 from dbvfiv.studies.stability.verdict import Verdict
 from dbvfiv.studies.steady.study import Cracking
 from dbvfiv.studies.workers import Lost, Workers
@@ -438,6 +439,28 @@ def test_samples_are_told_at_the_pressure_that_they_are_drawn_about(pressure, to
     found = SimpleNamespace(case=load_case(None, [*KEYS, *keys]), worst=2e3, heads=(2e3, 6e3), modes={})
     (run,) = (run for run in following(found) if run.name == "chance")
     assert run.changes == {"drive.pressure": pytest.approx(told)}
+
+
+def test_the_valve_of_the_second_mesh_cracks_at_the_head_of_the_case(monkeypatch, tmp_path):
+    sought = []
+
+    def sealing(case, _ratio, _observer):
+        sought.append(case.mesh.along)
+        return 10.0 * case.mesh.along
+
+    monkeypatch.setattr("dbvfiv.studies.session.sealing_for_cracking", sealing)
+    cracks = {"valve.sealing_pressure": None, "valve.cracking_head": 0.1}
+    given = Session(load_case("cases/dbv12-moulded.toml").replace(cracks))
+    found = SimpleNamespace(state=lambda _: None)
+    studies = _Studies(found, given.at_cracking(), tmp_path, 1, None, given)
+
+    def of(**changes):
+        return studies._asked(Run("mesh-modes", "modes", "", changes, 1)).case.valve.sealing_pressure
+
+    assert of(**{"drive.pressure": 2e3}) == 480.0
+    coarse = second_mesh(given.case)
+    assert [of(**coarse), of(**coarse | {"drive.pressure": 2e3})] == [240.0, 240.0]
+    assert sought == [48, 24]
 
 
 def test_heads_are_those_asked_or_shares_of_the_largest_pressure():
