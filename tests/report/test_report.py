@@ -248,6 +248,14 @@ def test_a_multiple_of_the_damping_that_is_not_known_is_none_that_was_looked_at(
     np.testing.assert_allclose(lines["chatter below"], [[2.0, 0.4], [6.0, np.nan]])
 
 
+def test_the_band_of_a_verdict_on_several_classes_is_the_least_of_them():
+    sways, parts = Verdict("stable", "", -1.0, 9.0, band=140.0), Verdict("stable", "", -2.0, 9.0, band=92.7)
+    left_open = Verdict.undecided("Nothing.")
+    assert Verdict.joined({"SS": parts, "SA": sways}).band == 92.7
+    assert Verdict.joined({"SS": parts, "SA": left_open}).band == 92.7
+    assert np.isnan(Verdict.joined({"SS": left_open, "SA": left_open}).band)
+
+
 @pytest.mark.parametrize(
     "classes, factor, sought",
     [

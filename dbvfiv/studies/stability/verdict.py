@@ -151,7 +151,8 @@ class Verdict:
 
     @classmethod
     def joined(cls, parts: Mapping[str, Verdict]) -> Verdict:
-        """Verdict on all symmetry classes of a state by their names: the worst of them, certain if all are.
+        """Verdict on all symmetry classes of a state by their names: the worst of them, certain if all are, up to the
+        frequency that all were looked at.
 
         Flutter begins where that of the first class does, and ends where that of the last one does; nothing is known of
         that where a class is undecided or diverges. None begins down to a factor if every class was looked at, and none
@@ -173,6 +174,7 @@ class Verdict:
             critical_damping_factor=np.nan if len(known) < len(unstable) else max(known, default=np.nan),
             damping_sought=float(np.max(sought)) if sought else np.nan,
             certain=all(part.certain for part in parts.values()),
+            band=min((part.band for part in parts.values() if not np.isnan(part.band)), default=np.nan),
         )
 
     @property
