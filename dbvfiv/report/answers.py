@@ -72,11 +72,12 @@ def opens(found: Gathered) -> Answer:
     crack = steady.cracking
     if crack is None:
         return Answer(question, UNKNOWN, "No cracking head was found below the heads examined.")
+    cracks = "" if crack.pressure is None else units.pressure(found.case.rest_pressure + crack.pressure, 3)
     if crack.pressure is None or state.hydraulics is None:
-        beyond = "" if crack.pressure is None else f"; they do at {units.pressure(crack.pressure, 3)}"
+        beyond = f"; they do at {cracks}" if cracks else ""
         return Answer(question, NO, f"The lips do not crack up to {units.pressure(top)}{beyond}.")
     text = (
-        f"Cracks at {units.pressure(crack.pressure, 3)}; at {units.pressure(top)} the opening is "
+        f"Cracks at {cracks}; at {units.pressure(top)} the opening is "
         f"{units.text_of('size', state.lip_opening, 3)}, {units.text_of('flow', state.volume_flow, 3)} flow with a jet "
         f"of {units.text_of('velocity', state.outlet_velocity, 3)} and a head loss of "
         f"{units.text_of('head', state.hydraulics.head_loss, 3)}."
@@ -360,7 +361,8 @@ def trade(found: Gathered) -> list[tuple[str, str]]:
     bore = 2 * (case.valve.inlet_radius - case.valve.flange_wall_deduction)
     rows += [("bill, width x height", bill), ("bore", units.text_of("size", bore, 4))]
     if steady is not None and steady.cracking is not None and steady.cracking.pressure is not None:
-        rows += [("cracking head", units.pressure(steady.cracking.pressure, 3))]
+        over = " over that at rest" if case.rest_pressure else ""
+        rows += [("cracking head", f"{units.pressure(steady.cracking.pressure, 3)}{over}")]
     if state is not None and state.hydraulics is not None:
         at = f"at {units.pressure(state.pressure, 3)}"
         rows += [

@@ -13,7 +13,7 @@ import plotly.graph_objects as go
 from matplotlib.figure import Figure
 from plotly.offline import get_plotlyjs
 
-from ..drawing.style import COMPUTED, DANGER, PUBLISHED, STABLE, UNSTABLE, new_figure
+from ..drawing.style import COMPUTED, DANGER, PUBLISHED, STABLE, UNSTABLE, new_figure, parameter_label
 from ..drawing.views import ValveSkin
 from .answers import loss_range
 from .gather import Gathered
@@ -62,7 +62,7 @@ def vibration_figure(found: Gathered) -> Figure:
     ratio.set_ylabel(_LEAST_DAMPED)
     _factors(found, factor, head, verdicts.values())
     for axes in (ratio, factor):
-        axes.set_xlabel("Head, kPa" if found.case.units.heads else "Inlet pressure, kPa")
+        axes.set_xlabel("Head, kPa" if found.case.units.heads else parameter_label(found.case, "pressure"))
         axes.set_xlim(left=0)
     return figure
 

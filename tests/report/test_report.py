@@ -24,7 +24,7 @@ from dbvfiv.errors import CaseError
 from dbvfiv.model import ValveModel
 from dbvfiv.model.material_stability import material_stability
 from dbvfiv.report import gather, write_page, write_pdf
-from dbvfiv.report.answers import UNKNOWN, answers, loss_range, opens
+from dbvfiv.report.answers import UNKNOWN, answers, loss_range, opens, trade
 from dbvfiv.report.figures import vibration_figure
 from dbvfiv.report.gather import Gathered, Run, _Studies, following, heads_of, planned, second_mesh
 from dbvfiv.report.parts import heads_part, onset_part, steady_part
@@ -413,6 +413,29 @@ def test_heads_at_which_the_bill_is_sealed_have_rows_without_losses(made):
     assert [row[1] for row in heads_part(found).tables[0].rows][-1] == "flutters (sealed)"
     answer = opens(found)  # the bill cracks above the heads examined, at a pressure that the case has besides
     assert answer.answer == "no" and answer.text.endswith("; they do at 0.612 m.")
+
+
+@pytest.mark.parametrize(
+    "top, text", [(12e3, "up to 12 kPa; they do at 13 kPa."), (20e3, "Cracks at 13 kPa; at 20 kPa")]
+)
+def test_the_lips_crack_above_the_pressure_downstream(top, text):
+    case = load_case(None, [*KEYS, "downstream.pressure=10 kPa"])
+    found = Gathered(case, "valve", (11e3, top), SimpleNamespace(bill_width=0.2, bill_height=0.1))
+    losses = SimpleNamespace(head_loss=0.9)
+    state = SimpleNamespace(pressure=top, lip_opening=0.03, volume_flow=0.02, outlet_velocity=4.0, hydraulics=losses)
+    state.hydraulics = losses if top > 13e3 else None
+    found.results["steady"] = SimpleNamespace(states=(state,), cracking=Cracking(2.0, 3e3, 0.3), failures=())
+    assert text in opens(found).text
+    assert ("cracking head", "3 kPa over that at rest") in trade(found)
+
+
+@pytest.mark.parametrize(
+    "name, label", [("dbv12", "Static inlet pressure"), ("dbv12-in-line", "Pressure in the reservoir")]
+)
+def test_the_axis_of_the_heads_names_the_place_of_the_pressure(name, label):
+    found = with_verdicts(damped("stable", 0.4), damped("stable", 0.4))
+    found.case = load_case(f"cases/{name}.toml", ["project.units=kPa"])
+    assert {axes.get_xlabel() for axes in vibration_figure(found).axes} == {f"{label}, kPa"}
 
 
 @pytest.mark.parametrize("name, span, along", [("in-line", "4:100:6:log", None), ("moulded", "4:100:3:log", 24)])
