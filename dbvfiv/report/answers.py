@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -52,8 +52,12 @@ class Answer:
 
 
 def answers(found: Gathered) -> list[Answer]:
-    """The four questions of page one."""
-    return [opens(found), chatters(found), closes(found), seals(found)]
+    """The four questions of page one, with the sentences of studies in the units of the case."""
+    say = found.case.units.say
+    return [
+        replace(one, text=say(one.text), margin=say(one.margin), uncertainty=tuple(map(say, one.uncertainty)))
+        for one in (opens(found), chatters(found), closes(found), seals(found))
+    ]
 
 
 def span(found: Gathered) -> str:

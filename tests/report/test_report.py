@@ -201,6 +201,11 @@ def test_the_range_of_the_loss_factors_is_that_of_the_shipped_ones_that_the_case
     assert loss_range(load_case(None, keys)) == (None if expected is None else pytest.approx(expected))
 
 
+def test_reasons_of_studies_are_told_in_the_units_of_the_case():
+    found = with_verdicts(*[Verdict.undecided("The wall at 6 kPa is 3 mm thin.")] * 2, keys=["project.units=psi, in"])
+    assert on_chatter(found).text.endswith("at 0.29 psi and 0.87 psi: The wall at 0.87 psi is 0.118 in thin.")
+
+
 def test_heads_that_flutter_and_heads_that_diverge_are_told_apart():
     flutters = Verdict("flutters", "", 3.0, 31.0, -0.015, certain=True)
     diverges = Verdict("diverges", "", 0.5, 0.0, 0.03, certain=True)
