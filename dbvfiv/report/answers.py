@@ -79,16 +79,23 @@ def opens(found: Gathered) -> Answer:
     cracks = "" if crack.pressure is None else units.pressure(found.case.rest_pressure + crack.pressure, 3)
     if crack.pressure is None or state.hydraulics is None:
         beyond = f"; they do at {cracks}" if cracks else ""
-        return Answer(question, NO, f"The lips do not crack up to {units.pressure(top)}{beyond}.")
+        return Answer(question, NO, f"The lips do not crack up to {units.pressure(top)}{beyond}.{_lost(found)}")
     text = (
         f"Cracks at {cracks}; at {units.pressure(top)} the opening is "
         f"{units.text_of('size', state.lip_opening, 3)}, {units.text_of('flow', state.volume_flow, 3)} flow with a jet "
         f"of {units.text_of('velocity', state.outlet_velocity, 3)} and a head loss of "
-        f"{units.text_of('head', state.hydraulics.head_loss, 3)}."
+        f"{units.text_of('head', state.hydraulics.head_loss, 3)}.{_lost(found)}"
     )
     ratio = (top - found.case.rest_pressure) / crack.pressure if crack.pressure > 0 else np.inf
     margin = f"{ratio:.3g} times the cracking head" if np.isfinite(ratio) else "open at rest by its weight"
     return Answer(question, YES, text, margin, (*_mesh_of_flow(found, state), *_levels_of_flow(found), _FLOW))
+
+
+def _lost(found: Gathered) -> str:
+    """Sentence on heads at which no steady state was found, behind another; empty without any."""
+    lost, failures = [p for p in found.heads if found.state(p) is None], found.get("steady").failures
+    at = listed(found.case.units.pressure(p, 3) for p in lost)
+    return f" No state was found at {at}: {failures[0]}" if lost and failures else ""
 
 
 def _mesh_of_flow(found: Gathered, state) -> Iterable[str]:
@@ -289,6 +296,8 @@ def closes(found: Gathered) -> Answer:
     collapse = _collapse(result, rated)
     text += f"{'' if shut else ' up to ' + units.pressure(states[-1].pressure, 3)}; {collapse}" if collapse else ""
     answer = YES if shut and states[-1].closed else NO
+    if not collapse and states[-1].pressure < rated * (1 - 1e-9):
+        answer, text = UNKNOWN, f"{text}; no state was found at the rated {units.pressure(rated, 3)}"
     return Answer(question, answer, text + ".", _margin(result), _closure_mesh(found))
 
 

@@ -24,7 +24,7 @@ from dbvfiv.errors import CaseError
 from dbvfiv.model import ValveModel
 from dbvfiv.model.material_stability import material_stability
 from dbvfiv.report import gather, write_page, write_pdf
-from dbvfiv.report.answers import UNKNOWN, answers, loss_range, opens, trade
+from dbvfiv.report.answers import UNKNOWN, answers, closes, loss_range, opens, trade
 from dbvfiv.report.figures import vibration_figure
 from dbvfiv.report.gather import Gathered, Run, _Studies, following, heads_of, planned, second_mesh
 from dbvfiv.report.parts import heads_part, onset_part, steady_part
@@ -432,6 +432,20 @@ def test_the_lips_crack_above_the_pressure_downstream(top, text):
     found.results["steady"] = SimpleNamespace(states=(state,), cracking=Cracking(2.0, 3e3, 0.3), failures=())
     assert text in opens(found).text
     assert ("cracking head", "3 kPa over that at rest") in trade(found)
+    found.results["steady"].failures = ("The state at 11 kPa was not found.",)
+    assert opens(found).text.endswith(" No state was found at 11 kPa: The state at 11 kPa was not found.")
+
+
+@pytest.mark.parametrize("rated, answer", [("60 kPa", "yes"), ("100 kPa", UNKNOWN)])
+def test_a_rated_pressure_that_was_not_reached_is_named(rated, answer):
+    case = load_case(None, [*KEYS, f"closure.rated_pressure={rated}"])
+    found = Gathered(case, "valve", (2e3, 6e3), None)
+    states = [SimpleNamespace(pressure=p, closed=True, beyond_limit=False) for p in (1e4, 6e4)]
+    nothing = {"failures": (), "critical_pressure": None, "safety": None, "classes": (), "buckling": ()}
+    found.results["closure"] = SimpleNamespace(states=states, case=case, **nothing)
+    told = closes(found)
+    missed = "; no state was found at the rated 100 kPa" if answer == UNKNOWN else ""
+    assert (told.answer, told.text) == (answer, f"Shut at 10 kPa and 60 kPa{missed}.")
 
 
 @pytest.mark.parametrize(
