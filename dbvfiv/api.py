@@ -94,7 +94,7 @@ class Valve:
     def plot(self, folder: str | Path = ".", format: str = "png", only: Sequence[str] = ()) -> list[Path]:
         """Draw the valve as its case describes it, with measures, wall and layers; nothing is solved."""
         model = self.session.described
-        figures = draw_figures({"valve": lambda: valve_figure(model)}, only, f"case {self.name!r}")
+        figures = draw_figures({"valve": lambda: valve_figure(model)}, only, f"case {self.name!r}", self.case.units)
         return write_figures(figures, folder, format)
 
     def replace(self, changes: Changes) -> Valve:

@@ -253,8 +253,9 @@ class Explorer:
         ------
         SolveError
         """
-        factor = critical_damping_factor(self.walk, answer.place, answer.verdict)
-        return replace(answer, verdict=replace(answer.verdict, critical_damping_factor=factor))
+        factor, sought = critical_damping_factor(self.walk, answer.place, answer.verdict)
+        verdict = replace(answer.verdict, critical_damping_factor=factor, damping_sought=sought)
+        return replace(answer, verdict=verdict)
 
     def _corners(self, place: Mu) -> list[Mu]:
         """Corners of the ranges that share the steady state of a point."""

@@ -208,7 +208,9 @@ class AskPanel:
                 name
             ].content = f"<b data-name='{name}' data-si='{state[name]!r}'>{_short(state[name] * factor)} {unit}</b>"
         ratio, margin = verdict["damping_ratio"], verdict["critical_damping_factor"]
-        missing = "none found" if whole else "–"
+        missing = "not known" if whole else "–"
+        if (sought := verdict.get("damping_sought")) is not None:
+            missing = f"none to {sought:.3g} × damping"
         self._margin.content = f"<b>{'–' if ratio is None else f'{100 * ratio:.3g} %'}</b>"
         self._factor.content = f"<b>{missing if margin is None else f'{margin:.3g} × damping'}</b>"
         self._verdict.text = verdict["outcome"].capitalize()

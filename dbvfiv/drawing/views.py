@@ -386,7 +386,7 @@ def _measure_pieces(axes: Axes, case: Case, height: float) -> None:
             continue
         arrow = {"arrowstyle": "<->", "lw": 0.9, "color": "0.3", "shrinkA": 0, "shrinkB": 0}
         axes.annotate("", (begin, height), (begin + length, height), arrowprops=arrow)
-        axes.text(begin + 0.5 * length, 1.03 * height, f"{name}\n{length:.4g}", ha="center", va="bottom", fontsize=8)
+        axes.text(begin + 0.5 * length, 1.03 * height, f"{name}\n{length:.4g} mm", ha="center", va="bottom", fontsize=8)
         begin += length
 
 

@@ -6,14 +6,17 @@ with a reason anywhere else.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from ..materials.shipped import shipped_loss, shipped_loss_names
 from ..studies.closure.safety import BUCKLING, CROSSING, END, SEAL, rated_verdict
+from ..studies.onset.search import NO_ONSET
+from ..studies.stability.verdict import DIVERGES, FLUTTERS, Verdict
 from ..texts import digits, listed
 from .gather import Gathered, second_mesh
 
@@ -49,8 +52,12 @@ class Answer:
 
 
 def answers(found: Gathered) -> list[Answer]:
-    """The four questions of page one."""
-    return [opens(found), chatters(found), closes(found), seals(found)]
+    """The four questions of page one, with the sentences of studies in the units of the case."""
+    say = found.case.units.say
+    return [
+        replace(one, text=say(one.text), margin=say(one.margin), uncertainty=tuple(map(say, one.uncertainty)))
+        for one in (opens(found), chatters(found), closes(found), seals(found))
+    ]
 
 
 def span(found: Gathered) -> str:
@@ -69,18 +76,26 @@ def opens(found: Gathered) -> Answer:
     crack = steady.cracking
     if crack is None:
         return Answer(question, UNKNOWN, "No cracking head was found below the heads examined.")
+    cracks = "" if crack.pressure is None else units.pressure(found.case.rest_pressure + crack.pressure, 3)
     if crack.pressure is None or state.hydraulics is None:
-        beyond = "" if crack.pressure is None else f"; they do at {units.pressure(crack.pressure, 3)}"
-        return Answer(question, NO, f"The lips do not crack up to {units.pressure(top)}{beyond}.")
+        beyond = f"; they do at {cracks}" if cracks else ""
+        return Answer(question, NO, f"The lips do not crack up to {units.pressure(top)}{beyond}.{_lost(found)}")
     text = (
-        f"Cracks at {units.pressure(crack.pressure, 3)}; at {units.pressure(top)} the opening is "
+        f"Cracks at {cracks}; at {units.pressure(top)} the opening is "
         f"{units.text_of('size', state.lip_opening, 3)}, {units.text_of('flow', state.volume_flow, 3)} flow with a jet "
         f"of {units.text_of('velocity', state.outlet_velocity, 3)} and a head loss of "
-        f"{units.text_of('head', state.hydraulics.head_loss, 3)}."
+        f"{units.text_of('head', state.hydraulics.head_loss, 3)}.{_lost(found)}"
     )
     ratio = (top - found.case.rest_pressure) / crack.pressure if crack.pressure > 0 else np.inf
     margin = f"{ratio:.3g} times the cracking head" if np.isfinite(ratio) else "open at rest by its weight"
     return Answer(question, YES, text, margin, (*_mesh_of_flow(found, state), *_levels_of_flow(found), _FLOW))
+
+
+def _lost(found: Gathered) -> str:
+    """Sentence on heads at which no steady state was found, behind another; empty without any."""
+    lost, failures = [p for p in found.heads if found.state(p) is None], found.get("steady").failures
+    at = listed(found.case.units.pressure(p, 3) for p in lost)
+    return f" No state was found at {at}: {failures[0]}" if lost and failures else ""
 
 
 def _mesh_of_flow(found: Gathered, state) -> Iterable[str]:
@@ -118,22 +133,27 @@ def chatters(found: Gathered) -> Answer:
         f"No certain verdict at {listed(units.pressure(p, 3) for p in at)}: {why}" for why, at in reasons.items()
     ]
     if bad:
-        worst = verdicts[max(bad, key=lambda p: verdicts[p].growth_rate)]
-        kind = "flutters" if worst.outcome == "flutters" else "diverges, without oscillating,"
-        text = f"It {kind} at {listed(units.pressure(p, 3) for p in bad)}"
-        swings = [verdicts[p].frequency for p in bad if verdicts[p].frequency > 0]
-        ends = dict.fromkeys(digits(end(swings)) for end in (min, max)) if swings else ()
-        text += f", at {' to '.join(ends)} Hz" if ends else ""
-        text = " ".join(filter(None, (f"{text}.", _onsets(found), *open_heads)))
+        text = " ".join(filter(None, (*_unstable(found, verdicts), _onsets(found), *open_heads)))
         return Answer(question, YES, text, _factor(found), _sure(found, verdicts))
     if unknown:
         return Answer(question, UNKNOWN, " ".join(open_heads), _factor(found))
-    least = min(verdicts.values(), key=lambda v: v.damping_ratio)
-    text = (
-        f"Stable at all {len(verdicts)} heads in every symmetry class; the least damped mode has a damping ratio of "
-        f"{digits(100 * least.damping_ratio, 2)} %, at {units.pressure(found.worst, 3)}."
-    )
-    return Answer(question, NO, text, _factor(found), _sure(found, verdicts))
+    text, least = f"Stable at all {len(verdicts)} heads in every symmetry class", verdicts[found.worst].damping_ratio
+    if np.isfinite(least):
+        text += f"; the least damped mode has a damping ratio of {digits(100 * least, 2)} %, "
+        text += f"at {units.pressure(found.worst, 3)}"
+    return Answer(question, NO, f"{text}.", _factor(found), _sure(found, verdicts))
+
+
+def _unstable(found: Gathered, verdicts: dict[float, Verdict]) -> Iterable[str]:
+    """Sentences on the heads at which the valve flutters, with its frequencies, and on those at which it diverges."""
+    for outcome, words in ((FLUTTERS, "It flutters"), (DIVERGES, "It diverges, without oscillating,")):
+        heads = [p for p, verdict in verdicts.items() if verdict.outcome == outcome]
+        swings = [verdicts[p].frequency for p in heads if verdicts[p].frequency > 0]
+        ends = dict.fromkeys(digits(end(swings)) for end in (min, max)) if swings else ()
+        at = listed(found.case.units.pressure(p, 3) for p in heads)
+        at += f", at {' to '.join(ends)} Hz" if ends else ""
+        if heads:
+            yield f"{words} at {at}."
 
 
 def _missing_head(found: Gathered, pressure: float) -> str:
@@ -144,33 +164,43 @@ def _onsets(found: Gathered) -> str:
     onset = found.get("onset")
     if onset is None or not onset.points:
         return "" if "onset" not in found.missing else f"Where it begins is not examined: {found.missing['onset']}"
-    units, said = found.case.units, []
+    units, said = found.case.units, {"Chatter": [], "Divergence": []}
     for point in (p for p in onset.points if p["edge"]):
         sure = "" if not point["uncertainty"] else f" ± {units.pressure(point['uncertainty'], 1)} (second mesh)"
-        if point["uncertainty"] is None and onset.case.onset.coarse_mesh:
-            sure = " (the second mesh has no onset like it)"
-        word = "begins" if point["gains"] else "ends"
-        said.append(f"{word} at {units.pressure(point['value'], 3)}{sure}, {digits(point['frequency'])} Hz")
-    return f"Chatter {listed(said)}." if said else ""
+        sure += f" (the second mesh {lacks})" if (lacks := lacking(point)) else ""
+        sure += "" if point["confirmed"] else " (not confirmed)"
+        at = f"{'begins' if point['gains'] else 'ends'} at {units.pressure(point['value'], 3)}{sure}"
+        oscillates = point["frequency"] > 0
+        at += f", {digits(point['frequency'])} Hz" if oscillates else ""
+        said["Chatter" if oscillates else "Divergence"].append(at)
+    return " ".join(f"{kind} {listed(points)}." for kind, points in said.items() if points)
+
+
+def lacking(point: dict[str, Any]) -> str:
+    """What the second mesh lacks, "has no onset like it"; empty of an onset that was found on both, or on one alone."""
+    found = re.search(f"{NO_ONSET}[^,]*", point["note"] or "")
+    return found[0] if found else ""
 
 
 def _factor(found: Gathered) -> str:
-    """Margin in damping: the factor on the damping of the wall at which the verdict changes, at the worst head; empty
-    where a head has no verdict.
+    """Margin in damping: the factor on the damping of the wall at which the verdict changes, at the worst head, or the
+    last one that was looked at; empty where a head has no verdict, or nothing is known of that.
     """
     verdicts = [result.verdict for result in found.modes.values()]
-    unstable = [v.critical_damping_factor for v in verdicts if v.stable is False]
-    if unstable:
-        quiet = f"quiet with {digits(max(unstable), 2)} times the damping"
-        return quiet if np.isfinite(unstable).all() else "no damping in reach quiets it"
+    if unstable := [v for v in verdicts if v.stable is False]:
+        if any(v.outcome == DIVERGES for v in unstable):
+            return "no damping quiets what diverges"
+        if sought := [v.damping_sought for v in unstable if np.isfinite(v.damping_sought)]:
+            return f"chatters up to {digits(max(sought), 2)} times the damping"
+        most = np.max([v.critical_damping_factor for v in unstable])
+        return f"quiet with {digits(most, 2)} times the damping" if np.isfinite(most) else ""
     if len(verdicts) < len(found.heads) or any(v.stable is None for v in verdicts):
         return ""
     factors = [v.critical_damping_factor for v in verdicts if np.isfinite(v.critical_damping_factor)]
-    return (
-        f"chatter begins at {digits(max(factors), 2)} times the damping"
-        if factors
-        else "stable down to 0.05 times the damping"
-    )
+    if factors:
+        return f"chatter begins at {digits(max(factors), 2)} times the damping"
+    least = np.max([v.damping_sought for v in verdicts])
+    return f"stable down to {digits(least, 2)} times the damping" if np.isfinite(least) else ""
 
 
 def _sure(found: Gathered, verdicts: dict) -> tuple[str, ...]:
@@ -181,16 +211,13 @@ def _sure(found: Gathered, verdicts: dict) -> tuple[str, ...]:
     if other is None:
         said.append(_not_there(found, "mesh-modes", "mesh"))
     else:
-        theirs, ours = (digits(100 * found.damping_ratio, 2) for found in (other.verdict, own))
-        said.append(f"second mesh ({_mesh(found)}): {_verdict(other.verdict)}, damping ratio {theirs} against {ours} %")
+        theirs, ours = (100 * verdict.damping_ratio for verdict in (other.verdict, own))
+        known = np.isfinite([theirs, ours]).all()
+        ratios = f", damping ratio {digits(theirs, 2)} against {digits(ours, 2)} %" if known else ""
+        said.append(f"second mesh ({_mesh(found)}): {_verdict(other.verdict)}{ratios}")
     spread = loss_range(found.case)
-    factors = [v.critical_damping_factor for v in verdicts.values() if np.isfinite(v.critical_damping_factor)]
     if spread is not None:
-        low, high = spread
-        always = any(v.stable is False for v in verdicts.values()) and max(factors, default=0.0) > high
-        holds = always or not any(low <= factor <= high for factor in factors)  # one head that chatters is enough
-        word = "holds" if holds else "does not hold"
-        said.append(f"over the range of the loss factors, {low:.2g} to {high:.2g} times: the verdict {word}")
+        said.append(_over_losses(verdicts.values(), *spread))
     else:
         said.append("range of the damping: not examined (none is known of given constants)")
     for level in _by_level(found, "modes"):
@@ -198,6 +225,23 @@ def _sure(found: Gathered, verdicts: dict) -> tuple[str, ...]:
     if (chance := _chance(found)) is not None:
         said.append(chance)
     return tuple(said)
+
+
+def _over_losses(verdicts: Iterable[Verdict], low: float, high: float) -> str:
+    """Whether the verdict on all heads holds to that end of a range of multiples of the damping which multiples were
+    looked at to: the low one of a stable valve, the high one of a valve that chatters, for which one head is enough.
+    """
+    bad = [v for v in verdicts if v.stable is False]
+    if bad:
+        end, examined = f"up to {high:.2g}", high > 1
+        holds = any(v.outcome == DIVERGES or v.critical_damping_factor >= high or v.damping_sought >= high for v in bad)
+        fails = all(v.critical_damping_factor < high for v in bad)
+    else:
+        end, examined = f"down to {low:.2g}", low < 1
+        holds = all(v.critical_damping_factor < low or v.damping_sought <= low for v in verdicts)
+        fails = any(v.critical_damping_factor >= low for v in verdicts)
+    word = "the verdict holds" if holds else "the verdict does not hold" if fails else "not examined"
+    return f"over the range of the loss factors, {end} times: {word if examined else 'not examined'}"
 
 
 def _fits(found: Gathered) -> Iterable[str]:
@@ -228,13 +272,14 @@ def _chance(found: Gathered) -> str | None:
 
 def loss_range(case) -> tuple[float, float] | None:
     """Ends of the range of the shipped loss factors over those of the case; None where it has none of them."""
-    if not case.damping.relaxes:
+    own = case.damping.loss_factor if case.damping.relaxes else 0.0
+    data = [case.materials.loss(layer.material) for layer in case.layers]
+    known = [
+        shipped_loss(one.loss_factor) for one in data if one is not None and one.loss_factor in shipped_loss_names()
+    ]
+    if not (own and known):
         return None
-    known = [shipped_loss(layer.material) for layer in case.layers if layer.material in shipped_loss_names()]
-    rubbers = [one for one in known if one.value]
-    if not rubbers:
-        return None
-    return min(one.range[0] / one.value for one in rubbers), max(one.range[1] / one.value for one in rubbers)
+    return min(one.range[0] / one.value for one in known) / own, max(one.range[1] / one.value for one in known) / own
 
 
 def closes(found: Gathered) -> Answer:
@@ -251,6 +296,8 @@ def closes(found: Gathered) -> Answer:
     collapse = _collapse(result, rated)
     text += f"{'' if shut else ' up to ' + units.pressure(states[-1].pressure, 3)}; {collapse}" if collapse else ""
     answer = YES if shut and states[-1].closed else NO
+    if not collapse and states[-1].pressure < rated * (1 - 1e-9):
+        answer, text = UNKNOWN, f"{text}; no state was found at the rated {units.pressure(rated, 3)}"
     return Answer(question, answer, text + ".", _margin(result), _closure_mesh(found))
 
 
@@ -327,7 +374,8 @@ def trade(found: Gathered) -> list[tuple[str, str]]:
     bore = 2 * (case.valve.inlet_radius - case.valve.flange_wall_deduction)
     rows += [("bill, width x height", bill), ("bore", units.text_of("size", bore, 4))]
     if steady is not None and steady.cracking is not None and steady.cracking.pressure is not None:
-        rows += [("cracking head", units.pressure(steady.cracking.pressure, 3))]
+        over = " over that at rest" if case.rest_pressure else ""
+        rows += [("cracking head", f"{units.pressure(steady.cracking.pressure, 3)}{over}")]
     if state is not None and state.hydraulics is not None:
         at = f"at {units.pressure(state.pressure, 3)}"
         rows += [

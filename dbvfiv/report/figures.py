@@ -13,7 +13,7 @@ import plotly.graph_objects as go
 from matplotlib.figure import Figure
 from plotly.offline import get_plotlyjs
 
-from ..drawing.style import COMPUTED, DANGER, PUBLISHED, STABLE, UNSTABLE, new_figure
+from ..drawing.style import COMPUTED, DANGER, PUBLISHED, STABLE, UNSTABLE, new_figure, parameter_label
 from ..drawing.views import ValveSkin
 from .answers import loss_range
 from .gather import Gathered
@@ -62,22 +62,23 @@ def vibration_figure(found: Gathered) -> Figure:
     ratio.set_ylabel(_LEAST_DAMPED)
     _factors(found, factor, head, verdicts.values())
     for axes in (ratio, factor):
-        axes.set_xlabel("Head, kPa" if found.case.units.heads else "Inlet pressure, kPa")
+        axes.set_xlabel("Head, kPa" if found.case.units.heads else parameter_label(found.case, "pressure"))
         axes.set_xlim(left=0)
     return figure
 
 
 def _factors(found: Gathered, axes, head, verdicts) -> None:
-    """Neutral curve over head and damping; at stable heads without one the lowest factor that was looked at."""
-    at, stable = (np.array(x) for x in zip(*((v.critical_damping_factor, v.stable is True) for v in verdicts)))
+    """Neutral curve over head and damping; at heads without one the last factor that was looked at."""
+    at, sought = (np.array(x) for x in zip(*((v.critical_damping_factor, v.damping_sought) for v in verdicts)))
     known = np.isfinite(at)
-    low, high = 0.05, 2.0
+    low, high = 0.05, max(2.0, 1.2 * np.nanmax(sought, initial=0.0))
     if known.any():
-        axes.fill_between(head[known], low, at[known], color=DANGER, lw=0)
-        axes.plot(head[known], at[known], "o-", color=UNSTABLE, label="chatter below")
+        axes.fill_between(head, low, at, where=known, color=DANGER, lw=0)
+        axes.plot(head, at, "o-", color=UNSTABLE, label="chatter below")
         low, high = min(low, at[known].min() / 1.5), max(high, 1.5 * at[known].max())
-    if (none := stable & ~known).any():
-        axes.plot(head[none], np.full(int(none.sum()), low), "v", color=STABLE, label="none found down to here")
+    for none, marker, colour, end in ((sought < 1, "v", STABLE, "down"), (sought > 1, "^", UNSTABLE, "up")):
+        if none.any():
+            axes.plot(head[none], sought[none], marker, color=colour, label=f"none found {end} to here")
     axes.axhline(1.0, color="0.2", lw=1.0, ls="--", label="this case")
     spread = loss_range(found.case)
     if spread is not None:

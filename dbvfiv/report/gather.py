@@ -23,8 +23,10 @@ from ..errors import CaseError, SolveError
 from ..model.sizes import ValveSizes
 from ..observer import Observer, is_watched
 from ..studies.case import Case
+from ..studies.inputs import Plan
 from ..studies.session import Session, kept_run, load_result
 from ..studies.stability.place import why_it_moves
+from ..studies.stability.verdict import DIVERGES
 from ..studies.workers import Lost, Work, Workers
 
 #: What a report can leave out.
@@ -144,9 +146,11 @@ def is_on_own_mesh(name: str) -> bool:
     return name.partition("-")[0] not in ("mesh", "levels")
 
 
-def _nearness(verdict) -> float:
-    """Nearness of a state to chatter: negative least damping ratio."""
-    return -verdict.damping_ratio if np.isfinite(verdict.damping_ratio) else -np.inf
+def _nearness(verdict) -> tuple[bool, float]:
+    """Nearness of a state to chatter: growth rate of one that diverges, else the negative least damping ratio."""
+    diverges = verdict.outcome == DIVERGES
+    size = verdict.growth_rate if diverges else -verdict.damping_ratio
+    return diverges, size if np.isfinite(size) else -np.inf
 
 
 def heads_of(case: Case) -> tuple[float, ...]:
@@ -230,7 +234,7 @@ def following(found: Gathered) -> Iterator[Run]:
             keys = quick | {"drive.pressure": pressure, "sweep.over": span}
             yield Run(f"pipe-{i}", "sweep", f"length of the pipe at {case.units.pressure(pressure)}", keys, 5)
     if case.uncertainty.model_fields_set:
-        over = {} if case.uncertainty.over else {"drive.pressure": worst}
+        over = {} if case.uncertainty.over else {"drive.pressure": _drawn_about(case, worst)}
         yield Run("chance", "uncertainty", "probability of chatter", over, 1.0 * case.uncertainty.samples)
     changed = [
         pair
@@ -239,8 +243,22 @@ def following(found: Gathered) -> Iterator[Run]:
     ]
     if changed:
         low, high = changed[0][0][0], changed[-1][1][0]
-        keys = {"onset.over": f"pressure={low:.9g}:{high:.9g}:{2 + len(changed)}", "onset.continuity": "case"}
+        between = [p for p in found.modes if low < p < high] or [0.5 * (low + high)]  # what is known of them stays so
+        over = ",".join(f"{p:.9g}" for p in (low, *between, high))
+        keys = {"onset.over": f"pressure={over}", "onset.continuity": "case"}
         yield Run("onset", "onset", "head at which chatter begins", keys | {"onset.symmetry": "all"}, 40)
+
+
+def _drawn_about(case: Case, pressure: float) -> float:
+    """Pressure, Pa, that samples of a case are told at: one that is asked for, or the median of the pressures that the
+    case says it has whatever it is driven by.
+    """
+    medians = set()
+    with suppress(CaseError):  # of inputs that cannot be used, which the study refuses
+        for own in (pressure, 1.01 * pressure):
+            inputs = Plan(case.replace({"drive.pressure": own})).inputs
+            medians |= {one.distribution.median for one in inputs if one.name == "pressure"}
+    return medians.pop() if len(medians) == 1 else pressure
 
 
 def cycle_run(found: Gathered) -> Iterator[Run]:
@@ -300,13 +318,15 @@ def gather(
     bar.expect(list(planned(session.case)))
     if case.seeks_levels or case.valve.cracking_head:
         bar.expect([Run("settled", "levels", "strain levels" if case.seeks_levels else "cracking head", {}, 12)])
-        session = session.settle(bar.of("settled")).at_cracking(bar.of("settled"))
+        session = session.settle(bar.of("settled"))
+        session.at_cracking(bar.of("settled"))
         bar.done("settled")
+    given, session = session, session.at_cracking()
     sizes = ValveSizes.of(session.described)
     found = Gathered(session.case, name, heads_of(session.case), sizes, levels=str(session.settled or ""))
     found.missing = dict.fromkeys(leave_out, "It was left out.")
     found.not_asked = set(leave_out)
-    studies = _Studies(found, session, folder, workers, bar)
+    studies = _Studies(found, session, folder, workers, bar, given)
     for runs in (planned, following, cycle_run):
         asked = runs(found.case if runs is planned else found)
         studies.make([run for run in asked if not {*run.name.split("-")} & {*leave_out}])
@@ -322,13 +342,17 @@ def _processor_time() -> float:
 
 @dataclass
 class _Studies:
-    """Runs of one report, from their files where these are there."""
+    """Runs of one report, from their files where these are there; `given` has a cracking head in place of the sealing
+    pressure that was found for it.
+    """
 
     found: Gathered
     session: Session
     folder: Path
     workers: int
     bar: Bar
+    given: Session
+    _cracking: dict[str, Session] = field(default_factory=dict)
 
     def make(self, runs: list[Run]) -> None:
         """Make runs; the steady states first, from which modes start, and the others by several processes."""
@@ -346,11 +370,20 @@ class _Studies:
 
     def _asked(self, run: Run) -> Session:
         """Session of a run, with the steady state it starts from where that is known."""
-        asked = self.session.replace(run.changes)
+        asked = self._walled(run.changes).replace(run.changes)
         if "mesh.around" not in run.changes and "drive.pressure" in run.changes:
             state = self.found.state(run.changes["drive.pressure"])
             asked.start = None if state is None else state.solution()
         return asked
+
+    def _walled(self, changes: dict[str, Any]) -> Session:
+        """Session of the case; on another mesh, or with other constants, one that cracks at the same head."""
+        wall = {key: value for key, value in changes.items() if key.startswith(("mesh.", "materials."))}
+        if not (wall and self.given.case.valve.cracking_head):
+            return self.session
+        if str(wall) not in self._cracking:
+            self._cracking[str(wall)] = self.given.replace(wall).at_cracking()
+        return self._cracking[str(wall)]
 
     def _path(self, run: Run) -> Path:
         return self.folder / f"{self.found.name}-{run.name}.h5"
@@ -376,7 +409,7 @@ class _Studies:
         """
         asked = {}
         for run in sorted(runs, key=lambda run: -run.share):  # longest first
-            with suppress(CaseError):
+            with suppress(CaseError, SolveError):
                 asked[run.name] = Work(_fill, (run.kind, self._asked(run), self._path(run)))
         with Workers(min(self.workers, len(asked)), str, (), self.bar.warn) as team:
             lost = []

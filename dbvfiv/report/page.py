@@ -123,7 +123,7 @@ def sheet(found: Gathered) -> tuple[tuple[str, str], ...]:
 def unanswered(found: Gathered) -> tuple[str, ...]:
     """Questions without an answer and studies that failed, each with its reason."""
     say = found.case.units.say
-    questions = [f"{a.question} {say(a.text)}" for a in answers(found) if a.answer == UNKNOWN]
+    questions = [f"{a.question} {a.text}" for a in answers(found) if a.answer == UNKNOWN]
     return (*questions, *(f"The study {name} failed: {say(why)}" for name, why in found.failed.items()))
 
 

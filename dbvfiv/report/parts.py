@@ -22,7 +22,7 @@ from ..materials.stability import StableRange, stable_range
 from ..model.symmetry import symmetry_named
 from ..record.mesh import MeshData
 from ..texts import digits, listed
-from .answers import loss_range
+from .answers import lacking, loss_range
 from .figures import closure_figure, headloss_figure, live_valve, pipe_figure, vibration_figure
 from .gather import Gathered, is_on_own_mesh
 
@@ -220,6 +220,7 @@ def heads_part(found: Gathered) -> Part:
         sealed = state is not None and case.valve.is_preset and state.hydraulics is None
         numbers = (v.growth_rate, v.frequency, 100 * v.damping_ratio, v.critical_damping_factor, v.band)
         said = [f"{x:.3g}" if np.isfinite(x) else "-" for x in numbers]
+        said[3] = f"none to {v.damping_sought:.3g}" if np.isfinite(v.damping_sought) else said[3]
         rows.append((shown, v.outcome + " (sealed)" * sealed, *said, "yes" if v.certain else "no"))
     missing = [
         f"{units.pressure(found.heads[int(n.split('-')[1]) - 1])}: {why}"
@@ -232,7 +233,8 @@ def heads_part(found: Gathered) -> Part:
     sentences = (
         f"Modes about the steady state at each head, in all symmetry classes: {classes}.",
         f"The factor is that on the {factor} at which chatter begins, or ends where the valve chatters, in the first "
-        "and the last of the classes; - where none between 0.05 and 10 makes the difference.",
+        "and the last of the classes; none to the last one that was looked at where none is found, - where that is not "
+        "known.",
         *missing,
     )
     caption = (
@@ -252,13 +254,16 @@ def onset_part(found: Gathered) -> Part | None:
     kinds = {"super": "softly (supercritical)", "sub": "hard (subcritical)"}
 
     def apart(p) -> str:
-        return "no such onset there" if p["uncertainty"] is None else f"{p['uncertainty'] / row.scale:.2g}"
+        unknown = "no such onset there" if lacking(p) else "-"
+        return unknown if p["uncertainty"] is None else f"{p['uncertainty'] / row.scale:.2g}"
 
     columns = {
         f"{_pressure_title(found)}, {row.shown_unit}": lambda p: f"{p['value'] / row.scale:.4g}",
         f"+- (second mesh), {row.shown_unit}": apart,
         "frequency, Hz": lambda p: f"{p['frequency']:.4g}",
-        "what changes": lambda p: ("unstable" if p["gains"] else "stable") + " above",
+        "what changes": lambda p: (
+            ("unstable" if p["gains"] else "stable") + " above" + ("" if p["confirmed"] else ", not confirmed")
+        ),
         "how": lambda p: kinds.get(p["criticality"], "-"),
     }
     tables = (Table.of(result.points, columns),) if result.points else ()

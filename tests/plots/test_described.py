@@ -3,6 +3,8 @@
 import numpy as np
 
 import dbvfiv
+from dbvfiv.case.units import Units
+from dbvfiv.drawing.style import put_in_units
 from dbvfiv.drawing.views import valve_figure
 from dbvfiv.studies.case import thesis_case
 
@@ -26,7 +28,7 @@ def test_the_picture_shows_measures_wall_and_layers():
     figure = valve_figure(valve.model)
     by_title = {axes.get_title(loc="left").split(",")[0].split(":")[0]: axes for axes in figure.axes}
     side, plan = by_title["Plane x = 0"], by_title["Plane y = 0"]
-    for words in ("duckbill\n105", "saddle\n140", "cuff\n20", "flange\n35"):
+    for words in ("duckbill\n105 mm", "saddle\n140 mm", "cuff\n20 mm", "flange\n35 mm"):
         assert words in texts(side)
     wall = 0.5 * (14.38 + 4.0)  # mm, of the side edge
     lip = 2 * 0.5 * (180.0 + 0.5 * 14.38) + wall  # its radius follows from the wall
@@ -36,6 +38,8 @@ def test_the_picture_shows_measures_wall_and_layers():
     cells = np.concatenate([np.ravel(c.get_array()) for c in by_title["Thickness and mesh"].collections])
     assert np.allclose(np.unique(np.round(cells, 6)), [7.19, 9.19])
     assert "0.5 times as given: 300 mm long" in figure.get_suptitle()
+    put_in_units(figure, Units("in", 1000.0))
+    assert "duckbill\n4.13 in" in texts(side) and side.get_ylabel() == "y, in"
 
 
 def test_plot_takes_a_case(tmp_path, command_line):

@@ -18,15 +18,19 @@ import pytest
 from PIL import Image
 
 from dbvfiv.api import Valve
+from dbvfiv.case.axis import parse_axis
 from dbvfiv.case.units import UNITS
 from dbvfiv.errors import CaseError
 from dbvfiv.model import ValveModel
 from dbvfiv.model.material_stability import material_stability
 from dbvfiv.report import gather, write_page, write_pdf
-from dbvfiv.report.answers import UNKNOWN, answers, opens
-from dbvfiv.report.gather import following, heads_of, planned
-from dbvfiv.report.parts import heads_part, steady_part
+from dbvfiv.report.answers import UNKNOWN, answers, closes, loss_range, opens, trade
+from dbvfiv.report.figures import vibration_figure
+from dbvfiv.report.gather import Gathered, Run, _Studies, following, heads_of, planned, second_mesh
+from dbvfiv.report.parts import heads_part, onset_part, steady_part
 from dbvfiv.studies.case import load_case
+from dbvfiv.studies.onset.search import NO_ONSET
+from dbvfiv.studies.session import Session
 from dbvfiv.studies.stability.verdict import Verdict
 from dbvfiv.studies.steady.study import Cracking
 from dbvfiv.studies.workers import Lost, Workers
@@ -129,35 +133,153 @@ def test_each_head_without_a_verdict_has_its_own_reason(made, monkeypatch, reaso
 @pytest.mark.parametrize(
     "verdicts, margin",
     [
-        ((("stable", 0.3), ("stable", np.nan)), "chatter begins at 0.3 times the damping"),
-        ((("stable", np.nan), ("stable", np.nan)), "stable down to 0.05 times the damping"),
+        ((("stable", 0.3), ("stable", np.nan, 0.05)), "chatter begins at 0.3 times the damping"),
+        ((("stable", np.nan, 0.05), ("stable", np.nan, 0.2)), "stable down to 0.2 times the damping"),
+        ((("stable", np.nan, 0.05), ("stable", np.nan)), ""),
         ((("stable", 0.3), ("undecided", np.nan)), ""),
         ((("flutters", 1.4), ("flutters", 1.2)), "quiet with 1.4 times the damping"),
-        ((("flutters", 1.4), ("flutters", np.nan)), "no damping in reach quiets it"),
-        ((("diverges", np.nan), ("stable", 0.3)), "no damping in reach quiets it"),
+        ((("flutters", 1.4), ("flutters", np.nan, 10.0)), "chatters up to 10 times the damping"),
+        ((("flutters", 1.4), ("flutters", np.nan)), ""),
+        ((("diverges", np.nan), ("stable", 0.3)), "no damping quiets what diverges"),
         ((("stable", 0.3),), ""),
     ],
 )
-def test_the_margin_in_damping_is_that_of_all_heads(made, monkeypatch, verdicts, margin):
-    found, _ = made
-    given = [Verdict(name, "", 1.0, 9.0, 0.02, factor, True) for name, factor in verdicts]
-    results = {p: SimpleNamespace(verdict=verdict, warnings=()) for p, verdict in zip(found.heads, given)}
-    monkeypatch.setattr(type(found), "modes", property(lambda _: results))
-    assert next(one for one in answers(found) if "chatter" in one.question).margin == margin
+def test_the_margin_in_damping_is_that_of_all_heads(verdicts, margin):
+    assert on_chatter(with_verdicts(*(damped(*given) for given in verdicts))).margin == margin
+
+
+def damped(outcome, factor, sought=np.nan):
+    """A verdict with a multiple of the damping, and the last one that was looked at."""
+    return Verdict(outcome, "", 1.0, 9.0, 0.02, factor, True, 90.0, sought)
+
+
+def with_verdicts(*verdicts, keys=(), heads=(2e3, 6e3)):
+    """A report on nothing but verdicts at its heads."""
+    found = Gathered(load_case(None, [*KEYS, *keys]), "valve", heads, None)
+    for i, verdict in enumerate(verdicts, 1):
+        given = {"verdict": verdict, "stable": verdict.stable, "warnings": (), "failures": (), "certificates": {}}
+        found.results[f"heads-{i}"] = SimpleNamespace(**given)
+    return found
+
+
+def on_chatter(found):
+    return next(one for one in answers(found) if "chatter" in one.question)
 
 
 @pytest.mark.parametrize(
-    "classes, factor",
+    "verdicts, told",
     [
-        ({"SS": ("stable", 0.46), "SA": ("stable", np.nan), "AA": ("stable", 0.6)}, 0.6),
-        ({"SS": ("flutters", 1.3), "SA": ("stable", 0.6)}, 1.3),
-        ({"SS": ("flutters", 1.3), "SA": ("flutters", np.nan)}, np.nan),
-        ({"SS": ("stable", 0.5), "SA": ("undecided", np.nan)}, np.nan),
+        ((("stable", 0.3), ("stable", np.nan, 0.05)), "down to 0.5 times: the verdict holds"),
+        ((("stable", 0.3), ("stable", 0.7)), "down to 0.5 times: the verdict does not hold"),
+        ((("stable", 0.3), ("stable", np.nan, 0.6)), "down to 0.5 times: not examined"),
+        ((("flutters", np.nan, 10.0), ("flutters", 1.3)), "up to 1.5 times: the verdict holds"),
+        ((("flutters", 1.2), ("flutters", 1.3)), "up to 1.5 times: the verdict does not hold"),
+        ((("flutters", 1.2), ("flutters", np.nan)), "up to 1.5 times: not examined"),
+        ((("diverges", np.nan), ("stable", 0.7)), "up to 1.5 times: the verdict holds"),
     ],
 )
-def test_the_multiple_of_the_damping_is_that_of_all_classes(classes, factor):
-    parts = {name: Verdict(outcome, "", -1.0, 9.0, 0.02, x, True) for name, (outcome, x) in classes.items()}
-    assert Verdict.joined(parts).critical_damping_factor == pytest.approx(factor, nan_ok=True)
+def test_a_verdict_over_the_range_of_the_loss_factors_is_on_what_was_looked_at(monkeypatch, verdicts, told):
+    monkeypatch.setattr("dbvfiv.report.answers.loss_range", lambda _: (0.5, 1.5))
+    (line,) = (x for x in on_chatter(with_verdicts(*(damped(*v) for v in verdicts))).uncertainty if "loss factors" in x)
+    assert line == f"over the range of the loss factors, {told}"
+
+
+@pytest.mark.parametrize(
+    "keys, expected",
+    [
+        ([], (0.4, 2.0)),  # that of the fibre
+        (["damping.loss_factor=2"], (0.2, 1.0)),
+        (["damping.loss_factor=0"], None),
+        ([f"materials.{name}.loss_factor=0.3" for name in ("CR", "SBR", "EPDM", "fibre")], None),
+        (
+            ["materials.CR.loss_factor=NBR", *(f"materials.{x}.loss_factor=1" for x in ("SBR", "EPDM", "fibre"))],
+            (0.5, 1.5),
+        ),
+    ],
+)
+def test_the_range_of_the_loss_factors_is_that_of_the_shipped_ones_that_the_case_has(keys, expected):
+    assert loss_range(load_case(None, keys)) == (None if expected is None else pytest.approx(expected))
+
+
+def test_reasons_of_studies_are_told_in_the_units_of_the_case():
+    found = with_verdicts(*[Verdict.undecided("The wall at 6 kPa is 3 mm thin.")] * 2, keys=["project.units=psi, in"])
+    assert on_chatter(found).text.endswith("at 0.29 psi and 0.87 psi: The wall at 0.87 psi is 0.118 in thin.")
+
+
+def test_heads_that_flutter_and_heads_that_diverge_are_told_apart():
+    flutters = Verdict("flutters", "", 3.0, 31.0, -0.015, certain=True)
+    diverges = Verdict("diverges", "", 0.5, 0.0, 0.03, certain=True)
+    found = with_verdicts(flutters, diverges)
+    assert on_chatter(found).text == "It flutters at 2 kPa, at 31 Hz. It diverges, without oscillating, at 6 kPa."
+    assert found.worst == 6e3  # the second mesh has a look at that, and not at a stable head or a lesser evil
+    assert on_chatter(with_verdicts(diverges, diverges)).text == "It diverges, without oscillating, at 2 kPa and 6 kPa."
+
+
+def test_the_least_damped_mode_is_that_of_a_head_that_has_modes():
+    still, rings = Verdict("stable", "", certain=True), Verdict("stable", "", -2.0, 9.0, 0.04, certain=True)
+    told = "Stable at all 2 heads in every symmetry class"
+    said = on_chatter(with_verdicts(still, rings)).text
+    assert said == f"{told}; the least damped mode has a damping ratio of 4 %, at 6 kPa."
+    assert on_chatter(with_verdicts(still, still)).text == f"{told}."
+
+
+def test_onsets_are_told_with_their_kind_and_with_what_speaks_against_them():
+    found = with_verdicts(damped("stable", np.nan), damped("flutters", np.nan))
+    own = {"edge": True, "gains": True, "uncertainty": None, "confirmed": True, "note": None, "criticality": None}
+    note = f"The mesh of 6 x 6 {NO_ONSET}{{}}, so its uncertainty is unknown."
+    points = [
+        own | {"value": 3e3, "frequency": 31.0},
+        own | {"value": 4e3, "frequency": 30.0, "gains": False, "confirmed": False},
+        own | {"value": 5e3, "frequency": 29.0, "note": note.format("")},
+        own | {"value": 6e3, "frequency": 0.0, "note": note.format(" that was solved")},
+    ]
+    found.results["onset"] = SimpleNamespace(points=points, failures=(), case=found.case)
+    assert on_chatter(found).text.partition("Hz. ")[2] == (
+        "Chatter begins at 3 kPa, 31 Hz, ends at 4 kPa (not confirmed), 30 Hz and begins at 5 kPa (the second mesh "
+        "has no onset like it), 29 Hz. "
+        "Divergence begins at 6 kPa (the second mesh has no onset like it that was solved)."
+    )
+    rows = onset_part(found).tables[0].rows
+    assert [row[1] for row in rows] == ["-", "-", "no such onset there", "no such onset there"]
+    assert [row[3] for row in rows][:2] == ["unstable above", "stable above, not confirmed"]
+
+
+def test_a_multiple_of_the_damping_that_is_not_known_is_none_that_was_looked_at():
+    found = with_verdicts(damped("stable", np.nan, 0.05), damped("stable", np.nan))
+    assert [row[5] for row in heads_part(found).tables[0].rows] == ["none to 0.05", "-"]
+    found = with_verdicts(damped("stable", 0.4), damped("flutters", np.nan, 10.0))
+    lines = {line.get_label(): line.get_xydata() for line in vibration_figure(found).axes[1].lines}
+    assert lines["none found up to here"].tolist() == [[6.0, 10.0]] and "none found down to here" not in lines
+    np.testing.assert_allclose(lines["chatter below"], [[2.0, 0.4], [6.0, np.nan]])
+
+
+def test_the_band_of_a_verdict_on_several_classes_is_the_least_of_them():
+    sways, parts = Verdict("stable", "", -1.0, 9.0, band=140.0), Verdict("stable", "", -2.0, 9.0, band=92.7)
+    left_open = Verdict.undecided("Nothing.")
+    assert Verdict.joined({"SS": parts, "SA": sways}).band == 92.7
+    assert Verdict.joined({"SS": parts, "SA": left_open}).band == 92.7
+    assert np.isnan(Verdict.joined({"SS": left_open, "SA": left_open}).band)
+
+
+@pytest.mark.parametrize(
+    "classes, factor, sought",
+    [
+        ({"SS": ("stable", 0.46), "SA": ("stable", np.nan, 0.05), "AA": ("stable", 0.6)}, 0.6, np.nan),
+        ({"SS": ("stable", np.nan, 0.05), "SA": ("stable", np.nan, 0.1)}, np.nan, 0.1),
+        ({"SS": ("stable", np.nan, 0.05), "SA": ("stable", np.nan)}, np.nan, np.nan),
+        ({"SS": ("flutters", 1.3), "SA": ("stable", 0.6)}, 1.3, np.nan),
+        ({"SS": ("flutters", 1.3), "SA": ("flutters", np.nan)}, np.nan, np.nan),
+        ({"SS": ("flutters", 1.3), "SA": ("flutters", np.nan, 8.0), "AA": ("stable", np.nan, 0.05)}, np.nan, 8.0),
+        ({"SS": ("stable", 0.5), "SA": ("undecided", np.nan)}, np.nan, np.nan),
+    ],
+)
+def test_the_multiple_of_the_damping_is_that_of_all_classes(classes, factor, sought):
+    joined = Verdict.joined({name: damped(*given) for name, given in classes.items()})
+    found = joined.critical_damping_factor, joined.damping_sought
+    assert found == pytest.approx((factor, sought), nan_ok=True)
+    again = Verdict.read(json.loads(json.dumps(joined.summary())))
+    assert (again.critical_damping_factor, again.damping_sought) == pytest.approx(found, nan_ok=True)
+    assert ("damping_sought" in joined.summary()) == np.isfinite(sought)  # as in results that know of none
 
 
 def test_heads_at_which_a_verdict_is_one_on_the_fit_of_the_rubber_are_named(tmp_path):
@@ -298,12 +420,97 @@ def test_heads_at_which_the_bill_is_sealed_have_rows_without_losses(made):
     assert answer.answer == "no" and answer.text.endswith("; they do at 0.612 m.")
 
 
+@pytest.mark.parametrize(
+    "top, text", [(12e3, "up to 12 kPa; they do at 13 kPa."), (20e3, "Cracks at 13 kPa; at 20 kPa")]
+)
+def test_the_lips_crack_above_the_pressure_downstream(top, text):
+    case = load_case(None, [*KEYS, "downstream.pressure=10 kPa"])
+    found = Gathered(case, "valve", (11e3, top), SimpleNamespace(bill_width=0.2, bill_height=0.1))
+    losses = SimpleNamespace(head_loss=0.9)
+    state = SimpleNamespace(pressure=top, lip_opening=0.03, volume_flow=0.02, outlet_velocity=4.0, hydraulics=losses)
+    state.hydraulics = losses if top > 13e3 else None
+    found.results["steady"] = SimpleNamespace(states=(state,), cracking=Cracking(2.0, 3e3, 0.3), failures=())
+    assert text in opens(found).text
+    assert ("cracking head", "3 kPa over that at rest") in trade(found)
+    found.results["steady"].failures = ("The state at 11 kPa was not found.",)
+    assert opens(found).text.endswith(" No state was found at 11 kPa: The state at 11 kPa was not found.")
+
+
+@pytest.mark.parametrize("rated, answer", [("60 kPa", "yes"), ("100 kPa", UNKNOWN)])
+def test_a_rated_pressure_that_was_not_reached_is_named(rated, answer):
+    case = load_case(None, [*KEYS, f"closure.rated_pressure={rated}"])
+    found = Gathered(case, "valve", (2e3, 6e3), None)
+    states = [SimpleNamespace(pressure=p, closed=True, beyond_limit=False) for p in (1e4, 6e4)]
+    nothing = {"failures": (), "critical_pressure": None, "safety": None, "classes": (), "buckling": ()}
+    found.results["closure"] = SimpleNamespace(states=states, case=case, **nothing)
+    told = closes(found)
+    missed = "; no state was found at the rated 100 kPa" if answer == UNKNOWN else ""
+    assert (told.answer, told.text) == (answer, f"Shut at 10 kPa and 60 kPa{missed}.")
+
+
+@pytest.mark.parametrize(
+    "name, label", [("dbv12", "Static inlet pressure"), ("dbv12-in-line", "Pressure in the reservoir")]
+)
+def test_the_axis_of_the_heads_names_the_place_of_the_pressure(name, label):
+    found = with_verdicts(damped("stable", 0.4), damped("stable", 0.4))
+    found.case = load_case(f"cases/{name}.toml", ["project.units=kPa"])
+    assert {axes.get_xlabel() for axes in vibration_figure(found).axes} == {f"{label}, kPa"}
+
+
 @pytest.mark.parametrize("name, span, along", [("in-line", "4:100:6:log", None), ("moulded", "4:100:3:log", 24)])
 def test_lengths_of_the_pipe_are_fewer_where_each_has_a_curve_of_equilibria(name, span, along):
     found = SimpleNamespace(case=load_case(f"cases/dbv12-{name}.toml"), worst=2e3, heads=(1e3, 2e3, 5e3), modes={})
     (pipe,) = (run.changes for run in following(found) if run.part == "pipe")
     assert pipe["sweep.over"] == f"pipe_length={span}" and pipe["drive.pressure"] == 2e3
     assert pipe.get("mesh.along") == along
+
+
+@pytest.mark.parametrize(
+    "stable, over",
+    [
+        ((True, False, True, True, True, False), (2e3, 5e3, 1e4, 2e4, 4e4, 7e4)),
+        ((True, True, False, True, True, True), (5e3, 1e4, 2e4)),
+        ((True, False, False, False, False, False), (2e3, 3.5e3, 5e3)),
+    ],
+)
+def test_onsets_are_sought_between_the_heads_that_differ(stable, over):
+    heads = (2e3, 5e3, 1e4, 2e4, 4e4, 7e4)
+    found = with_verdicts(*(damped("stable" if one else "flutters", np.nan) for one in stable), heads=heads)
+    (run,) = (run for run in following(found) if run.name == "onset")
+    assert parse_axis(run.changes["onset.over"]).values == over
+
+
+@pytest.mark.parametrize(
+    "pressure, told", [("normal(20 kPa, 1 kPa)", 20e3), ("normal(5 %)", 2e3), ("uniform(0 %, 10 %)", 2e3), (None, 2e3)]
+)
+def test_samples_are_told_at_the_pressure_that_they_are_drawn_about(pressure, told):
+    inputs = {"thickness": "lognormal(1.1)"} | ({"pressure": pressure} if pressure else {})
+    keys = [f"uncertainty.inputs.{name}={text}" for name, text in inputs.items()]
+    found = SimpleNamespace(case=load_case(None, [*KEYS, *keys]), worst=2e3, heads=(2e3, 6e3), modes={})
+    (run,) = (run for run in following(found) if run.name == "chance")
+    assert run.changes == {"drive.pressure": pytest.approx(told)}
+
+
+def test_the_valve_of_the_second_mesh_cracks_at_the_head_of_the_case(monkeypatch, tmp_path):
+    sought = []
+
+    def sealing(case, _ratio, _observer):
+        sought.append(case.mesh.along)
+        return 10.0 * case.mesh.along
+
+    monkeypatch.setattr("dbvfiv.studies.session.sealing_for_cracking", sealing)
+    cracks = {"valve.sealing_pressure": None, "valve.cracking_head": 0.1}
+    given = Session(load_case("cases/dbv12-moulded.toml").replace(cracks))
+    found = SimpleNamespace(state=lambda _: None)
+    studies = _Studies(found, given.at_cracking(), tmp_path, 1, None, given)
+
+    def of(**changes):
+        return studies._asked(Run("mesh-modes", "modes", "", changes, 1)).case.valve.sealing_pressure
+
+    assert of(**{"drive.pressure": 2e3}) == 480.0
+    coarse = second_mesh(given.case)
+    assert [of(**coarse), of(**coarse | {"drive.pressure": 2e3})] == [240.0, 240.0]
+    assert sought == [48, 24]
 
 
 def test_heads_are_those_asked_or_shares_of_the_largest_pressure():

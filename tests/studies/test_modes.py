@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -17,7 +18,10 @@ from dbvfiv.model.equilibria import LoadPath, rest_state
 from dbvfiv.model.residual import ValveResidual
 from dbvfiv.observer import Observer
 from dbvfiv.studies.case import thesis_case
-from dbvfiv.studies.modes.search import ModesOptions, run_modes
+from dbvfiv.studies.modes import search as modes_search
+from dbvfiv.studies.modes.search import ModesOptions, critical_damping_factor, run_modes
+from dbvfiv.studies.stability.line import ParameterLine
+from dbvfiv.studies.stability.verdict import Verdict
 from dbvfiv.studies.stability.walk import StabilityWalk
 from eigen import SearchOptions
 from eigen.pairs import acceptable, all_eigenvalues
@@ -175,6 +179,35 @@ def test_the_critical_damping_is_sought_among_factors_that_the_materials_reach()
         critical[outcome] = factor * verdict.critical_damping_factor
     assert 2.0 < valve.model.relaxation.highest(0.244, 2.44) < 2.44
     assert critical["flutters"] == pytest.approx(critical["stable"], rel=1e-3)
+
+
+@pytest.mark.parametrize(
+    "rates, outcome, beta, found",
+    [
+        (lambda beta: -1.0, "stable", 1e-3, (np.nan, 0.05)),
+        (lambda beta: 1.0, "flutters", 1e-3, (np.nan, 10.0)),
+        (lambda beta: 0.3e-3 - beta, "stable", 1e-3, (0.3, np.nan)),
+        (lambda beta: -1.0, "stable", 0.0, (np.nan, np.nan)),  # nothing to take away
+        (lambda beta: -1.0, "flutters", 1e-3, (np.nan, np.nan)),  # another verdict than that of the full matrices
+        (lambda beta: np.nan if beta < 0.2e-3 else -1.0, "stable", 1e-3, (np.nan, 0.22361)),
+        (None, "stable", 1e-3, (np.nan, np.nan)),
+    ],
+)
+def test_damping_that_was_looked_at_is_told_from_damping_that_was_not(monkeypatch, rates, outcome, beta, found):
+    class Line(ParameterLine):
+        is_reduced, column = rates is not None, SimpleNamespace(model=SimpleNamespace())
+
+        def locate(self, crossing, accuracy, scan):
+            return SimpleNamespace(value=0.3e-3, residual=0.0)
+
+    def eigenvalues(place):
+        rate = rates(place.beta)
+        return [] if np.isnan(rate) else [rate + 30j]
+
+    Line.column.model.eigenvalues = eigenvalues
+    monkeypatch.setattr(modes_search, "ParameterLine", Line)
+    walk, place = SimpleNamespace(case=None), Mu(beta=beta, alpha=5.0)
+    assert critical_damping_factor(walk, place, Verdict(outcome, "")) == pytest.approx(found, rel=1e-4, nan_ok=True)
 
 
 def test_the_critical_damping_of_a_mode_beyond_the_list():

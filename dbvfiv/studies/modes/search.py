@@ -540,8 +540,8 @@ LOWER, HIGHER = np.geomspace(1.0, 0.05, 9), np.geomspace(1.0, 10.0, 7)
 ACCURACY = 1e-4
 
 
-def critical_damping_factor(walk: StabilityWalk, place: Mu, verdict: Verdict) -> float:
-    """Factor on the loss factors, or on beta, at which flutter begins, next to 1.
+def critical_damping_factor(walk: StabilityWalk, place: Mu, verdict: Verdict) -> tuple[float, float]:
+    """Factor on the loss factors, or on beta, at which flutter begins, next to 1, and what was looked at without one.
 
     It lies below 1 where the state is stable and above where it flutters.
 
@@ -555,8 +555,10 @@ def critical_damping_factor(walk: StabilityWalk, place: Mu, verdict: Verdict) ->
     Returns
     -------
     float
-        NaN where the wall has no such damping, the verdict is another, no factor in reach makes the difference, or no
-        mode is neutral there by the full matrices.
+        NaN where none is found.
+    float
+        The last factor looked at where none up to it, or down to it, makes the difference; NaN where one is found, the
+        wall has no such damping, the verdict is another, or no mode is neutral there by the full matrices.
 
     Raises
     ------
@@ -566,7 +568,7 @@ def critical_damping_factor(walk: StabilityWalk, place: Mu, verdict: Verdict) ->
     name = "loss_factor" if place.loss_factor > 0 else "beta"
     own = place[name]
     if own <= 0 or verdict.outcome not in (STABLE, FLUTTERS):
-        return np.nan
+        return np.nan, np.nan
     factors = LOWER if verdict.outcome == STABLE else HIGHER
     highest = PARAMETERS[name].high
     if name == "loss_factor":
@@ -574,18 +576,19 @@ def critical_damping_factor(walk: StabilityWalk, place: Mu, verdict: Verdict) ->
     factors = factors[own * factors <= highest]
     line = ParameterLine(walk, place, name, own * factors)
     if not line.is_reduced:
-        return np.nan
+        return np.nan, np.nan
 
     def flutter(value: float) -> np.ndarray:
         values = np.asarray(line.column.model.eigenvalues(line.place(value)))
         return values[oscillates(values)]
 
-    scan = Scan(flutter)
-    for near, far in pairwise(map(scan.at, line.values)):
+    scan, sought = Scan(flutter), np.nan
+    for factor, (near, far) in zip(factors[1:].tolist(), pairwise(map(scan.at, line.values))):
         if not (len(near.eigenvalues) and len(far.eigenvalues)):
             break
         if (near.pairs > 0) != (far.pairs > 0):
             onset = line.locate(Crossing(0, *sorted((near, far), key=lambda one: one.value)), ACCURACY, scan=scan)
             # rounding of factorisations would part a resumed run from a whole one
-            return float(f"{onset.value / own:.8g}") if np.isfinite(onset.residual) else np.nan
-    return np.nan
+            return float(f"{onset.value / own:.8g}") if np.isfinite(onset.residual) else np.nan, np.nan
+        sought = factor if (far.pairs > 0) == (verdict.outcome == FLUTTERS) else np.nan
+    return np.nan, sought

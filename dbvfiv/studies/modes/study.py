@@ -70,10 +70,11 @@ def run(session: Session, record: GrowingRecord) -> None:
         if variant.continuity == own_variant(case).continuity and not options.in_vacuo:
             record.progress("critical damping factor")
             try:
-                factor = critical_damping_factor(own, here, found.verdict)
+                factor, sought = critical_damping_factor(own, here, found.verdict)
             except SolveError:
-                factor = np.nan
-            found = replace(found, verdict=replace(found.verdict, critical_damping_factor=factor))
+                factor = sought = np.nan
+            verdict = replace(found.verdict, critical_damping_factor=factor, damping_sought=sought)
+            found = replace(found, verdict=verdict)
         _keep(record, variant, found)
         record.item(found)
 

@@ -280,6 +280,8 @@ LEAST_RATIO = 1.15
 LOCATED = 1e-6
 #: Largest relative difference of frequencies of one onset on two meshes.
 ALIKE = 0.25
+#: What a second mesh is said to lack, up to a comma.
+NO_ONSET = "has no onset like it"
 
 
 def coarse_case(case: Case, share: float) -> tuple[Case, float]:
@@ -311,12 +313,13 @@ def with_uncertainty(
     size = f"{coarse.mesh.around} x {coarse.mesh.along}"
     observer.progress(f"second mesh, {size}")
     search = OnsetSearch(coarse, replace(options, normal_form=False), observer, known=known, mesh=COARSE)
-    found = []
+    found, lost = [], set()
     for crossing in search.scan.run(options.values):
         try:
             value, expected = search.line.bracket(crossing, LOCATED)
             eigenvalue = search.critical(search.place(value), expected).eigenvalue
         except SolveError:
+            lost.add(crossing.gains)
             continue
         found.append((value, abs(eigenvalue.imag) / (2 * np.pi), crossing.gains))
     done = []
@@ -329,7 +332,8 @@ def with_uncertainty(
             found = [c for c in found if c[0] != value]
             point = replace(point, coarse_value=value, uncertainty=abs(point.value - value) / (ratio**ORDER - 1.0))
         else:
-            sentence = f"The mesh of {size} has no onset like it, so its uncertainty is unknown."
+            solved = " that was solved" if point.gains in lost else ""
+            sentence = f"The mesh of {size} {NO_ONSET}{solved}, so its uncertainty is unknown."
             point = replace(point, note=point.note if sentence in point.note else f"{point.note} {sentence}".strip())
         observer.item(point)
         done.append(point)

@@ -46,12 +46,14 @@ class Verdict:
         Of the least damped oscillating mode that is listed, of more modes by `modes` than by studies over parameters;
         NaN if unknown.
     critical_damping_factor : float
-        Factor on the loss factors, or on beta, at which flutter would begin; NaN where it was not asked for or where
-        no factor in reach makes the difference.
+        Factor on the loss factors, or on beta, at which flutter would begin or end; NaN where none is known.
     certain : bool
         The list and the independent count agree; always so where nothing was searched because the constants fail.
     band : float, Hz
         Frequency up to which modes were looked for; infinite for all.
+    damping_sought : float
+        Last factor on that damping that was looked at where none down to it, or up to it, makes the difference; NaN
+        where one does and where that is not known.
     """
 
     outcome: str
@@ -62,6 +64,7 @@ class Verdict:
     critical_damping_factor: float = np.nan
     certain: bool = False
     band: float = np.inf
+    damping_sought: float = np.nan
 
     @classmethod
     def of(
@@ -148,10 +151,12 @@ class Verdict:
 
     @classmethod
     def joined(cls, parts: Mapping[str, Verdict]) -> Verdict:
-        """Verdict on all symmetry classes of a state by their names: the worst of them, certain if all are.
+        """Verdict on all symmetry classes of a state by their names: the worst of them, certain if all are, up to the
+        frequency that all were looked at.
 
         Flutter begins where that of the first class does, and ends where that of the last one does; nothing is known of
-        that where a class is undecided or diverges.
+        that where a class is undecided or diverges. None begins down to a factor if every class was looked at, and none
+        ends up to one if it ends in no class that flutters.
         """
         if len(parts) == 1:
             return next(iter(parts.values()))
@@ -160,12 +165,16 @@ class Verdict:
         unstable = [part.critical_damping_factor for part in parts.values() if not part.stable]
         factors = unstable or [part.critical_damping_factor for part in parts.values()]
         known = [factor for factor in factors if np.isfinite(factor)]
+        sought = [part.damping_sought for part in parts.values() if not (unstable and part.stable)]
+        sought = [x for x in sought if np.isfinite(x)] if unstable else [] if known else sought
         return replace(
             parts[worst],
             reason=" ".join(f"In {name}: {lowered(part.reason)}" for name, part in parts.items()),
             damping_ratio=min(ratios, default=np.nan),
             critical_damping_factor=np.nan if len(known) < len(unstable) else max(known, default=np.nan),
+            damping_sought=float(np.max(sought)) if sought else np.nan,
             certain=all(part.certain for part in parts.values()),
+            band=min((part.band for part in parts.values() if not np.isnan(part.band)), default=np.nan),
         )
 
     @property
@@ -193,17 +202,21 @@ class Verdict:
         if np.isfinite(factor):
             begins = "flutter would begin" if self.outcome == STABLE else "flutter would end"
             said += f"; {begins} at {factor:.3g} times the damping of the wall"
+        elif np.isfinite(self.damping_sought):
+            none = "no flutter begins down to" if self.outcome == STABLE else "flutter does not end up to"
+            said += f"; {none} {self.damping_sought:.3g} times the damping of the wall"
         return said + "."
 
     def summary(self) -> dict[str, Any]:
-        """Plain numbers for JSON; None for what is not known."""
-        return {field.name: json_value(getattr(self, field.name)) for field in fields(self)}
+        """Plain numbers for JSON; None for what is not known, and what was sought only where nothing was found."""
+        told = {field.name: json_value(getattr(self, field.name)) for field in fields(self)}
+        return {name: value for name, value in told.items() if (name, value) != ("damping_sought", None)}
 
     @classmethod
     def read(cls, summary: Mapping[str, Any]) -> Verdict:
         """The verdict that `summary` gave."""
         numbers = {"growth_rate", "frequency", "damping_ratio", "critical_damping_factor", "band"}
-        given = {field.name: summary[field.name] for field in fields(cls)}
+        given = {"damping_sought": np.nan} | {f.name: summary[f.name] for f in fields(cls) if f.name in summary}
         missing = {name: np.nan for name in numbers if given[name] is None}
         return cls(**given | missing)
 

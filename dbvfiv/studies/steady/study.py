@@ -139,7 +139,7 @@ class Cracking(NamedTuple):
     area_ratio : float
         The multiple.
     pressure : float or None, Pa
-        Driving pressure there, over the pressure downstream; None where no state is open so far.
+        Driving pressure there, over that at rest; None where no state is open so far.
     head : float or None, m
         The same as a head of the fluid.
     sealed : bool
@@ -159,13 +159,13 @@ class Cracking(NamedTuple):
         if self.sealed:
             return (
                 f"Cracking pressure: {digits(self.pressure, 4)} Pa ({1e3 * self.head:.3g} mm of the fluid) over that "
-                "downstream; before it the faces press on each other and nothing flows."
+                "at rest; before it the faces press on each other and nothing flows."
             )
         if self.pressure is None:
             return f"Cracking: not up to {highest / 1e3:.4g} kPa, where the lips leave less than {grown}."
         return (
             f"Cracking pressure: {digits(self.pressure, 4)} Pa ({1e3 * self.head:.3g} mm of the fluid) over that "
-            f"downstream, where the lips leave {grown}; they leave a gap at rest, so some fluid passes before."
+            f"at rest, where the lips leave {grown}; they leave a gap at rest, so some fluid passes before."
         )
 
 
@@ -190,7 +190,7 @@ def find_cracking(model: ValveModel, states: Iterable[SteadyState], area_ratio: 
 
     @cache
     def missing(drive: float) -> float:
-        """Logarithm of the passage over the one wanted, at a pressure over that downstream."""
+        """Logarithm of the passage over the one wanted, at a pressure over that at rest."""
         if drive == 0.0 and model.weight is None:
             return -np.log(area_ratio)
         return float(np.log(max(path.go_to(back + drive).station_area[0], rest * 1e-6)) - wanted)
