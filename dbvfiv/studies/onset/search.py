@@ -15,6 +15,8 @@ from continuation.options import ContinuationError
 from ...case.parameters import DESIGN, PARAMETERS, Mu
 from ...errors import SolveError
 from ...fit.cards import outside_band
+from ...geometry import surface_of
+from ...geometry.divisions import least_rows
 from ...model.forms import ValveForms
 from ...model.leading import other_end
 from ...observer import Observer
@@ -283,12 +285,15 @@ ALIKE = 0.25
 
 
 def coarse_case(case: Case, share: float) -> tuple[Case, float]:
-    """The case on fewer elements, and the ratio of mesh widths."""
-    mesh = case.mesh
-    around, along = (max(6, int(round(share * n))) for n in (mesh.around, mesh.along))
-    return case.replace({"mesh.around": around, "mesh.along": along}), float(
-        np.sqrt(mesh.around * mesh.along / (around * along))
-    )
+    """The case on fewer elements, along no fewer than its surface has pieces, and the ratio of mesh widths; that is 1
+    where either way stays all but as fine, so that the difference says nothing of it.
+    """
+    mesh, pieces = case.mesh, least_rows(surface_of(case.valve, case.part))
+    ways = (mesh.around, 6), (mesh.along, max(6, pieces))
+    around, along = (min(n, max(least, int(round(share * n)))) for n, least in ways)
+    ratios = mesh.around / around, mesh.along / along
+    ratio = float(np.sqrt(np.prod(ratios))) if min(ratios) >= LEAST_RATIO else 1.0
+    return case.replace({"mesh.around": around, "mesh.along": along}), ratio
 
 
 def with_uncertainty(
