@@ -83,6 +83,16 @@ def test_no_crossing_is_claimed_across_a_value_without_a_certificate():
     assert len(scan.run([0.0, 1.0, 2.0])) == 1 and scan.uncertain == []
 
 
+def test_the_sign_of_rounding_is_no_crossing():
+    """Modes of a wall without damping, and a value of the scan that is an onset itself."""
+    rounding = np.random.default_rng(0)
+    scan = Scan(modes(*(lambda x: 1e-10 * rounding.choice([-1, 1]) for _ in range(3))))
+    assert scan.run(np.linspace(1, 2, 9)) == [] and len(scan.samples) == 9
+    scan = Scan(modes(lambda x: x - 1.0 + 1e-10))
+    (crossing,) = scan.run([0.0, 1.0, 2.0])
+    assert (crossing.low.value, crossing.high.value) == (1.0, 2.0) and locate(scan, crossing, 1e-12)[0] == 1.0
+
+
 @pytest.mark.parametrize("text, value", [("-2", 1.0), ("-2.5 1/s", 0.5), ("10 %", 3.0 - 1.0 / np.sqrt(0.99))])
 def test_levels_of_damping_are_crossed_where_the_mode_has_it(text, value):
     """Growth rate -3 + x at 10 rad/s; of a ratio zeta it is -10 zeta / sqrt(1 - zeta^2)."""
