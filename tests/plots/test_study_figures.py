@@ -95,7 +95,8 @@ def onset_result(values, growth, certified=None):
     point |= {"edge": True, "gains": False}
     points = [point] if len(values) > 1 else []
     certified = np.ones(len(values), bool) if certified is None else np.array(certified)
-    stretches = [known_intervals(values, growth, certified, [p["value"] for p in points], which) for which in (0, 1)]
+    states = values, growth > 0, certified, [p["value"] for p in points]
+    stretches = [known_intervals(*states, which) for which in (0, 1)]
     return SimpleNamespace(
         case=case,
         parameter="pressure",
@@ -107,7 +108,7 @@ def onset_result(values, growth, certified=None):
         classes=(),
         stable_intervals=stretches[0],
         unstable_intervals=stretches[1],
-        uncertain_intervals=uncertain_intervals(values, certified),
+        uncertain_intervals=uncertain_intervals(*states),
     )
 
 

@@ -146,8 +146,8 @@ class OnsetSearch:
         """
         name, said = self.options.parameter, []
         for low, high in joined_stretches([self.scan.uncertain]):
-            left = next((s.left_open for s in self.asked if low <= s.value <= high and s.left_open), "")
-            why = left or "Spectrum and independent count do not agree everywhere."
+            within = [s.left_open or s.failure for s in self._scanned if low <= s.value <= high]
+            why = next(filter(None, within), "Spectrum and independent count do not agree everywhere.")
             said.append(f"Between {name} = {low:.6g} and {high:.6g} nothing is claimed. {why}")
         bands = [s.verdict.band for s in self.line.samples.values() if np.isfinite(s.verdict.band)]
         if bands:
@@ -157,9 +157,17 @@ class OnsetSearch:
     @property
     def asked(self) -> list[Sample]:
         """Samples of the scan in ascending order, with those at which the constants of the rubber do not hold."""
-        scanned = {*self.scan.samples, *self.scan.failures}
-        known = {value: s for value, s in self.line.samples.items() if value in scanned and not s.failure}
-        return [known[value] for value in sorted(known)]
+        return [sample for sample in self._scanned if not sample.failure]
+
+    @property
+    def missed(self) -> list[float]:
+        """Values of the scan at which no state was found."""
+        return [sample.value for sample in self._scanned if sample.failure]
+
+    @property
+    def _scanned(self) -> list[Sample]:
+        known = self.line.samples
+        return [known[value] for value in sorted({*self.scan.samples, *self.scan.failures}) if value in known]
 
     def point(self, crossing: Crossing) -> OnsetPoint:
         """Locate, confirm and describe one crossing.
@@ -216,7 +224,7 @@ class OnsetSearch:
             abs(eigenvalue.imag) / (2 * np.pi),
             eigenvalue.real,
             crossing.gains,
-            min(below.unstable_count, above.unstable_count) == 0,
+            crossing.index == 0 and min(below.unstable_count, above.unstable_count) == 0,
             below,
             above,
             confirmed,
@@ -396,7 +404,7 @@ def run_onset(
     warnings += filter(None, [outside_band(case, [p.frequency for p in points])])
     points = tuple(sorted(points, key=lambda p: p.value))
     variant = options.variant or own_variant(case)
-    return FoundOnsets(variant, tuple(search.asked), points, tuple(failures), tuple(warnings))
+    return FoundOnsets(variant, tuple(search.asked), points, tuple(failures), tuple(warnings), tuple(search.missed))
 
 
 def normal_form(case: Case, walk: StabilityWalk, place: Mu, mode, parameter: str | None = None):
