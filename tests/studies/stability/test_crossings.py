@@ -1,5 +1,6 @@
 """Scans along a parameter on spectra known in closed form."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -167,3 +168,15 @@ def test_nothing_is_claimed_where_the_state_jumps():
     ((low, high),) = found.uncertain_intervals
     assert not found.points and 2.0 <= low < 2.3 < high <= 3.0
     assert found.stable_intervals == [(1.0, low)] and found.unstable_intervals == [(high, 4.0)]
+
+
+def test_a_mode_that_grows_too_slowly_to_be_counted_leaves_the_state_open():
+    """Without damping the independent count begins a little right of the axis."""
+    values = np.array([0.05 + 94j, -1.0 + 120j])
+    one = Sample(1.0, values, 0, 0, True, line=0.1, how=DIRECT)
+    assert one.verdict.outcome == "undecided" and not one.verdict.certain
+    assert "A mode grows by 0.05 1/s, too slowly to be counted." in one.verdict.reason
+    rest = replace(one, eigenvalues=np.array([1e-12 + 94j, -1.0 + 120j]))
+    assert rest.verdict.outcome == "stable"
+    found = FoundOnsets(Variant("storage", "SS"), (one, replace(one, value=2.0), replace(rest, value=3.0)), ())
+    assert found.uncertain_intervals == [(1.0, 3.0)] and not (found.stable_intervals or found.unstable_intervals)
