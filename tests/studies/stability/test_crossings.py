@@ -8,6 +8,7 @@ import pytest
 
 from dbvfiv.case.axis import Level
 from dbvfiv.errors import JumpError, SolveError
+from dbvfiv.studies.map.column import _crossings
 from dbvfiv.studies.onset.line import FoundOnsets
 from dbvfiv.studies.onset.search import OnsetOptions, OnsetSearch
 from dbvfiv.studies.stability.dimensions import Variant
@@ -180,3 +181,12 @@ def test_a_mode_that_grows_too_slowly_to_be_counted_leaves_the_state_open():
     assert rest.verdict.outcome == "stable"
     found = FoundOnsets(Variant("storage", "SS"), (one, replace(one, value=2.0), replace(rest, value=3.0)), ())
     assert found.uncertain_intervals == [(1.0, 3.0)] and not (found.stable_intervals or found.unstable_intervals)
+
+
+def test_a_mode_that_enters_the_band_costs_a_column_of_a_map_no_cells():
+    """The list of growth rates has a jump there, and another mode is neutral at 2.5."""
+    scan = Scan(modes(lambda x: -1.0 if x < 1.3 else 2.0, lambda x: x - 2.5))
+    follow = lambda crossing, rel, level, scan: LineOnset(*locate(scan, crossing, rel), 0.0)  # noqa: E731
+    line = SimpleNamespace(scan=scan, values=(0.0, 1.0, 2.0, 3.0), stays=True, is_reduced=True, locate=follow)
+    (onset,) = _crossings(line, Level())
+    assert onset[0] == pytest.approx(2.5) and onset[2] == 1.0
