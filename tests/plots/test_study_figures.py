@@ -206,7 +206,7 @@ def test_cells_that_are_not_valid_are_hatched_named_and_in_no_colour_scale():
     axes = figure.axes[0]
     assert {t.get_text() for t in axes.texts} >= {"not valid", "stable"}
     assert sum(bool(c.get_hatch()) for c in axes.collections) == 10
-    assert any("constants of the rubber are unstable there" in text for text in texts(figure))
+    assert any("constants of the rubber do not hold there" in text for text in texts(figure))
 
 
 def test_sealed_cells_are_named_and_stand_apart_from_the_other_stable_ones():

@@ -174,7 +174,7 @@ def _vouched(result: StudyResult) -> str:
     if not certified_cells(result).all():
         text += ", the others hatched"
     if invalid_cells(result).any():
-        text += " (not valid: the constants of the rubber are unstable there)"
+        text += " (not valid: the constants of the rubber do not hold there)"
     return text + (f", {len(result.checks)} solved again in full" if result.checks else "")
 
 
