@@ -13,7 +13,7 @@ import numpy as np
 
 from eigen.columns import DIRECT, MISSING
 
-from ...errors import SolveError
+from ...errors import CaseError, SolveError
 from ...fit.cards import outside_band
 from ...model.leading import other_end
 from ...record.mesh import MeshData
@@ -50,6 +50,7 @@ def check_cells(
 ) -> list[dict[str, Any]]:
     """Cells spread over the map by a sequence that fills the plane evenly, solved again with the full pencil: error of
     the leading eigenvalue, over its size, and whether it is accepted and the number of unstable eigenvalues the same.
+    A cell whose state is not found again is told as a warning.
     """
     usable = [column for column in columns if not column.failure and column.level == 0]
     if not usable:
@@ -65,10 +66,15 @@ def check_cells(
         kept = usable[i].samples[law][cell]
         if kept.is_missing:
             continue
-        cell = walk.cell(plan.place(usable[i].value, kept.value, plan.laws[law]))
+        x, y = (kept.value, usable[i].value) if plan.transposed else (usable[i].value, kept.value)
+        try:
+            cell = walk.cell(plan.place(usable[i].value, kept.value, plan.laws[law]))
+        except (SolveError, CaseError) as error:
+            at = f"{plan.x.parameter} = {x:.6g}, {plan.y.parameter} = {y:.6g}"
+            walk.observer.warn(f"The cell at {at} was not solved again: {error}")
+            continue
         leading, true = (complex(v[0]) if len(v) else complex(np.nan) for v in (kept.eigenvalues, cell.leading))
         error, unstable = abs(leading - true) / max(abs(true), 1.0), cell.certificate.unstable
-        x, y = (kept.value, usable[i].value) if plan.transposed else (usable[i].value, kept.value)
         numbers = {"growth_rate": true.real, "frequency": true.imag / (2 * np.pi), "error": float(error)}
         agrees = bool(error <= ACCEPTED and unstable == kept.unstable)
         found.append({"x": x, "y": y, "law": law} | numbers | {"unstable": unstable, "agrees": agrees})
