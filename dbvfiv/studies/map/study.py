@@ -370,6 +370,28 @@ class MapResult(StudyResult):
         """A quantity of the cells on the grid (laws, y, x); see `Sample.number`."""
         return grid_of(self.plan, self.columns, name, range(len(self.plan.laws)))
 
+    def over_classes(self, name: str) -> np.ndarray:
+        """A quantity of the cells in all classes of motion on the grid (laws, y, x).
+
+        Growth rate and frequency are those of the most unstable motion, the outcome is the one that decides; a cell is
+        certified if it is in all classes, or unstable in one that is.
+        """
+        others = range(len(self.plan.laws), len(self.plan.parts))
+        if not others:
+            return self.grid(name)
+
+        def table(name: str) -> np.ndarray:
+            more = (grid_of(self.plan, self.columns, name, [part]) for part in others)
+            return np.stack(np.broadcast_arrays(self.grid(name), *more))
+
+        if name == "outcome":
+            return table(name).min(axis=0)  # they are in that order
+        if name == "certified":
+            certified = table(name).astype(bool)
+            return certified.all(axis=0) | (certified & (table("unstable") > 0)).any(axis=0)
+        names = [motion.name for motion in self.plan.classes]
+        return np.array(leading_class(names, table("growth_rate"), table("frequency"))[name], float)
+
     @property
     def probability(self) -> np.ndarray:
         """Probability of flutter with the ends of its 95 % interval on the grid (3, y, x); NaN where there is none."""
