@@ -163,7 +163,8 @@ def _doubts(plan: MapPlan, columns: Iterable[MapColumn], checks: Iterable[dict[s
         lost = [s.failure for s in cells if s.failure]
         refused = sum(bool(s.refusal) for s in cells)
         left_open = [s.left_open for s in cells if s.left_open]
-        doubtful = sum(not (s.certified or s.is_missing or s.left_open) for s in cells)
+        asked = [s for s in cells if not (s.is_missing or s.left_open)]
+        doubtful = sum(not s.certified or s.verdict.stable is None for s in asked)
         if lost:
             said.append(f"{prefix}{len(lost)} cells have no steady state that was found; the first: {lost[0]}")
         if refused:
@@ -173,8 +174,8 @@ def _doubts(plan: MapPlan, columns: Iterable[MapColumn], checks: Iterable[dict[s
             said.append(f"{prefix}{len(left_open)} cells are left open. {left_open[0]}")
         if doubtful:
             said.append(
-                f"{prefix}{doubtful} cells are uncertain: spectrum and independent count disagree, or the count is not "
-                "certain; they are called neither stable nor unstable."
+                f"{prefix}{doubtful} cells are uncertain: spectrum and independent count disagree, the count is not "
+                "certain, or a mode grows too slowly to be counted; they are called neither stable nor unstable."
             )
     bands = [c.band for c in solved if np.isfinite(c.band)]
     if bands:
@@ -489,7 +490,7 @@ class MapResult(StudyResult):
                 lines += chances.sentences(self.record, self.plan)
             if self.has_cycles:
                 lines += cycles.sentences(self.record, self.plan, i)
-        lines += [self._class_line(note) for note in self.classes]
+        lines += [self._class_line(part, note) for part, note in enumerate(self.classes, len(self.plan.laws))]
         if self.checks:
             worst = max(check["error"] for check in self.checks)
             agreeing = sum(check["agrees"] for check in self.checks)
@@ -527,12 +528,12 @@ class MapResult(StudyResult):
         ]
         return [list(row) for row in zip(*table)] if self.plan.transposed else table
 
-    @staticmethod
-    def _class_line(note: dict[str, Any]) -> str:
-        unstable, certified = np.array(note["unstable_count"]), np.array(note["certified"], bool)
+    def _class_line(self, part: int, note: dict[str, Any]) -> str:
+        (outcome,), certified = grid_of(self.plan, self.columns, "outcome", [part]), np.array(note["certified"], bool)
+        number = {name: int(((outcome == i) & certified).sum()) for i, name in enumerate(OUTCOMES)}
         return (
-            f"class {note['symmetry']} ({note['motion']}): {int(((unstable > 0) & certified).sum())} cells unstable, "
-            f"{int(((unstable == 0) & certified).sum())} stable, {int(certified.sum())} of {unstable.size} certified."
+            f"class {note['symmetry']} ({note['motion']}): {number[FLUTTERS] + number[DIVERGES]} cells unstable, "
+            f"{number[STABLE]} stable, {int(certified.sum())} of {certified.size} certified."
         )
 
     def _curve_line(self, curve: OnsetCurve) -> str:

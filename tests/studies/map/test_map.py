@@ -18,7 +18,7 @@ from dbvfiv.record.record import GrowingRecord
 from dbvfiv.studies.case import thesis_case
 from dbvfiv.studies.map.column import MapColumn, MapPlan
 from dbvfiv.studies.map.figures import stability_map
-from dbvfiv.studies.map.study import MapResult, check_cells, keep_column, tables_of
+from dbvfiv.studies.map.study import MapResult, _doubts, check_cells, keep_column, tables_of
 from dbvfiv.studies.modes.search import run_modes
 from dbvfiv.studies.session import load_result
 from dbvfiv.studies.stability.samples import Sample
@@ -51,6 +51,21 @@ def test_a_check_whose_state_is_not_found_again_ends_no_map(case):
     checks = check_cells(plan, columns, walk, 12)
     assert len(checks) + len(said) == 12 and min(check["x"] for check in checks) > 3000.0
     assert said and all(text.startswith("The cell at pressure = 1000, density = ") for text in said)
+
+
+def test_cells_whose_mode_grows_too_slowly_to_be_counted_are_uncertain(case):
+    plan = MapPlan(case.replace({"map.symmetry": "all"}))
+    slow, calm = (Cell(np.array([complex(rate, 94.0)]), Certificate(0, 0, True, 0.1), DIRECT) for rate in (0.05, -1.0))
+    cells = {part: [Sample.of(v, slow if part else calm) for v in plan.along.values] for part in range(4)}
+    columns = tuple(MapColumn(value, 0, cells, np.zeros((0, 5))) for value in plan.across.values)
+    number = len(plan.along.values) * len(columns)
+    said = _doubts(plan, columns, [])
+    assert [text.split(" cells are")[0] for text in said] == [
+        f"In class {name}: {number}" for name in ("SA", "AS", "AA")
+    ]
+    result = SimpleNamespace(plan=plan, columns=columns)
+    note = {"symmetry": "SA", "motion": "sway", "certified": np.ones((10, 6), bool)}
+    assert MapResult._class_line(result, 1, note) == "class SA (sway): 0 cells unstable, 0 stable, 60 of 60 certified."
 
 
 def test_onsets_of_columns_lie_between_cells_of_opposite_sign(whole):
