@@ -16,6 +16,7 @@ EFFECTS = {
         "no verdict on vibration there with loss factors; with Rayleigh damping one on the fit, not on the rubber",
         "materials.constants",
     ),
+    "damping.loss_factor must be lower": ("no verdict on vibration there", "-"),
     "settled at the largest pressures": ("10 to 16 % in flow between 10 and 20 %", "materials.strain_level"),
     "growth rates do not order the modes": ("none below that frequency", "modes.max_frequency"),
     "the count finds more": ("no verdict on vibration above that frequency", "-"),

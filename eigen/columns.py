@@ -224,9 +224,13 @@ class ColumnSolver:
         doubtful = count(self._joint(first, fine) if joint else first, counted)
         if doubtful and joint and self._counter[1] is not fine:
             doubtful = count(self._joint(first, fine, anew=True), doubtful)
-        if doubtful and joint:
+        above = [i for i in counted if i not in doubtful and _grows_above(cells[i])]
+        if doubtful + above and joint:
             # a mode that is all but neutral has to be met to a fraction of its growth rate
-            doubtful = count(ReducedFamily(family, fine.V, OPTIONS.close, base=first), doubtful, within_band=True)
+            close = ReducedFamily(family, fine.V, OPTIONS.close, base=first)
+            doubtful, _ = (count(close, chosen, within_band=True) for chosen in (doubtful, above))
+        for i in above:
+            cells[i] = replace(cells[i], open_above=True)
         for i in doubtful:
             try:
                 spectrum = self.direct(family, points[i])
@@ -312,7 +316,7 @@ class ColumnSolver:
             If the full operator has no usable shift.
         """
         own, end = cell.certificate, family.search(mu).whole
-        if not own.stable or own.band >= end or (cell.leading.real > own.line).any():
+        if cell.open_above or not own.stable or own.band >= end or (cell.leading.real > own.line).any():
             return cell
         whole = self.reduction(family).first([mu]).count(mu, cell.leading, end)
         if whole.certain and not whole.number:
@@ -437,6 +441,12 @@ def _counted_band(family: PencilFamily, mu: Hashable, within_band: bool = False)
     if options.max_frequency is None or (family.relaxation(mu) is not None and not within_band):
         return options.whole
     return options.inside * options.max_frequency
+
+
+def _grows_above(cell: Cell) -> bool:
+    """True where none of the list grows, which ends at the band, and both counts, which do not, find what does."""
+    own = cell.certificate
+    return own.unstable > 0 and own.agrees and not (cell.leading.real > own.line).any()
 
 
 def _beside_changes(leading) -> np.ndarray:

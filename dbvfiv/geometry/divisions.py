@@ -36,6 +36,11 @@ class Division:
     missed: np.ndarray
 
 
+def least_rows(surface: Surface) -> int:
+    """Elements along that a surface needs at least, one for each of its pieces."""
+    return len(surface.breaks) - 1
+
+
 def row_division(valve: Valve, mesh: Mesh, surface: Surface, parts=()) -> Division:
     """Axial positions of the rows, m, from the lip to the flange; on the edges of parts of the wall too."""
     joints = surface.breaks

@@ -19,6 +19,8 @@ import numpy as np
 from ..case.materials import HIGHEST_LEVEL, LOWEST_LEVEL
 from ..case.model import Case
 from ..errors import SolveError
+from ..geometry import surface_of
+from ..geometry.divisions import least_rows
 from ..observer import Observer
 from .equilibria import LoadPath, SteadyOptions, operating_pressure
 from .load_steps import LARGEST_JUMP
@@ -130,7 +132,8 @@ class SettledLevels:
 def settle_levels(
     case: Case, pressure: float | None, back_pressure: float | None = None, observer: Observer | None = None
 ) -> SettledLevels:
-    """Levels of the built-in rubbers at the largest pressures that a case names, on a mesh of `SETTLING` elements.
+    """Levels of the built-in rubbers at the largest pressures that a case names, on a mesh of `SETTLING` elements, with
+    one for each piece of the surface at least.
 
     Each rubber takes the largest level of the states. A pressure that is not reached is halved; nothing is refused:
     where halves of it are not reached either, rubbers keep the lowest tested level.
@@ -152,7 +155,7 @@ def settle_levels(
     coarse = case.replace(
         {
             "mesh.around": SETTLING[0],
-            "mesh.along": SETTLING[1],
+            "mesh.along": max(SETTLING[1], least_rows(surface_of(case.valve, case.part))),
             "steady.min_step": max(SMALLEST_STEP, case.steady.min_step),
         }
     )

@@ -209,8 +209,12 @@ def require_consistent(case: Case, kind: str | None = None) -> None:
 
 def _nothing_flows(case: Case, kind: str | None) -> Iterator[str]:
     """Drive that is not above what the valve discharges into."""
-    back, drive = case.downstream.pressure, case.drive.pressure
-    behind = f"downstream.pressure = {_pascal(back)}" if back else "0, the pressure downstream"
+    given, drive = case.downstream.pressure, case.drive.pressure
+    # a level that opposes the flow is that of one density, and a study may vary it
+    back = min(given, case.rest_pressure)
+    behind = f"downstream.pressure = {_pascal(given)}" if given else "0, the pressure downstream"
+    if back < given:
+        behind = f"{_pascal(back)}, {behind} less the level of the lips below the inlet"
     if drive <= back and (kind is None or (kind in _AT_DRIVE and not _varies_pressure(case, kind))):
         if not (kind == "modes" and case.modes.in_vacuo):
             yield (

@@ -13,6 +13,7 @@ from eigen import (
     SearchOptions,
     lowest_frequencies,
 )
+from eigen.columns import REDUCED
 from eigen.operator import FLUID_PARTS
 from tests.eigen.test_columns import Point, PointFamily, dense
 
@@ -198,6 +199,38 @@ def test_a_cell_that_is_counted_anew_lists_no_slow_motions():
     (cell,) = ColumnSolver().solve(family, [condition]).cells
     assert cell.certificate.agrees and cell.certificate.counted == 2
     assert cell.leading == pytest.approx(family.reach(condition).leading(dense(family, condition)), rel=1e-7)
+
+
+def test_a_cell_whose_growing_mode_lies_above_the_band_is_left_open():
+    """Modes of 30 and 40 Hz decay; a third one grows, at 114 to 91 Hz, the slower the denser the fluid; the band is one
+    of 100 Hz, and the small model knows that mode from the cells where it lies inside."""
+
+    class Three(PointFamily):
+        def __init__(self):
+            self.mass, self.damping = np.eye(3), np.diag([4.0, 6.0, -16.0])
+            self.stiffness = np.diag((2 * np.pi * np.array([30.0, 40.0, 120.0])) ** 2)
+            pattern = np.array([[0.2], [0.2], [1.0]])
+            self.forces, self.slope = sp.csr_matrix(pattern), sp.csr_matrix(pattern.T)
+            shapes = {"A": (1, 1), "B": (1, 0), "R": (0, 1), "S": (0, 0)}
+            self._parts = {0.0: {name: np.zeros(shapes[name[0]]) for name in FLUID_PARTS} | {"A2": -np.eye(1)}}
+            self._relaxation = Relaxation([0.01 * self.stiffness], [[0.1]], [1.0])
+
+        def search(self, condition):
+            return SearchOptions(max_frequency=100.0)
+
+        def relaxation(self, mu):
+            return self._relaxation
+
+    family, conditions = Three(), [Point(inertia, 0.0, 1.0, 0.0) for inertia in (0.1, 0.3, 0.4, 0.5, 0.8)]
+    column = ColumnSolver().solve(family, conditions)
+    assert (column.how == REDUCED).all() and column.certified.all()
+    for cell, condition in zip(column.cells, conditions):
+        values = dense(family, condition)
+        growing = values[values.real > 0]
+        inside = np.abs(growing.imag) <= 2 * np.pi * 100.0
+        assert len(growing) == 2 and cell.certificate.unstable == inside.sum() == 2 * (cell.leading[0].real > 0)
+        assert cell.open_above == (not inside.any())
+    assert [cell.open_above for cell in column.cells] == [True] * 3 + [False] * 2
 
 
 def test_correction_is_that_of_newton_on_the_full_pencil():

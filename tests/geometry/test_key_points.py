@@ -11,7 +11,10 @@ import dbvfiv
 from dbvfiv.case import CaseError
 from dbvfiv.case.key_points import read_key_points
 from dbvfiv.geometry import key_point_table, surface_of, valve_mesh
+from dbvfiv.model import strain_level
 from dbvfiv.studies.case import Case, thesis_case
+from dbvfiv.studies.onset.search import coarse_case
+from dbvfiv.studies.stability.place import rebuilder
 
 WIDE = {
     "valve.lip_half_width": 0.18,
@@ -103,6 +106,24 @@ def test_a_smooth_skin_goes_through_its_profiles_and_needs_no_row_on_them(tmp_pa
     with pytest.raises(ValueError, match="the surface has 20 pieces and each needs an element"):
         ruled = Case().replace(given)
         valve_mesh(ruled.valve, ruled.mesh)
+
+
+def test_coarser_meshes_have_a_row_for_every_piece(tmp_path, monkeypatch, refused):
+    """Levels of rubbers settle on fewer elements, and an onset is found again on a second mesh."""
+    asked = []
+
+    def settled(case, loads, levels, observer):
+        asked.append(case)
+        yield strain_level._Round(1, case, levels, (), 0.0)
+
+    monkeypatch.setattr(strain_level, "_rounds", settled)
+    case = by_points(Case().replace(WIDE), tmp_path, 17, 26, **{"mesh.along": 30})
+    assert len(surface_of(case.valve).profiles) == 30
+    strain_level.settle_levels(case, 6e3)
+    found = [asked[0], *(coarse_case(case.replace({"mesh.along": n}), 0.5)[0] for n in (30, 80))]
+    assert [valve_mesh(each.valve, each.mesh).shape for each in found] == [(14, 29), (6, 29), (6, 40)]
+    with refused(CaseError, match="mesh.along is 28, but the surface has 29 pieces"):
+        rebuilder(case.replace({"mesh.along": 28}))({})
 
 
 def test_forms_of_a_table(tmp_path):

@@ -1,5 +1,6 @@
 """Figures of stability and closure: what they say is what the result holds."""
 
+from functools import partial
 from types import SimpleNamespace
 
 import numpy as np
@@ -8,11 +9,14 @@ from matplotlib.colors import BoundaryNorm
 
 from dbvfiv.studies.case import thesis_case
 from dbvfiv.studies.map import figures as map_figures
-from dbvfiv.studies.map.column import MapPlan
+from dbvfiv.studies.map.column import MapColumn, MapPlan
 from dbvfiv.studies.map.curves import OnsetCurve
+from dbvfiv.studies.map.study import MapResult
 from dbvfiv.studies.onset import study as onset_study
 from dbvfiv.studies.onset.line import known_intervals, uncertain_intervals
+from dbvfiv.studies.stability.samples import Sample
 from dbvfiv.studies.stability.verdict import FLUTTERS, NOT_VALID, OUTCOMES, STABLE, UNDECIDED
+from eigen.columns import DIRECT
 
 
 def texts(figure):
@@ -95,7 +99,8 @@ def onset_result(values, growth, certified=None):
     point |= {"edge": True, "gains": False}
     points = [point] if len(values) > 1 else []
     certified = np.ones(len(values), bool) if certified is None else np.array(certified)
-    stretches = [known_intervals(values, growth, certified, [p["value"] for p in points], which) for which in (0, 1)]
+    states = values, growth > 0, certified, [p["value"] for p in points]
+    stretches = [known_intervals(*states, which) for which in (0, 1)]
     return SimpleNamespace(
         case=case,
         parameter="pressure",
@@ -107,7 +112,7 @@ def onset_result(values, growth, certified=None):
         classes=(),
         stable_intervals=stretches[0],
         unstable_intervals=stretches[1],
-        uncertain_intervals=uncertain_intervals(values, certified),
+        uncertain_intervals=uncertain_intervals(*states),
     )
 
 
@@ -156,7 +161,7 @@ def map_result(certified=None):
     grids["outcome"] = np.where(grids["certified"], decided, OUTCOMES.index(UNDECIDED))
     x = np.full(9, 6500.0) + np.linspace(-500, 500, 9)
     curve = OnsetCurve(0, x, np.geomspace(1, 1000, 9), np.linspace(36, 52, 9), exact=True)
-    return SimpleNamespace(
+    result = SimpleNamespace(
         plan=plan,
         columns=[SimpleNamespace(failure="")],
         curves=[curve],
@@ -166,6 +171,33 @@ def map_result(certified=None):
         moved=("pressure", "density"),
         grid=grids.get,
     )
+    result.over_classes = lambda name: result.grid(name)
+    return result
+
+
+def test_a_map_of_all_classes_shows_the_motion_that_decides():
+    """The opening lips decay everywhere; the lips sway and grow in the left half, which nobody certifies in row 0."""
+    keys = {"map.x": "pressure=1000:6000:6", "map.y": "density=1:1000:2:log", "map.symmetry": "all"}
+    case = thesis_case(keys)
+    plan = MapPlan(case)
+    columns = []
+    for k, across in enumerate(plan.across.values):
+        cells = {}
+        for part in range(len(plan.parts)):
+            sways = part == 1 and k < 3
+            values, number = np.array([complex(7.0 if sways else -3.0 - part, 200.0)]), 2 * sways
+            cells[part] = [
+                Sample(y, values, number, number, bool(part or j), how=DIRECT) for j, y in enumerate(plan.along.values)
+            ]
+        columns.append(MapColumn(across, 0, cells, np.zeros((0, 5))))
+    result = map_result()
+    result.plan, result.case, result.columns, result.curves = plan, case, columns, []
+    result.grid, result.over_classes = (partial(getattr(MapResult, name), result) for name in ("grid", "over_classes"))
+    figure = map_figures.stability_map(result)
+    colours = np.ma.filled(figure.axes[0].collections[0].get_array(), np.nan)
+    assert np.array_equal(colours, [[7.0] * 3 + [np.nan] * 3, [7.0] * 3 + [-3.0] * 3], equal_nan=True)
+    assert {t.get_text() for t in figure.axes[0].texts} >= {"stable", "unstable"}
+    assert any("9 of 12 cells certified by two counts in classes SS, SA, AS, AA" in text for text in texts(figure))
 
 
 def test_a_map_has_one_colour_bar_with_every_band_labelled():
@@ -205,7 +237,7 @@ def test_cells_that_are_not_valid_are_hatched_named_and_in_no_colour_scale():
     axes = figure.axes[0]
     assert {t.get_text() for t in axes.texts} >= {"not valid", "stable"}
     assert sum(bool(c.get_hatch()) for c in axes.collections) == 10
-    assert any("constants of the rubber are unstable there" in text for text in texts(figure))
+    assert any("constants of the rubber do not hold there" in text for text in texts(figure))
 
 
 def test_sealed_cells_are_named_and_stand_apart_from_the_other_stable_ones():

@@ -8,12 +8,12 @@ import pytest
 import dbvfiv
 from continuation.normal_form import Motion
 from dbvfiv.case.quantity import GRAVITY
-from dbvfiv.errors import SolveError
+from dbvfiv.errors import CaseError, SolveError
 from dbvfiv.model.classes import linearise_class
 from dbvfiv.model.equilibria import find_equilibrium, rest_state
 from dbvfiv.model.forms import ValveForms
 from dbvfiv.model.symmetry import SYMMETRIES
-from dbvfiv.studies.case import thesis_case
+from dbvfiv.studies.case import require_consistent, thesis_case
 from dbvfiv.studies.stability.place import is_surrounding
 from tests.model.test_residual_forms import check, difference
 from tests.small_valves import SMALL, load_small, make_valve, settings
@@ -73,6 +73,15 @@ def test_a_valve_that_hangs_holds_still_water():
 def test_less_than_the_level_does_not_flow():
     with pytest.raises(SolveError, match="nothing flows.*by the level of the lips"):
         find_equilibrium(load_small(UP).model, 5e3)
+
+
+@pytest.mark.parametrize("kind", [None, "steady", "modes", "onset"])
+def test_lips_that_lie_deep_in_water_are_driven_by_the_level_too(kind):
+    """1 m of water at the lips, which lie 0.56 m below the inlet."""
+    deep = load_small(DOWN, {"downstream.pressure": 9.8e3, "drive.pressure": 6e3, "report.heads": [5e3, 6e3]})
+    require_consistent(deep.case, kind)
+    with pytest.raises(CaseError, match="4 kPa, which is not above 4.308 kPa, downstream.pressure = 9.8 kPa less the"):
+        require_consistent(deep.replace({"drive.pressure": 4e3}).case, kind)
 
 
 @pytest.mark.slow

@@ -117,6 +117,10 @@ def test_every_class_has_its_figures(four):
     leading = [mode for mode in four.modes[:3] if SYMMETRIES[mode.symmetry].signs[0] > 0]
     assert lines == {f"centre-line-{mode.number}" for mode in leading}
     assert "in class SA" in drawers["winding-SA"]().axes[0].get_title(loc="left")
+    assert four.verdict.outcome == "flutters"
+    for name, certificate in four.certificates.items():
+        said = drawers["winding" if name == "SS" else f"winding-{name}"]().get_supxlabel()
+        assert said.startswith("Flutters" if certificate.unstable_count else "Stable"), said
 
 
 def test_both_laws_are_for_the_symmetric_class(coarse_valve, refused):

@@ -15,7 +15,7 @@ from eigen.columns import MISSING
 
 from ...case.axis import Axis, Level
 from ...case.parameters import Mu
-from ...errors import CaseError, SolveError
+from ...errors import CaseError, JumpError, SolveError
 from ...model.symmetry import Symmetry, chosen_symmetries
 from ...texts import shortly
 from ..case import Case
@@ -247,7 +247,9 @@ def _crossings(line: ParameterLine, level: Level) -> list[tuple[float, float, fl
         direction = 1.0 if crossing.gains else -1.0
         try:
             onset = line.locate(crossing, ROUGH if line.is_reduced else LOCATED, level, scan)
-        except SolveError:  # the state jumps there, or is not found
+        except JumpError:  # of the state, or of a list whose leading mode enters or leaves the band
+            continue
+        except SolveError:  # the state is not found
             if line.stays:
                 raise
             continue

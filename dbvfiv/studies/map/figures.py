@@ -26,7 +26,7 @@ from ...drawing.style import (
 from ...texts import digits
 from ..result import StudyResult
 from ..stability.place import describe_fixed
-from ..stability.verdict import NOT_VALID, OUTCOMES
+from ..stability.verdict import DIVERGES, FLUTTERS, NOT_VALID, OUTCOMES, STABLE
 from .chances import BANDS
 
 #: Places across a picture at which its regions are looked at.
@@ -48,7 +48,7 @@ def draw(result: StudyResult) -> Iterator[tuple[str, Callable[[], Figure]]]:
 
 def stability_map(result: StudyResult) -> Figure:
     """The headline: where the valve flutters. Cells that no independent count certifies are hatched."""
-    growth = np.where(certified_cells(result), result.grid("growth_rate"), np.nan)
+    growth = np.where(certified_cells(result), result.over_classes("growth_rate"), np.nan)
     levels = growth_levels(growth)
     norm = BoundaryNorm(levels, 256)
     figure, panels = _panels(result)
@@ -79,7 +79,7 @@ def _bands(axes, result: StudyResult) -> None:
 
 def leading_frequency(result: StudyResult) -> Figure:
     """Frequency of the leading mode; it changes with a jump where another mode takes the lead."""
-    frequency = np.ma.masked_invalid(np.where(certified_cells(result), result.grid("frequency"), np.nan))
+    frequency = np.ma.masked_invalid(np.where(certified_cells(result), result.over_classes("frequency"), np.nan))
     top = float(frequency.max()) if frequency.count() else 1.0
     norm = matplotlib.colors.Normalize(0.0, top)
     figure, panels = _panels(result)
@@ -123,12 +123,12 @@ def cycle_amplitude(result: StudyResult) -> Figure:
 
 def certified_cells(result: StudyResult) -> np.ndarray:
     """(laws, rows, columns) whether two counts agree on a cell."""
-    return result.grid("certified").astype(bool) & (result.grid("unstable") >= 0)
+    return result.over_classes("certified").astype(bool) & (result.grid("unstable") >= 0)
 
 
 def invalid_cells(result: StudyResult) -> np.ndarray:
     """(laws, rows, columns) where the constants of the rubber do not hold."""
-    return result.grid("outcome") == OUTCOMES.index(NOT_VALID)
+    return result.over_classes("outcome") == OUTCOMES.index(NOT_VALID)
 
 
 def growth_levels(growth: np.ndarray) -> np.ndarray:
@@ -169,12 +169,15 @@ def _headline(figure: Figure, result: StudyResult) -> None:
 
 
 def _vouched(result: StudyResult) -> str:
-    certified, found = result.grid("certified"), result.grid("unstable") >= 0
+    certified, found = result.over_classes("certified"), result.grid("unstable") >= 0
     text = f"{int(certified.sum())} of {int(found.sum())} cells certified by two counts"
+    if len(result.plan.classes) > 1:
+        names = ", ".join(motion.name for motion in result.plan.classes)
+        text += f" in classes {names} (curves: {result.plan.classes[0].name})"
     if not certified_cells(result).all():
         text += ", the others hatched"
     if invalid_cells(result).any():
-        text += " (not valid: the constants of the rubber are unstable there)"
+        text += " (not valid: the constants of the rubber do not hold there)"
     return text + (f", {len(result.checks)} solved again in full" if result.checks else "")
 
 
@@ -274,12 +277,15 @@ def _ticks_along(axes, points: np.ndarray, frequency: np.ndarray) -> None:
 
 
 def label_regions(axes, result: StudyResult, law: int) -> None:
-    """Words, on a ground of their own, in the middle of the largest stable and unstable regions."""
-    unstable = result.grid("unstable")[law]
+    """Words, on a ground of their own, in the middle of the largest regions: stable in all classes of motion, unstable
+    in any.
+    """
+    outcome, stable = result.over_classes("outcome")[law], OUTCOMES.index(STABLE)
+    unstable = np.isin(outcome, [OUTCOMES.index(name) for name in (FLUTTERS, DIVERGES)])
     sure, invalid = certified_cells(result)[law], invalid_cells(result)[law]
     cells = [_drawn_cells(axis) for axis in (result.plan.x, result.plan.y)]
     sealed = result.grid("sealed")[law] > 0
-    regions = {"unstable": sure & (unstable > 0), "not valid": invalid, "stable": sure & (unstable == 0) & ~sealed}
+    regions = {"unstable": sure & unstable, "not valid": invalid, "stable": sure & (outcome == stable) & ~sealed}
     regions["sealed"] = sealed
     for word, mask in regions.items():
         parts, count = label(mask[np.ix_(cells[1], cells[0])])

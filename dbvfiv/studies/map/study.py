@@ -13,7 +13,7 @@ import numpy as np
 
 from eigen.columns import DIRECT, MISSING
 
-from ...errors import SolveError
+from ...errors import CaseError, SolveError
 from ...fit.cards import outside_band
 from ...model.leading import other_end
 from ...record.mesh import MeshData
@@ -50,6 +50,7 @@ def check_cells(
 ) -> list[dict[str, Any]]:
     """Cells spread over the map by a sequence that fills the plane evenly, solved again with the full pencil: error of
     the leading eigenvalue, over its size, and whether it is accepted and the number of unstable eigenvalues the same.
+    A cell whose state is not found again is told as a warning.
     """
     usable = [column for column in columns if not column.failure and column.level == 0]
     if not usable:
@@ -65,10 +66,15 @@ def check_cells(
         kept = usable[i].samples[law][cell]
         if kept.is_missing:
             continue
-        cell = walk.cell(plan.place(usable[i].value, kept.value, plan.laws[law]))
+        x, y = (kept.value, usable[i].value) if plan.transposed else (usable[i].value, kept.value)
+        try:
+            cell = walk.cell(plan.place(usable[i].value, kept.value, plan.laws[law]))
+        except (SolveError, CaseError) as error:
+            at = f"{plan.x.parameter} = {x:.6g}, {plan.y.parameter} = {y:.6g}"
+            walk.observer.warn(f"The cell at {at} was not solved again: {error}")
+            continue
         leading, true = (complex(v[0]) if len(v) else complex(np.nan) for v in (kept.eigenvalues, cell.leading))
         error, unstable = abs(leading - true) / max(abs(true), 1.0), cell.certificate.unstable
-        x, y = (kept.value, usable[i].value) if plan.transposed else (usable[i].value, kept.value)
         numbers = {"growth_rate": true.real, "frequency": true.imag / (2 * np.pi), "error": float(error)}
         agrees = bool(error <= ACCEPTED and unstable == kept.unstable)
         found.append({"x": x, "y": y, "law": law} | numbers | {"unstable": unstable, "agrees": agrees})
@@ -157,7 +163,8 @@ def _doubts(plan: MapPlan, columns: Iterable[MapColumn], checks: Iterable[dict[s
         lost = [s.failure for s in cells if s.failure]
         refused = sum(bool(s.refusal) for s in cells)
         left_open = [s.left_open for s in cells if s.left_open]
-        doubtful = sum(not (s.certified or s.is_missing or s.left_open) for s in cells)
+        asked = [s for s in cells if not (s.is_missing or s.left_open)]
+        doubtful = sum(not s.certified or s.verdict.stable is None for s in asked)
         if lost:
             said.append(f"{prefix}{len(lost)} cells have no steady state that was found; the first: {lost[0]}")
         if refused:
@@ -167,8 +174,8 @@ def _doubts(plan: MapPlan, columns: Iterable[MapColumn], checks: Iterable[dict[s
             said.append(f"{prefix}{len(left_open)} cells are left open. {left_open[0]}")
         if doubtful:
             said.append(
-                f"{prefix}{doubtful} cells are uncertain: spectrum and independent count disagree, or the count is not "
-                "certain; they are called neither stable nor unstable."
+                f"{prefix}{doubtful} cells are uncertain: spectrum and independent count disagree, the count is not "
+                "certain, or a mode grows too slowly to be counted; they are called neither stable nor unstable."
             )
     bands = [c.band for c in solved if np.isfinite(c.band)]
     if bands:
@@ -364,6 +371,28 @@ class MapResult(StudyResult):
         """A quantity of the cells on the grid (laws, y, x); see `Sample.number`."""
         return grid_of(self.plan, self.columns, name, range(len(self.plan.laws)))
 
+    def over_classes(self, name: str) -> np.ndarray:
+        """A quantity of the cells in all classes of motion on the grid (laws, y, x).
+
+        Growth rate and frequency are those of the most unstable motion, the outcome is the one that decides; a cell is
+        certified if it is in all classes, or unstable in one that is.
+        """
+        others = range(len(self.plan.laws), len(self.plan.parts))
+        if not others:
+            return self.grid(name)
+
+        def table(name: str) -> np.ndarray:
+            more = (grid_of(self.plan, self.columns, name, [part]) for part in others)
+            return np.stack(np.broadcast_arrays(self.grid(name), *more))
+
+        if name == "outcome":
+            return table(name).min(axis=0)  # they are in that order
+        if name == "certified":
+            certified = table(name).astype(bool)
+            return certified.all(axis=0) | (certified & (table("unstable") > 0)).any(axis=0)
+        names = [motion.name for motion in self.plan.classes]
+        return np.array(leading_class(names, table("growth_rate"), table("frequency"))[name], float)
+
     @property
     def probability(self) -> np.ndarray:
         """Probability of flutter with the ends of its 95 % interval on the grid (3, y, x); NaN where there is none."""
@@ -461,7 +490,7 @@ class MapResult(StudyResult):
                 lines += chances.sentences(self.record, self.plan)
             if self.has_cycles:
                 lines += cycles.sentences(self.record, self.plan, i)
-        lines += [self._class_line(note) for note in self.classes]
+        lines += [self._class_line(part, note) for part, note in enumerate(self.classes, len(self.plan.laws))]
         if self.checks:
             worst = max(check["error"] for check in self.checks)
             agreeing = sum(check["agrees"] for check in self.checks)
@@ -499,12 +528,12 @@ class MapResult(StudyResult):
         ]
         return [list(row) for row in zip(*table)] if self.plan.transposed else table
 
-    @staticmethod
-    def _class_line(note: dict[str, Any]) -> str:
-        unstable, certified = np.array(note["unstable_count"]), np.array(note["certified"], bool)
+    def _class_line(self, part: int, note: dict[str, Any]) -> str:
+        (outcome,), certified = grid_of(self.plan, self.columns, "outcome", [part]), np.array(note["certified"], bool)
+        number = {name: int(((outcome == i) & certified).sum()) for i, name in enumerate(OUTCOMES)}
         return (
-            f"class {note['symmetry']} ({note['motion']}): {int(((unstable > 0) & certified).sum())} cells unstable, "
-            f"{int(((unstable == 0) & certified).sum())} stable, {int(certified.sum())} of {unstable.size} certified."
+            f"class {note['symmetry']} ({note['motion']}): {number[FLUTTERS] + number[DIVERGES]} cells unstable, "
+            f"{number[STABLE]} stable, {int(certified.sum())} of {certified.size} certified."
         )
 
     def _curve_line(self, curve: OnsetCurve) -> str:

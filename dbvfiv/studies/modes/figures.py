@@ -353,7 +353,7 @@ def winding(result: StudyResult, symmetry: str, certificate: Certificate) -> Fig
     axes.set_xlabel("Frequency on the imaginary axis, Hz")
     axes.set_ylabel("Phase of the determinant, half turns")
     axes.set_title(f"Independent count{which} {conditions(result)}", loc="left", fontweight="bold", pad=6 + 11 * levels)
-    verdict = f"{result.verdict.outcome.capitalize()} {result.law}: {certificate.statement}"
+    verdict = f"{result.verdicts[symmetry].outcome.capitalize()} {result.law}: {certificate.statement}"
     beginning = f" The curve begins at {start:g}, half the degree of the determinant." if start else ""
     figure.supxlabel(f"{verdict}\nNumbers: modes found by the search.{beginning}", x=0.01, ha="left", fontsize=9)
     return figure

@@ -195,6 +195,11 @@ class ModesResult(StudyResult):
         """One for each class of motion that was searched, by its name."""
         return {name: found.certificate for name, found in self._classes.items()}
 
+    @property
+    def verdicts(self) -> dict[str, Verdict]:
+        """One for each class of motion that was searched, by its name."""
+        return {name: found.verdict for name, found in self._classes.items()}
+
     @cached_property
     def certificate(self) -> Certificate | None:
         """Certificate of all classes searched; None if the run ended before it had one."""
@@ -212,7 +217,7 @@ class ModesResult(StudyResult):
             return Verdict.not_valid(refusals[-1]["text"])
         if not self._classes:
             return Verdict.undecided("The run ended before its modes were found.")
-        return Verdict.joined({name: found.verdict for name, found in self._classes.items()})
+        return Verdict.joined(self.verdicts)
 
     @property
     def stable(self) -> bool | None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, fields
 from functools import cached_property
 from typing import Any
@@ -143,6 +143,8 @@ class FoundOnsets:
     points : tuple of OnsetPoint
         In ascending order of the parameter.
     failures, warnings : tuples of str
+    missed : tuple of float
+        Values at which no state was found.
     """
 
     variant: Variant
@@ -150,6 +152,7 @@ class FoundOnsets:
     points: tuple[OnsetPoint, ...]
     failures: tuple[str, ...] = ()
     warnings: tuple[str, ...] = ()
+    missed: tuple[float, ...] = ()
 
     @cached_property
     def values(self) -> np.ndarray:
@@ -184,24 +187,31 @@ class FoundOnsets:
         """Verdicts on the values of the scan."""
         return tuple(sample.verdict for sample in self.samples)
 
-    def _known(self, unstable: bool) -> list[Interval]:
+    @cached_property
+    def _states(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, list[float]]:
+        """Values, whether the state is unstable there and whether that is sure, and the edges between such states."""
+        found = [
+            (s.value, s.verdict.stable is False, s.certified and s.verdict.stable is not None) for s in self.samples
+        ]
+        rows = sorted([*found, *((value, False, False) for value in self.missed)])
         edges = [point.value for point in self.points if point.edge]
-        return known_intervals(self.values, self.growth_rates[:, 0], self.certified, edges, unstable)
+        values, grows, sure = np.array(rows, float).reshape(-1, 3).T
+        return values, grows > 0, sure > 0, edges
 
     @property
     def unstable_intervals(self) -> list[Interval]:
         """Intervals of the scanned range in which the state is known to be unstable."""
-        return self._known(True)
+        return known_intervals(*self._states, True)
 
     @property
     def stable_intervals(self) -> list[Interval]:
         """Intervals of the scanned range in which the state is known to be stable."""
-        return self._known(False)
+        return known_intervals(*self._states, False)
 
     @property
     def uncertain_intervals(self) -> list[Interval]:
         """Intervals of the scanned range in which neither stability nor instability is claimed."""
-        return uncertain_intervals(self.values, self.certified)
+        return uncertain_intervals(*self._states)
 
     def scan(self) -> dict[str, Any]:
         """Plain numbers of the scan for JSON."""
@@ -230,7 +240,7 @@ class FoundOnsets:
 
 
 def known_intervals(
-    values: np.ndarray, growth: np.ndarray, certified: np.ndarray, edges: Iterable[float], unstable: bool
+    values: np.ndarray, grows: np.ndarray, sure: np.ndarray, edges: Iterable[float], unstable: bool
 ) -> list[Interval]:
     """Intervals in which a state is known to be unstable, or stable.
 
@@ -238,33 +248,43 @@ def known_intervals(
     ----------
     values : (s,) array
         Values of the scan, ascending.
-    growth : (s,) array, 1/s
-        Growth rate of the leading mode there.
-    certified : (s,) bool array
-        Nothing is claimed beside a value without a certificate.
+    grows : (s,) bool array
+        True where the state is unstable.
+    sure : (s,) bool array
+        Nothing is claimed beside a value that is not.
     edges : iterable of float
-        Onsets at which the state changes between stable and unstable.
+        Onsets at which the state changes between stable and unstable. Nothing is claimed between two values whose
+        states these do not make of each other, as where the state jumps.
     unstable : bool
         True for the unstable intervals, False for the stable ones.
     """
-    edges, found = sorted(edges), []
-    # right at an onset the sign of the growth rate is that of rounding
-    away = [all(abs(v - e) > BESIDE * abs(e) for e in edges) or v in (values[0], values[-1]) for v in values]
-    values, growth, certified = (np.asarray(part)[np.array(away, bool)] for part in (values, growth, certified))
-    for i in np.flatnonzero(certified[:-1] & certified[1:]):
-        marks = [values[i], *(e for e in edges if values[i] < e < values[i + 1]), values[i + 1]]
-        state = bool(growth[i] > 0)
+    found = []
+    for marks, state, known in _stretches(values, grows, sure, edges):
         for number, (a, b) in enumerate(zip(marks[:-1], marks[1:])):
-            if (state == unstable) == (number % 2 == 0):
-                found.append((float(a), float(b)))
+            if known and (state == unstable) == (number % 2 == 0):
+                found.append((a, b))
     return joined_stretches([found])
 
 
-def uncertain_intervals(values: np.ndarray, certified: np.ndarray) -> list[Interval]:
-    """Intervals in which nothing is claimed, because a neighbour in the scan lacks a certificate."""
-    values = np.asarray(values, float).tolist()
-    pairs = zip(values[:-1], values[1:], certified[:-1], certified[1:])
-    return joined_stretches([[(a, b) for a, b, low, high in pairs if not (low and high)]])
+def uncertain_intervals(
+    values: np.ndarray, grows: np.ndarray, sure: np.ndarray, edges: Iterable[float]
+) -> list[Interval]:
+    """Intervals in which `known_intervals` claims nothing."""
+    parts = _stretches(values, grows, sure, edges)
+    return joined_stretches([[(marks[0], marks[-1]) for marks, _, known in parts if not known]])
+
+
+def _stretches(values, grows, sure, edges) -> Iterator[tuple[list[float], bool, bool]]:
+    """Neighbours of a scan with the edges between them, whether the state is unstable at the first, and whether it is
+    known all the way.
+    """
+    edges = sorted(edges)
+    # right at an onset the sign of the growth rate is that of rounding
+    away = [all(abs(v - e) > BESIDE * abs(e) for e in edges) or v in (values[0], values[-1]) for v in values]
+    rows = list(zip(*(np.asarray(part)[np.array(away, bool)].tolist() for part in (values, grows, sure))))
+    for (a, state, first), (b, other, second) in zip(rows[:-1], rows[1:]):
+        between = [e for e in edges if a < e < b]
+        yield [a, *between, b], state, first and second and (state != other) == (len(between) % 2 == 1)
 
 
 def joined_stretches(parts: Sequence[Sequence[Interval]]) -> list[Interval]:

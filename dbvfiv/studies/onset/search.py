@@ -15,6 +15,8 @@ from continuation.options import ContinuationError
 from ...case.parameters import DESIGN, PARAMETERS, Mu
 from ...errors import SolveError
 from ...fit.cards import outside_band
+from ...geometry import surface_of
+from ...geometry.divisions import least_rows
 from ...model.forms import ValveForms
 from ...model.leading import other_end
 from ...observer import Observer
@@ -144,8 +146,8 @@ class OnsetSearch:
         """
         name, said = self.options.parameter, []
         for low, high in joined_stretches([self.scan.uncertain]):
-            left = next((s.left_open for s in self.asked if low <= s.value <= high and s.left_open), "")
-            why = left or "Spectrum and independent count do not agree everywhere."
+            within = [s.left_open or s.failure for s in self._scanned if low <= s.value <= high]
+            why = next(filter(None, within), "Spectrum and independent count do not agree everywhere.")
             said.append(f"Between {name} = {low:.6g} and {high:.6g} nothing is claimed. {why}")
         bands = [s.verdict.band for s in self.line.samples.values() if np.isfinite(s.verdict.band)]
         if bands:
@@ -155,9 +157,17 @@ class OnsetSearch:
     @property
     def asked(self) -> list[Sample]:
         """Samples of the scan in ascending order, with those at which the constants of the rubber do not hold."""
-        scanned = {*self.scan.samples, *self.scan.failures}
-        known = {value: s for value, s in self.line.samples.items() if value in scanned and not s.failure}
-        return [known[value] for value in sorted(known)]
+        return [sample for sample in self._scanned if not sample.failure]
+
+    @property
+    def missed(self) -> list[float]:
+        """Values of the scan at which no state was found."""
+        return [sample.value for sample in self._scanned if sample.failure]
+
+    @property
+    def _scanned(self) -> list[Sample]:
+        known = self.line.samples
+        return [known[value] for value in sorted({*self.scan.samples, *self.scan.failures}) if value in known]
 
     def point(self, crossing: Crossing) -> OnsetPoint:
         """Locate, confirm and describe one crossing.
@@ -214,7 +224,7 @@ class OnsetSearch:
             abs(eigenvalue.imag) / (2 * np.pi),
             eigenvalue.real,
             crossing.gains,
-            min(below.unstable_count, above.unstable_count) == 0,
+            crossing.index == 0 and min(below.unstable_count, above.unstable_count) == 0,
             below,
             above,
             confirmed,
@@ -285,12 +295,15 @@ NO_ONSET = "has no onset like it"
 
 
 def coarse_case(case: Case, share: float) -> tuple[Case, float]:
-    """The case on fewer elements, and the ratio of mesh widths."""
-    mesh = case.mesh
-    around, along = (max(6, int(round(share * n))) for n in (mesh.around, mesh.along))
-    return case.replace({"mesh.around": around, "mesh.along": along}), float(
-        np.sqrt(mesh.around * mesh.along / (around * along))
-    )
+    """The case on fewer elements, along no fewer than its surface has pieces, and the ratio of mesh widths; that is 1
+    where either way stays all but as fine, so that the difference says nothing of it.
+    """
+    mesh, pieces = case.mesh, least_rows(surface_of(case.valve, case.part))
+    ways = (mesh.around, 6), (mesh.along, max(6, pieces))
+    around, along = (min(n, max(least, int(round(share * n)))) for n, least in ways)
+    ratios = mesh.around / around, mesh.along / along
+    ratio = float(np.sqrt(np.prod(ratios))) if min(ratios) >= LEAST_RATIO else 1.0
+    return case.replace({"mesh.around": around, "mesh.along": along}), ratio
 
 
 def with_uncertainty(
@@ -395,7 +408,7 @@ def run_onset(
     warnings += filter(None, [outside_band(case, [p.frequency for p in points])])
     points = tuple(sorted(points, key=lambda p: p.value))
     variant = options.variant or own_variant(case)
-    return FoundOnsets(variant, tuple(search.asked), points, tuple(failures), tuple(warnings))
+    return FoundOnsets(variant, tuple(search.asked), points, tuple(failures), tuple(warnings), tuple(search.missed))
 
 
 def normal_form(case: Case, walk: StabilityWalk, place: Mu, mode, parameter: str | None = None):

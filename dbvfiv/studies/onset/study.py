@@ -88,9 +88,11 @@ def read_onsets(record: Record, variant: Variant, partly: bool = False) -> Found
     if not (done or partly):
         return None
     key = (variant.storage, variant.symmetry, FINE)
-    samples = {s.value: s for s in read_samples(record) if s.key[:3] == key and not s.failure}
+    samples = {s.value: s for s in read_samples(record) if s.key[:3] == key}
     said = [tuple(done[-1][name]) if done else () for name in ("failures", "warnings")]
-    return FoundOnsets(variant, tuple(samples[v] for v in sorted(samples)), tuple(_points(record, variant)), *said)
+    found = tuple(samples[v] for v in sorted(samples) if not samples[v].failure)
+    missed = tuple(v for v in sorted(samples) if samples[v].failure)
+    return FoundOnsets(variant, found, tuple(_points(record, variant)), *said, missed)
 
 
 class OnsetResult(StudyResult):
@@ -286,13 +288,14 @@ class OnsetResult(StudyResult):
         invalid = outcomes.count(NOT_VALID)
         if outcomes and invalid == len(outcomes):
             return f"Not valid {scanned}: {lowered(self.verdicts[0].reason)}"
-        if not all(self.leading["certified"]) or len(set(outcomes)) != 1 or UNDECIDED in outcomes:
+        unclear = self.uncertain_intervals or not all(self.leading["certified"])
+        if unclear or len(set(outcomes)) != 1 or UNDECIDED in outcomes:
             but = f" {invalid} of them are not valid: the constants of the rubber do not hold." if invalid else ""
             return (
                 f"No onset was found, and none is ruled out: {sure} of {len(self.values)} values {scanned} carry "
                 f"two counts that agree.{but}"
             )
-        state = "unstable" if self.leading["growth_rate"][0] > 0 else "stable"
+        state = "unstable" if outcomes[0] != STABLE or self.unstable_intervals else "stable"
         band = min(verdict.band for verdict in self.verdicts)
         scanned += f" for modes up to {digits(band, 4)} Hz" if np.isfinite(band) else ""
         which = f" in classes {', '.join([self._own, *(c['symmetry'] for c in self.classes)])}" if self.classes else ""

@@ -271,14 +271,15 @@ def parameters_of(model: ValveModel) -> tuple[str, ...]:
 
     Those of `dbvfiv.case.parameters` that the valve has, lengths of its shape, and the layers, which count from 1,
     inside to outside: "layer 3 angle", "layer 1 thickness" (its share of the wall), "layer 1 mu_0" (a constant of its
-    law).
+    law, except the series of moduli and exponents of an Ogden rubber).
     """
     names = [name for name in PARAMETERS if _has(model, name)]
     if model.case.valve.key_points is None:
         names += SHAPE
     for i, layer in enumerate(model.shell.section.layers, 1):
         names += [f"layer {i} thickness", f"layer {i} angle"]
-        names += [f"layer {i} {field.name}" for field in fields(layer.law)]
+        single = (field.name for field in fields(layer.law) if not isinstance(getattr(layer.law, field.name), tuple))
+        names += [f"layer {i} {name}" for name in single]
     return tuple(names)
 
 

@@ -280,7 +280,8 @@ class ParameterLine:
         return self.walk.cell(place, spectrum)
 
     def _is_certified(self, value: float) -> bool:
-        return self._cell(value).certificate.agrees
+        cell = self._cell(value)
+        return cell.certificate.agrees and not cell.open_above
 
     def spectrum(self, value: float) -> np.ndarray:
         """Leading eigenvalues of the full pencil.

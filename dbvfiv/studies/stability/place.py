@@ -291,5 +291,14 @@ def models_of(case: Case, own: ValveModel) -> Callable[[Mapping[str, float]], Va
 
 
 def rebuilder(case: Case) -> Callable[[Mapping[str, float]], ValveModel]:
-    """Models of a case for design parameters."""
-    return lambda design: ValveModel(redesigned(case, design))
+    """Models of a case for design parameters; what geometry, mesh and shell refuse is a `CaseError`."""
+
+    def build(design: Mapping[str, float]) -> ValveModel:
+        try:
+            return ValveModel(redesigned(case, design))
+        except CaseError:
+            raise
+        except ValueError as error:
+            raise CaseError(str(error)) from error
+
+    return build

@@ -20,7 +20,7 @@ from ...record.record import GrowingRecord, Record
 from ...record.table import Column, TableSpec
 from ...texts import shortly
 from .dimensions import CLASS_NAMES, VARIANT
-from .verdict import OUTCOMES, UNDECIDED, Verdict
+from .verdict import NEUTRAL, OUTCOMES, UNDECIDED, Verdict
 
 #: Modes whose order is watched.
 WATCHED = 4
@@ -101,10 +101,20 @@ class Sample:
         found[: len(kept)] = kept
         return found
 
+    @cached_property
+    def moving(self) -> np.ndarray:
+        """(WATCHED,) bool, whether these growth rates are more than rounding."""
+        return np.abs(self.growth) > NEUTRAL * np.pad(np.abs(self.eigenvalues[:WATCHED]), (0, WATCHED))[:WATCHED]
+
+    @property
+    def growing(self) -> np.ndarray:
+        """(k,) bool, modes whose growth is more than rounding."""
+        return self.eigenvalues.real > NEUTRAL * np.abs(self.eigenvalues)
+
     @property
     def pairs(self) -> int:
         """Unstable modes, a pair being one."""
-        return int(np.sum(self.eigenvalues.real > 0))
+        return int(np.sum(self.growing))
 
     @property
     def certified(self) -> bool | None:

@@ -125,11 +125,12 @@ class Scan:
             return []
         x = self._coordinate(values)
         growth = np.array([self.samples[v].growth for v in values])
+        moving = np.array([self.samples[v].moving for v in values])
         wanted = set()
         for k in range(WATCHED):
             for i in range(1, len(values) - 1):
                 g = growth[i - 1 : i + 2, k]
-                if g.min() < -1e8 or not (np.all(g > 0) or np.all(g < 0)):
+                if g.min() < -1e8 or not (np.all(g > 0) or np.all(g < 0)) or not moving[i - 1 : i + 2, k].any():
                     continue
                 # nearest to zero in the middle: a summit below the axis or a hollow above it
                 if not abs(g[1]) <= min(abs(g[0]), abs(g[2])):
@@ -178,7 +179,7 @@ def _exchanged(low: Sample, high: Sample) -> bool:
         return False
     here, there = low.eigenvalues[:WATCHED], high.eigenvalues[:WATCHED]
     pairs = linear_sum_assignment(np.abs(here[:, None] - there))
-    before, after = here[pairs[0]].real > 0, there[pairs[1]].real > 0
+    before, after = low.growing[:WATCHED][pairs[0]], high.growing[:WATCHED][pairs[1]]
     return bool((before & ~after).any() and (after & ~before).any())
 
 
@@ -194,6 +195,9 @@ def locate(scan: Scan, crossing: Crossing, tolerance: float) -> tuple[float, com
     """
     growth = {end.value: float(end.growth[crossing.index]) for end in (crossing.low, crossing.high)}
     low, high = crossing.low.value, crossing.high.value
+    if (growth[low] > 0) == (growth[high] > 0):  # one end is neutral itself, to rounding
+        neutral = min((crossing.low, crossing.high), key=lambda end: abs(growth[end.value]))
+        return neutral.value, complex(neutral.eigenvalues[crossing.index])
 
     def rate(value: float) -> float:
         found = scan.within(value)

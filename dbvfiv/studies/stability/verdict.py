@@ -106,6 +106,8 @@ class Verdict:
         'flutters'
         >>> Verdict.of([], 0, 0, True).outcome
         'undecided'
+        >>> Verdict.of([0.05 + 94j], 0, 0, True, line=0.1).outcome
+        'undecided'
         """
         values = np.asarray(eigenvalues, complex)
         values = values[np.isfinite(values.real)]
@@ -133,6 +135,10 @@ class Verdict:
             return cls(FLUTTERS, statement, **measures)
         if growing.any() or not agrees or counted:
             return cls(UNDECIDED, statement, **measures)
+        slow = values.real[values.real > NEUTRAL * np.abs(values)]
+        if slow.size:  # of a wall without damping, left of the line that was counted from
+            reason = f"{statement} A mode grows by {slow.max():.4g} 1/s, too slowly to be counted."
+            return cls(UNDECIDED, reason, **measures | {"certain": False})
         return cls(STABLE, statement, **measures)
 
     def open_above(self, said: str) -> Verdict:

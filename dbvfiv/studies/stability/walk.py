@@ -21,6 +21,7 @@ from eigen.spectrum import SearchOptions, Spectrum
 from ...case.parameters import Mu
 from ...case.quantity import GRAVITY
 from ...errors import CaseError, NotValidError, SolveError
+from ...materials.laws import MaterialError
 from ...model.classes import linearise_class
 from ...model.dynamics import LinearisedState
 from ...model.equilibria import LoadPath, SteadyOptions
@@ -428,7 +429,8 @@ class StabilityWalk:
         return self.family(place).leading(place)
 
     def refusal(self, place: Mu) -> str:
-        """Reason why the constants of a rubber with loss factors are unstable at a place; empty where they are not.
+        """Reason why the constants of a rubber with loss factors are unstable at a place, or its branches do not reach
+        such loss factors; empty where all holds.
 
         Raises
         ------
@@ -442,8 +444,13 @@ class StabilityWalk:
         if key not in self._validity:
             if len(self._validity) > 4000:
                 self._validity.clear()
-            found = material_stability(self.built(place).model, self.equilibrium(place), place.pressure, loss)
-            self._validity[key] = "" if found.holds else found.sentence
+            model, q = self.built(place).model, self.equilibrium(place)
+            try:
+                found = material_stability(model, q, place.pressure, loss)
+                model.relaxation.branches(loss)  # of plies too
+                self._validity[key] = "" if found.holds else found.sentence
+            except MaterialError as error:
+                self._validity[key] = str(error)
         return self._validity[key]
 
     def require_valid(self, place: Mu) -> None:

@@ -4,6 +4,7 @@ import json
 import os
 import signal
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -15,11 +16,14 @@ from dbvfiv.observer import Observer
 from dbvfiv.record.files import Header
 from dbvfiv.record.record import GrowingRecord
 from dbvfiv.studies.case import thesis_case
+from dbvfiv.studies.map.column import MapColumn, MapPlan
 from dbvfiv.studies.map.figures import stability_map
-from dbvfiv.studies.map.study import MapResult, keep_column, tables_of
+from dbvfiv.studies.map.study import MapResult, _doubts, check_cells, keep_column, tables_of
 from dbvfiv.studies.modes.search import run_modes
 from dbvfiv.studies.session import load_result
-from eigen import SingularShiftError, unstable_count
+from dbvfiv.studies.stability.samples import Sample
+from eigen import Certificate, SingularShiftError, unstable_count
+from eigen.columns import DIRECT, Cell
 from tests.small_valves import SMALL, settings
 
 from .axes import AXES, run_map
@@ -31,6 +35,37 @@ def test_every_cell_is_certified_and_checks_agree(whole):
     unstable = whole.grid("unstable")[0]
     assert set(np.unique(unstable)) == {0, 2} and (unstable == whole.grid("counted")[0]).all()
     assert ((whole.grid("growth_rate")[0] > 0) == (unstable > 0)).all()
+
+
+def test_a_check_whose_state_is_not_found_again_ends_no_map(case):
+    plan, said, found = MapPlan(case), [], Cell(np.array([-1.0 + 50j]), Certificate(0, 0, True), DIRECT)
+
+    def cell(place):
+        if place.pressure < 3000.0:
+            raise SolveError("No equilibrium was found.")
+        return found
+
+    cells = [Sample.of(value, found) for value in plan.along.values]
+    columns = tuple(MapColumn(value, 0, {0: cells}, np.zeros((0, 5))) for value in plan.across.values)
+    walk = SimpleNamespace(cell=cell, observer=SimpleNamespace(warn=said.append))
+    checks = check_cells(plan, columns, walk, 12)
+    assert len(checks) + len(said) == 12 and min(check["x"] for check in checks) > 3000.0
+    assert said and all(text.startswith("The cell at pressure = 1000, density = ") for text in said)
+
+
+def test_cells_whose_mode_grows_too_slowly_to_be_counted_are_uncertain(case):
+    plan = MapPlan(case.replace({"map.symmetry": "all"}))
+    slow, calm = (Cell(np.array([complex(rate, 94.0)]), Certificate(0, 0, True, 0.1), DIRECT) for rate in (0.05, -1.0))
+    cells = {part: [Sample.of(v, slow if part else calm) for v in plan.along.values] for part in range(4)}
+    columns = tuple(MapColumn(value, 0, cells, np.zeros((0, 5))) for value in plan.across.values)
+    number = len(plan.along.values) * len(columns)
+    said = _doubts(plan, columns, [])
+    assert [text.split(" cells are")[0] for text in said] == [
+        f"In class {name}: {number}" for name in ("SA", "AS", "AA")
+    ]
+    result = SimpleNamespace(plan=plan, columns=columns)
+    note = {"symmetry": "SA", "motion": "sway", "certified": np.ones((10, 6), bool)}
+    assert MapResult._class_line(result, 1, note) == "class SA (sway): 0 cells unstable, 0 stable, 60 of 60 certified."
 
 
 def test_onsets_of_columns_lie_between_cells_of_opposite_sign(whole):

@@ -9,6 +9,7 @@ from dbvfiv.case.parameters import Mu
 from dbvfiv.errors import CaseError, SolveError
 from dbvfiv.studies import session
 from dbvfiv.studies.case import Case, thesis_case
+from dbvfiv.studies.onset import search
 from dbvfiv.studies.onset.search import OnsetOptions, run_onset
 from dbvfiv.studies.session import Session
 from dbvfiv.studies.stability.walk import StabilityWalk
@@ -85,6 +86,14 @@ def test_criticality_and_uncertainty(coarse_case):
     speed = (point.above.eigenvalue.real - point.below.eigenvalue.real) / width
     assert point.crossing_speed == pytest.approx(speed, rel=1e-3)
     assert point.uncertainty == pytest.approx(abs(point.value - point.coarse_value) / 3, rel=0.05)
+
+
+@pytest.mark.parametrize(
+    "mesh, coarse, ratio", [((28, 48), (14, 24), 2.0), ((8, 16), (6, 8), (8 / 3) ** 0.5), ((4, 48), (4, 24), 1.0)]
+)
+def test_a_second_mesh_is_coarser_both_ways_or_says_nothing(mesh, coarse, ratio):
+    case, found = search.coarse_case(Case().replace({"mesh.around": mesh[0], "mesh.along": mesh[1]}), 0.5)
+    assert (case.mesh.around, case.mesh.along) == coarse and found == pytest.approx(ratio)
 
 
 def test_a_parameter_point_is_changed(coarse_case):

@@ -9,8 +9,9 @@ from dbvfiv.model import ValveModel, linearise
 from dbvfiv.model.equilibria import find_equilibrium
 from dbvfiv.model.newton import EquilibriumSolver, NewtonOptions
 from dbvfiv.studies.case import thesis_case
-from dbvfiv.studies.stability.derivatives import Neighbourhood, changed, parameters_of
+from dbvfiv.studies.stability.derivatives import Neighbourhood, changed, parameters_of, require_number
 from eigen import SearchOptions, leading_modes
+from tests.small_valves import SMALL
 
 RAYLEIGH = Mu(density=10.0, alpha=1.0, beta=0.003)
 NEAR_RAYLEIGH = {"limit_point": -1 / 0.003}
@@ -143,3 +144,13 @@ def test_only_what_a_valve_has_is_a_parameter(valve):
 def test_an_unknown_parameter_is_named(valve):
     with pytest.raises(CaseError, match="'colour'.*layer 1 thickness"):
         valve.slope("colour")
+
+
+def test_an_ogden_rubber_is_differentiated_by_what_it_has_one_of(refused):
+    own = {"kind": "ogden", "mu": [0.6e6, -0.01e6], "alpha": [1.3, -2.0], "density": 1300.0}
+    changes = {"materials.own": own, "layers": [{"material": "own", "thickness": 0.01}]}
+    model = ValveModel(thesis_case(SMALL | changes))
+    known = [name for name in parameters_of(model) if name.startswith("layer")]
+    assert known == ["layer 1 thickness", "layer 1 angle", "layer 1 density"]
+    with refused(CaseError, match="'layer 1 mu', by which nothing of this valve can be differentiated"):
+        require_number(model, "layer 1 mu")

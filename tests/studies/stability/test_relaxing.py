@@ -6,13 +6,14 @@ import pytest
 from dbvfiv import resume
 from dbvfiv.api import Valve
 from dbvfiv.case.parameters import Mu
-from dbvfiv.studies.case import thesis_case
+from dbvfiv.studies.case import Case, thesis_case
 from dbvfiv.studies.onset.search import run_onset
 from dbvfiv.studies.session import load_result
+from dbvfiv.studies.stability.line import ParameterLine
 from dbvfiv.studies.stability.walk import StabilityWalk
 from eigen import certified_spectrum
 from tests.observers import Stop
-from tests.small_valves import FORMER
+from tests.small_valves import FORMER, SMALL
 from tests.studies.map.axes import run_map
 
 LAWS = pytest.mark.parametrize("continuity", [pytest.param("quasi-steady", marks=pytest.mark.slow), "storage"])
@@ -106,6 +107,18 @@ def test_a_map_over_loss_factors_resumes_to_the_same_numbers(lossy_case, tmp_pat
     for name in ("growth_rate", "frequency", "unstable", "counted"):
         for other in (result, again):
             assert np.array_equal(other.grid(name), whole.grid(name))
+
+
+def test_loss_factors_beyond_the_branches_of_a_rubber_cost_their_own_cells_alone():
+    """Rubbers of tan delta 1, 4 branches of which reach up to 2.1 or so."""
+    keys = {f"materials.{name}.loss_factor": 1.0 for name in ("CR", "SBR", "EPDM")}
+    keys |= {"materials.strain_level": 0.1, "fluid.density": 10.0, "drive.pressure": 2e3}
+    case = Case().replace(SMALL | keys)
+    line = ParameterLine(StabilityWalk(case), Mu.of(case), "loss_factor", (0.5, 1.0, 3.0))
+    sound, own, beyond = line.cells()
+    assert sound.certified and own.certified and not (sound.is_missing or own.is_missing)
+    assert beyond.verdict.outcome == "not valid" and "damping.loss_factor must be lower" in beyond.verdict.reason
+    assert len(line.scan.run(line.values)) == 0 and list(line.scan.failures) == [3.0]
 
 
 @LAWS
