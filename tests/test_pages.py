@@ -46,6 +46,8 @@ def only_parsed(monkeypatch, capsys):
     def parse(line: str) -> str:
         """Nothing, or what is wrong with the line."""
         words = shlex.split(line)
+        if lost := [word for word in words if word.startswith("cases/") and not list(ROOT.glob(word))]:
+            return f"no {', '.join(lost)}"
         status = cli.run(words[1:])
         said = capsys.readouterr().err.strip()
         of_the_reader = (

@@ -5,21 +5,24 @@ import os
 import re
 import subprocess
 import sys
+import tomllib
 import types
 
 import pytest
 import typer
 
 from dbvfiv.cli import main, run
+from dbvfiv.cli.main import build
 from dbvfiv.cli.terminal import print_json
 from dbvfiv.errors import CaseError, SolveError
 from dbvfiv.studies.case import Case, load_case
+from tests.pages import ROOT
 
 
 def test_help_lists_every_command(command_line):
     outcome = command_line("--help")
     assert outcome.status == 0
-    for name in ("case", "doctor"):
+    for name in build().commands:
         assert f"\n  {name} " in outcome.out
 
 
@@ -36,7 +39,9 @@ def test_every_command_has_help_and_loads_nothing_heavy():
 
 def test_version(command_line):
     outcome = command_line("--version")
-    assert (outcome.status, outcome.out.split()[0]) == (0, "dbvfiv")
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
+    assert outcome.status == 0 and outcome.out.split()[:2] == ["dbvfiv", project["version"]]
+    assert f"version: {project['version']}" in (ROOT / "CITATION.cff").read_text().splitlines()
 
 
 @pytest.mark.parametrize(
@@ -188,7 +193,7 @@ def test_doctor_names_the_remedy(monkeypatch, command_line):
     monkeypatch.setattr(doctor.importlib, "util", hidden)
     outcome = command_line("doctor")
     assert outcome.status == 1
-    assert "petsc4py" in outcome.out and "make setup" in outcome.out or "conda" in outcome.out
+    assert "petsc4py" in outcome.out and ("make setup" in outcome.out or "conda" in outcome.out)
 
 
 def test_json_of_arrays_and_of_what_is_not_finite(capsys):

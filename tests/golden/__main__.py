@@ -13,11 +13,11 @@ from .runs import RUNS
 def main(words: list[str]) -> int:
     """Compare or write the runs whose names hold one of the words; return the number of those that differ."""
     write, words = "--write" in words, [word for word in words if word != "--write"]
-    wrong = 0
+    wrong, runs = 0, {name: run for name, run in RUNS.items() if not words or any(word in name for word in words)}
+    if not runs:
+        sys.exit(f"No run has {' or '.join(words)} in its name.")
     DOCUMENTS.mkdir(exist_ok=True)
-    for name, arguments in RUNS.items():
-        if words and not any(word in name for word in words):
-            continue
+    for name, arguments in runs.items():
         start = time.time()
         found = document(arguments)
         if write:

@@ -18,6 +18,8 @@ RTOL, SCALE = 1e-6, 1e-8
 OF_CYCLES = 1e-4
 #: Growth rate, 1/s, below which a state is neutral: a search for an onset ends there by rounding.
 NEUTRAL = 1e-2
+#: Keys that hold a growth rate, or its derivative where the dictionary has that per per cent too.
+RATES = {"growth_rate", "leading_growth_rate"}
 #: Keys whose values are times, counts of work or rounding, or name a file; a verdict says what ``certified`` does.
 VOLATILE = {"seconds", "time", "version", "case", "file", "residual", "residuals", "response_error", "work", "progress"}
 VOLATILE |= {"error", "correction", "trivial", "certified"}
@@ -36,11 +38,21 @@ def document(arguments: list[str]) -> dict:
 def steady(value):
     """Document without the values that change from run to run."""
     if isinstance(value, dict):
-        rate = value.get("growth_rate")
-        if _is_number(rate) and abs(rate) < NEUTRAL:
+        neutral = set() if "growth_rate_per_percent" in value else {key for key in RATES if _is_neutral(value.get(key))}
+        if "growth_rate" in neutral and "outcome" in value:  # verdict on a state of a scan
             return "neutral"
-        return {key: steady(own) for key, own in value.items() if key not in VOLATILE}
+        return {k: "neutral" if k in neutral else steady(own) for k, own in value.items() if k not in VOLATILE}
     return [steady(own) for own in value if not _is_of_scan(own)] if isinstance(value, list) else value
+
+
+def _size(value: dict) -> float:
+    """Size of the eigenvalue, 1/s, of which a growth rate is the smaller part; rounding goes with it."""
+    frequency = value.get("frequency")
+    return 2 * math.pi * abs(frequency) if _is_number(frequency) else 0.0
+
+
+def _is_neutral(value) -> bool:
+    return _is_number(value) and abs(value) < NEUTRAL
 
 
 def _is_of_scan(value) -> bool:
@@ -55,7 +67,7 @@ def differences(now, then, where: str = "", scale: float = 0.0) -> Iterator[str]
             if key not in now or key not in then:
                 yield f"{where}.{key} is {'missing' if key not in now else 'new'}"
             else:
-                yield from differences(now[key], then[key], f"{where}.{key}")
+                yield from differences(now[key], then[key], f"{where}.{key}", _size(then) if key in RATES else 0.0)
     elif isinstance(now, list) and isinstance(then, list):
         if len(now) != len(then):
             yield f"{where} has {len(now)} entries for {len(then)}"

@@ -95,6 +95,15 @@ def same(result, whole):
     assert not [*differences(steady(found), steady(expected))]
 
 
+@pytest.mark.parametrize("key, value", [("value", 2.0), ("criticality", "sub"), ("uncertainty", 1e-3)])
+def test_points_next_to_neutral_are_compared(key, value):
+    """A growth rate that is left at an onset is not; all else of it is."""
+    point = {"growth_rate": 1e-11, "frequency": 50.0, "value": 1.0, "criticality": "super", "uncertainty": 2e-3}
+    same, other = point | {"growth_rate": -2e-11}, point | {key: value}
+    assert not [*differences(steady([same]), steady([point]))]
+    assert [*differences(steady([other]), steady([point]))]
+
+
 def slow(*where):
     return pytest.param(*where, marks=pytest.mark.slow)
 

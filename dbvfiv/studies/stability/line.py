@@ -52,12 +52,15 @@ class OnsetCorrection:
         From a value to leading eigenvalues of the full pencil, where corrections on the small model do not settle.
     level : Level, optional
         Of the crossing; neutral by default.
+    single : float, optional
+        Largest relative change of an eigenvalue by one correction that stands for that of the full matrices.
     """
 
     model: ReducedColumn
     place: Callable[[float], Mu]
     direct: Callable[[float], np.ndarray]
     level: Level = Level()
+    single: float = ACCURATE
 
     def __call__(self, value: float, frequency: float) -> tuple[float, float, float]:
         """Value, frequency (Hz) and excess over the size of the eigenvalue, NaN where no mode was followed."""
@@ -104,7 +107,7 @@ class OnsetCorrection:
         if found is None:
             return None
         size, change = max(abs(found), 1.0), complex(self.model.corrected(self.place(value), [found])[0])
-        if abs(change) > ACCURATE * size:  # one correction leaves up to a fifth of what it changes
+        if abs(change) > self.single * size:  # one correction leaves as much as it changes, or several times that
             change = self.model.exact(self.place(value), found) - found
         return found + change if abs(change) < SAME * size else None
 
@@ -344,7 +347,9 @@ class ParameterLine:
         value, eigenvalue = locate(scan or self.scan, crossing, tolerance)
         if not self.is_reduced:
             return LineOnset(value, eigenvalue, abs(eigenvalue.real) / max(abs(eigenvalue), 1.0))
-        correct = OnsetCorrection(self.column.model, self.place, self.spectrum, level)
+        correct = OnsetCorrection(
+            self.column.model, self.place, self.spectrum, level, min(ACCURATE, max(tolerance, NEUTRAL))
+        )
         found, frequency, residual = correct(value, abs(eigenvalue.imag) / (2 * np.pi))
         if np.isfinite(residual):
             return LineOnset(found, level.eigenvalue(2 * np.pi * frequency), residual)

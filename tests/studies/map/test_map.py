@@ -125,7 +125,8 @@ def test_both_laws_and_pairs_without_the_load(coarse_case):
     assert both.grid("growth_rate").shape == (2, 10, 2) and both.grid("certified").all()
     pair = coarse_case.replace(AXES | {"map.x": "beta=0.001:0.004:3", "map.y": "storage=0:1:5", "map.refine": 0})
     result = run_map(pair)
-    assert result.grid("certified").all() and all(check["agrees"] for check in result.checks)
+    assert result.grid("certified").all()
+    assert len(result.checks) == 3 and all(check["agrees"] for check in result.checks)
 
 
 def test_two_structural_axes(coarse_case):
@@ -135,6 +136,7 @@ def test_two_structural_axes(coarse_case):
         )
     )
     assert result.grid("certified").all() and (result.grid("how") == 1).all()
+    assert len(result.checks) == 1 and result.checks[0]["agrees"]
 
 
 def test_a_missing_state_is_a_marked_gap(case, monkeypatch):
@@ -229,7 +231,8 @@ def test_cells_of_light_damping_are_those_of_the_full_matrices():
     """At beta = 1e-4 s quick modes lead, to 500 Hz, which a space made for slow ones knows to 10 % alone."""
     keys = SMALL | {"map.x": "pressure=450:1820:2", "map.y": "beta=1e-4:1e-2:4:log", "map.curve": False}
     result = run_map(thesis_case(keys | {"map.refine": 0, "map.checks": 8}))
-    assert result.grid("certified").all() and all(check["agrees"] for check in result.checks)
+    assert result.grid("certified").all()
+    assert len(result.checks) == 8 and all(check["agrees"] for check in result.checks)
     assert result.grid("frequency").max() > 150
 
 

@@ -37,6 +37,15 @@ def test_small_models_with_corrections():
     assert value == pytest.approx(EXACT, abs=1e-9) and frequency == pytest.approx(10.0 / (2 * np.pi)) and left < 1e-8
 
 
+def test_a_correction_that_errs_by_more_than_it_changes_gives_way_to_the_full_matrices():
+    """At growth rates that hardly change along the line 1e-6 of an eigenvalue is 1e-4 of the onset."""
+    small = EXACT + 1e-6
+    right = corrected_by(lambda value: pair(value, small), small - EXACT)
+    wrong = SimpleNamespace(**vars(right.model) | {"corrected": lambda condition, values: np.full(len(values), -1e-6)})
+    value, _, left = OnsetCorrection(wrong, right.place, right.direct, single=1e-9)(small, 10.0 / (2 * np.pi))
+    assert value == pytest.approx(EXACT, abs=1e-9) and left < 1e-8
+
+
 def test_small_models_without_any_mode_leave_it_to_the_full_matrices():
     value, frequency, left = corrected_by(lambda value: np.zeros(0, complex))(SMALL, 10.0 / (2 * np.pi))
     assert value == pytest.approx(EXACT, abs=1e-9) and frequency == pytest.approx(10.0 / (2 * np.pi)) and left < 1e-8
