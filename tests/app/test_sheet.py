@@ -36,6 +36,16 @@ def test_keys_are_set_and_taken_away(tmp_path):
     assert "pressure" not in data["drive"]
 
 
+def test_an_element_of_a_list_that_was_not_given_is_set_in_its_default(tmp_path):
+    """Keys of a layer without a value are left out of the text that drawing, questions and runs read."""
+    data = {}
+    change(data, "layers.0.thickness", "3 mm")
+    text = write_sheet(data)
+    assert "None" not in text and "None" not in write_sheet({"layers": [{"material": "CR", "begin": None}]})
+    assert read_sheet(text) == data
+    assert check(read_sheet(text), tmp_path).case == Case().replace({"layers.0.thickness": 0.003})
+
+
 def test_a_sheet_is_the_case_of_its_file(tmp_path):
     (tmp_path / "dbv6.toml").write_text(COARSE)
     assert check(read_sheet(COARSE), tmp_path).case == load_case(tmp_path / "dbv6.toml")
