@@ -338,14 +338,29 @@ class Case(Section):
         """Return plain SI data (numbers, strings, lists, dicts) that JSON and HDF5 can hold."""
         return self.model_dump(mode="json")
 
+    @property
+    def given(self) -> dict[str, list[str]]:
+        """Keys that were given, by section, as plain data; ``to_dict`` holds every key."""
+        return {name: sorted(part.model_fields_set) for name, part in self if isinstance(part, Section)}
+
     @classmethod
-    def from_dict(cls, data: Mapping[str, Any]) -> Self:
+    def from_dict(cls, data: Mapping[str, Any], given: Mapping[str, Collection[str]] | None = None) -> Self:
         """Rebuild a case from ``to_dict`` without looking for the files it was made from; one of a version that had no
-        damping.model damps by Rayleigh's constants.
+        damping.model damps by Rayleigh's constants. All keys of the data count as given, or those alone that `given`
+        has of a section.
         """
         if isinstance(data.get("damping"), Mapping):
             data = {**data, "damping": {"model": "rayleigh", **data["damping"]}}
-        return make_case(cls, data, check_files=False)
+        return cls._with_given(data, given or {})
+
+    @classmethod
+    def _with_given(cls, data: Mapping[str, Any], given: Mapping[str, Collection[str]]) -> Self:
+        """A case of which those keys alone count as given that stand there, in the sections that stand there."""
+        made = make_case(cls, data, check_files=False)
+        for name, part in made:
+            if isinstance(part, Section) and name in given:
+                part.model_fields_set.intersection_update(given[name])
+        return made
 
     def replace(self, changes: Mapping[str, Any]) -> Self:
         """Return a validated copy with some keys changed, ``{"drive.pressure": 36e3, ...}``.
@@ -360,12 +375,12 @@ class Case(Section):
         self.make_way(data, changed)
         if ("drive", "head") in changed:
             changed.add(("drive", "pressure"))
-        made = make_case(type(self), data, check_files=False)
-        for name, before in self:  # a dictionary holds every key, but not all were given
-            if isinstance(before, Section) and (name,) not in changed:
-                given = before.model_fields_set | {path[1] for path in changed if path[0] == name}
-                getattr(made, name).model_fields_set.intersection_update(given)
-        return made
+        given = {  # a dictionary holds every key, but not all were given
+            name: {*keys, *(path[1] for path in changed if path[0] == name)}
+            for name, keys in self.given.items()
+            if (name,) not in changed
+        }
+        return self._with_given(data, given)
 
 
 #: What `dbvfiv.load` and `Valve.replace` take.

@@ -118,6 +118,8 @@ class Fluid(Section):
 class Drive(Section):
     """The load."""
 
+    told_by_giving = ("pressure",)
+
     kind: Literal["flow", "uniform"] = key(
         "flow", "Pressure from the flow through the valve, or one uniform pressure without flow."
     )

@@ -478,9 +478,8 @@ class Header:
         """The case, with files that have gone or changed since put back from the attachments."""
         if not self.attachments:
             return self.case
-        return type(self.case).from_dict(
-            renamed(self.case.to_dict(), {one.path: one.place() for one in self.attachments})
-        )
+        data = renamed(self.case.to_dict(), {one.path: one.place() for one in self.attachments})
+        return type(self.case).from_dict(data, self.case.given)
 
 
 def versions() -> dict[str, str]:
@@ -511,6 +510,7 @@ def write_header(file: h5py.File, header: Header) -> None:
     case = file.create_group("case")
     case["toml"] = case_toml(header.case, comments=False)
     case["json"] = json.dumps(header.case.to_dict())
+    case["given"] = json.dumps(header.case.given)
     files = case.create_group("files")
     for number, attachment in enumerate(header.attachments):
         dataset = files.create_dataset(str(number), data=np.frombuffer(attachment.data, "u1"))
@@ -528,9 +528,10 @@ def read_header(file: h5py.File, case_model: type[Case]) -> Header:
     files = file["case/files"]
     attached = [Attachment(str(files[name].attrs["path"]), _bytes_of(files[name])) for name in sorted(files, key=int)]
     places = {one.path: one.place() for one in attached}
+    given = json.loads(file["case/given"].asstr()[()]) if "given" in file["case"] else None  # of an earlier version
     return Header(
         kind=str(attributes["dbvfiv_kind"]),
-        case=_case(renamed(json.loads(file["case/json"].asstr()[()]), places), case_model),
+        case=_case(renamed(json.loads(file["case/json"].asstr()[()]), places), case_model, given),
         versions={name: str(version) for name, version in file["versions"].attrs.items()},
         attachments=tuple(replace(one, path=places[one.path]) for one in attached),
         complete=bool(attributes["complete"]),
@@ -553,11 +554,11 @@ GONE = {
 }
 
 
-def _case(data: dict[str, Any], model: type[Case]) -> Case:
+def _case(data: dict[str, Any], model: type[Case], given: dict[str, list[str]] | None) -> Case:
     for section, names in GONE.items():
         for name in names:
             data.get(section, {}).pop(name, None)
     try:
-        return model.from_dict(data)
+        return model.from_dict(data, given)
     except CaseError as error:  # not the user's slip but the file's
         raise ValueError(f"its case cannot be used, {error}") from error

@@ -243,6 +243,20 @@ def test_written_text_reads_back_as_the_same_case(tmp_path, changes, comments):
     assert Case.from_dict(case.to_dict()) == case
 
 
+@pytest.mark.parametrize("comments", [True, False])
+@pytest.mark.parametrize(
+    "override", ["drive.pressure=2 kPa", "steady.pressures=[2e3, 6e3]", "closure.rated_pressure=8e3"]
+)
+def test_written_text_asks_for_the_same_pressures(tmp_path, override, comments):
+    """Lists of pressures that were not given are not given in the text either."""
+    case = load_case(None, [override])
+    (tmp_path / "b.toml").write_text(case_toml(case, comments=comments))
+    again = load_case(tmp_path / "b.toml")
+    assert again == case and again.replace({"closure.rated_pressure": 2e3}).closure.pressures == (2e3, 3e3)
+    assert again.steady_pressures() == case.steady_pressures()
+    assert again.straining_pressures() == case.straining_pressures()
+
+
 def test_the_reference_page_is_up_to_date():
     assert (ROOT / "docs/case-reference.md").read_text() == page(Case), "run `make docs`"
 

@@ -4,6 +4,7 @@ import json
 import shutil
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import h5py
@@ -17,7 +18,7 @@ from dbvfiv.geometry import key_point_table
 from dbvfiv.materials.shipped import published_rubber
 from dbvfiv.model.equilibria import LoadPath
 from dbvfiv.observer import Observer
-from dbvfiv.record.files import Header, read_header, write_header
+from dbvfiv.record.files import Attachment, Header, read_header, write_header
 from dbvfiv.shell.recovery import layer_fields
 from dbvfiv.studies.case import Case
 
@@ -107,6 +108,19 @@ def _kept(tmp_path, case: Case, name="h.h5") -> Header:
 def _read(tmp_path, name="h.h5") -> Header:
     with h5py.File(tmp_path / name) as file:
         return read_header(file, Case)
+
+
+def test_a_kept_case_knows_which_keys_were_given(tmp_path, monkeypatch):
+    """What was not given is asked of no valve: a soft one bears the pressure of its case, and not the usual ones."""
+    monkeypatch.setenv("DBVFIV_CACHE", str(tmp_path / "cache"))
+    case = Case().replace({"drive.pressure": 1e3, "valve.wall_thickness": 0.01})
+    kept = _kept(tmp_path, case)
+    for again in (kept.case, replace(kept, attachments=(Attachment("none.csv", b""),)).rebuildable_case()):
+        assert again == case and again.given == case.given
+        assert again.steady_pressures() == (1e3,) and again.straining_pressures() == (1e3, None)
+    with h5py.File(tmp_path / "h.h5", "a") as file:
+        del file["case/given"]
+    assert _read(tmp_path).case.straining_pressures() == (50e3, 28e3)  # of an earlier version: every key
 
 
 LATIN = "# \u00b5\nfrequency,tan delta\n1,0.1\n200,0.2\n".encode("latin-1")
