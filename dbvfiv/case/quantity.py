@@ -69,6 +69,8 @@ def _factor(unit_text: str, si: str) -> float | None:
         text = re.sub(r"\b([cdm]?m|ft|in)([23])\b", r"\1^\2", text)
         source = registry.Quantity(1.0, registry.parse_units(text))
         target = "degree" if si == "deg" else (si or "dimensionless")
+        if si == "Hz" and "radian" in str(source.to_root_units().units):
+            target = "turn/s"  # of an angular velocity, which pint counts in radians
         return float(source.to(target).magnitude)
     except Exception:  # pint raises a wide family, tokeniser errors included
         return None

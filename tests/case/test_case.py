@@ -19,6 +19,7 @@ from dbvfiv.case.key_points import read_key_points
 from dbvfiv.case.materials import shear_modulus_of
 from dbvfiv.case.measured import read_measured
 from dbvfiv.case.model import change_case
+from dbvfiv.case.quantity import Quantity
 from dbvfiv.case.tables import read_drive_table, read_pump_table
 from dbvfiv.case.write import case_toml
 from dbvfiv.fit.curves import read_curves
@@ -93,6 +94,21 @@ def test_a_quantity_in_its_usual_unit_is_the_same_float():
     for number in range(1, 2000):
         case = load_case(None, [f"drive.pressure={number / 100} kPa"])
         assert case.drive.pressure == number * 10.0
+
+
+@pytest.mark.parametrize(
+    ("given", "si", "value"),
+    [
+        ("3000 rpm", "Hz", 50.0),
+        ("200 rad/s", "Hz", 100 / math.pi),
+        ("360 deg/s", "Hz", 1.0),
+        ("2 kHz", "Hz", 2000.0),
+        ("60 1/min", "Hz", 1.0),
+        ("200 rad/s", "1/s", 200.0),
+    ],
+)
+def test_frequencies_of_angular_velocities_are_turns_per_second(given, si, value):
+    assert Quantity(si).parse(given) == pytest.approx(value, rel=1e-12)
 
 
 def test_overrides_win_over_the_file_and_each_other(tmp_path):
