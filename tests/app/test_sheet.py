@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given as drawn
 from hypothesis import strategies as st
 
-from dbvfiv.app.see import arguments_of
+from dbvfiv.app.see import arguments_of, map_figure
 from dbvfiv.app.sheet import change, check, given, read_sheet, usual_value, write_sheet
 from dbvfiv.errors import CaseError
 from dbvfiv.studies.case import Case, load_case
@@ -98,3 +98,40 @@ def test_pictures_begin_above_the_pressure_downstream():
     assert arguments_of(case, "Root locus over head") == ["--over", "pressure=5750:12500:10"]
     case = load_case(None, ["drive.pressure=10 kPa"])
     assert arguments_of(case, "Root locus over head") == ["--over", "pressure=1500:15000:10"]
+
+
+PICTURE = {"growth_rate": [[-2.0, 1.0]], "certified": [[True, False]], "onset_curves": []}
+
+
+def found_map(name: str, **more) -> dict:
+    axes = {"x": {"parameter": "pressure", "values": [1e3, 2e3]}, "y": {"parameter": name, "values": [1.0]}}
+    return {axis: row | {"log": False} for axis, row in axes.items()} | PICTURE | {"continuity": "storage"} | more
+
+
+@pytest.mark.parametrize(
+    ("name", "changes", "own"),
+    [
+        ("density", {}, 1000.0),
+        ("sealing", {"valve.sealing_pressure": 1.5e3}, 1.5),
+        ("thickness", {"valve.thickness_factor": 0.8}, 1.0),
+        ("angle", {"layers.2.angle": 40}, None),
+        ("sealing", {}, None),
+        ("pipe_length", {}, None),
+    ],
+)
+def test_the_star_of_a_map_stands_where_the_case_has_both_values(name, changes, own):
+    figure, _ = map_figure(Case().replace({"drive.pressure": 9806.65, **changes}), found_map(name))
+    stars = [(line["x"], line["y"]) for line in figure["data"] if line.get("name") == "this installation"]
+    assert stars == ([] if own is None else [([pytest.approx(1.0)], [pytest.approx(own)])])
+
+
+def test_a_map_of_both_flow_models_is_drawn_for_that_of_the_case():
+    """With its name; cells without a certificate are blank, and words below name the margins that are drawn."""
+    contours = [{"level": "4 %", "points": [[1e3, 1.0]]}]
+    laws = [PICTURE | {"continuity": "quasi-steady"}, PICTURE | {"continuity": "storage", "contours": contours}]
+    laws[1]["growth_rate"] = [[-3.0, 1.0]]
+    figure, said = map_figure(Case(), found_map("density", laws=laws))
+    assert figure["data"][0]["z"] == [[-3.0, None]] and figure["layout"]["title"]["text"] == "Flow model: storage"
+    assert "margin 4 %" in said and "margin 4 %" in [line.get("name") for line in figure["data"]]
+    figure, said = map_figure(Case(), found_map("density"))
+    assert figure["data"][0]["z"] == [[-2.0, None]] and "title" not in figure["layout"] and "margin" not in said
