@@ -20,8 +20,6 @@ FORM = 'PARAMETER=START:STOP:COUNT, with ":log" behind it for logarithmic steps,
 _LARGEST = 100_000
 #: Parameters that say where something was measured.
 PLACES = tuple(name for name in PARAMETERS if name not in DESIGN)
-#: A head of the fluid in the text of a range.
-_HEAD = re.compile(r"\d\s*(m|ft)\s*([:,]|$)")
 
 
 @dataclass(frozen=True)
@@ -162,18 +160,26 @@ class RangeSection(Section):
         return "pressure" if self.axis is None else self.axis.parameter
 
 
+def _needs_density(parse: Callable[..., Any], text: str) -> bool:
+    """True for the text of a range in heads of the fluid."""
+    try:
+        parse(text)
+    except ValueError:
+        return True
+    return False
+
+
 def _readable(parse: Callable[..., Any]) -> AfterValidator:
     """Validator of a text that a function can read, heads of the fluid in a range as pressures."""
 
     def check(text: str, info: ValidationInfo) -> str:
         axis = parse(text, density=(info.context or {}).get("density"))
-        span = text.partition("=")[2]
-        if not isinstance(axis, Axis) or axis.parameter != "pressure" or not _HEAD.search(span):
+        if not isinstance(axis, Axis) or not _needs_density(parse, text):
             return text
         log = ":log" if axis.log else ""
-        if "," in span:
-            return f"pressure={','.join(f'{value!r} Pa' for value in axis.values)}{log}"
-        return f"pressure={axis.values[0]!r} Pa:{axis.values[-1]!r} Pa:{len(axis.values)}{log}"
+        if "," in text:
+            return f"{axis.parameter}={','.join(f'{value!r} Pa' for value in axis.values)}{log}"
+        return f"{axis.parameter}={axis.values[0]!r} Pa:{axis.values[-1]!r} Pa:{len(axis.values)}{log}"
 
     return AfterValidator(check)
 

@@ -354,6 +354,12 @@ def test_heads_in_ranges_are_those_of_the_fluid_of_the_case():
     weight = 1025 * 9.80665
     assert case.onset.axis.log and case.onset.axis.values[::7] == pytest.approx([0.1 * weight, 4 * 0.3048 * weight])
     assert case.sweep.axis.values == pytest.approx([weight, 1.5 * weight, 2 * weight])
+    case = case.replace(
+        {"onset.over": "sealing=0.1 m:.3 m:5", "map.y": "sealing=0.1 m,1. m", "sweep.over": "pressure=1. m:2 m:3"}
+    )
+    assert case.onset.axis.values[::4] == pytest.approx([0.1 * weight, 0.3 * weight])
+    assert case.map.axes[1].values == pytest.approx([0.1 * weight, weight]) and case.map.axes[1].parameter == "sealing"
+    assert case.sweep.axis.values[0] == pytest.approx(weight)
 
 
 def test_numbers_that_are_not_given_follow_from_the_model():
