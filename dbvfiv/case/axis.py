@@ -13,7 +13,7 @@ from pydantic import AfterValidator, StrictStr, ValidationInfo
 
 from ..errors import CaseError
 from .parameters import DESIGN, PARAMETERS, SWEPT, Parameter
-from .quantity import number_or_text
+from .quantity import number_or_text, unit_behind
 from .section import Described, Section
 
 FORM = 'PARAMETER=START:STOP:COUNT, with ":log" behind it for logarithmic steps, or PARAMETER=VALUE,VALUE,...'
@@ -66,7 +66,11 @@ def parse_axis(text: str, names: Iterable[str] = SWEPT, density: float | None = 
     listed = len(parts) == 1 and "," in parts[0]
     if not equals or (len(parts) != 3 and not listed):
         raise ValueError("which is not of that form")
-    values = [_value(row, part, density) for part in (parts[0].split(",") if listed else parts[:2])]
+    spans = parts[0].split(",") if listed else parts[:2]
+    values = [_value(row, part, density) for part in spans]
+    units = [unit_behind(part) for part, value in zip(spans, values) if value]
+    if "" in units and any(unit and _value(row, f"1 {unit}", density) != 1.0 for unit in units):
+        raise ValueError("which has a unit at some of its values alone")
     if not listed and (not re.fullmatch("[0-9]{1,6}", parts[2]) or not 2 <= int(parts[2]) <= _LARGEST):
         raise ValueError(f"whose count is not between 2 and {_LARGEST}")
     if any(first >= second for first, second in pairwise(values)):

@@ -90,6 +90,12 @@ def number_or_text(value: Any) -> Any:
         return value
 
 
+def unit_behind(text: str) -> str:
+    """Unit of a number with a unit; empty for any other text."""
+    match = _QUANTITY.fullmatch(text)
+    return (match[2] or "").strip() if match else ""
+
+
 def head_of(pressure: float, density: float) -> float:
     """Head, m, of a fluid, kg/m3, that a pressure, Pa, carries."""
     return pressure / (density * GRAVITY)
@@ -103,15 +109,15 @@ def _head(text: str, density: float | None) -> float | None:
     ValueError
         For a head of a fluid whose density is not known.
     """
-    match = _QUANTITY.fullmatch(text)
-    unit = (match[2] or "").strip() if match else ""
+    unit = unit_behind(text)
     water = _HEAD_OF_WATER.fullmatch(unit)
     if unit not in _HEADS and water is None:
         return None
     if water is None and density is None:
         raise ValueError("which is a head, and the density of the fluid is not known here; mH2O or a pressure is")
     weight = GRAVITY * (WATER if water else density)
-    return float(f"{float(match[1]) * _factor(water[1] if water else unit, 'm') * weight:.15g}")
+    number = float(_QUANTITY.fullmatch(text)[1])
+    return float(f"{number * _factor(water[1] if water else unit, 'm') * weight:.15g}")
 
 
 def _to_si(text: str, si: str) -> float:

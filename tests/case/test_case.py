@@ -19,6 +19,7 @@ from dbvfiv.case.key_points import read_key_points
 from dbvfiv.case.materials import shear_modulus_of
 from dbvfiv.case.measured import read_measured
 from dbvfiv.case.model import change_case
+from dbvfiv.case.parameters import PARAMETERS
 from dbvfiv.case.quantity import Quantity
 from dbvfiv.case.tables import read_drive_table, read_pump_table
 from dbvfiv.case.write import case_toml
@@ -360,6 +361,20 @@ def test_heads_in_ranges_are_those_of_the_fluid_of_the_case():
     assert case.onset.axis.values[::4] == pytest.approx([0.1 * weight, 0.3 * weight])
     assert case.map.axes[1].values == pytest.approx([0.1 * weight, weight]) and case.map.axes[1].parameter == "sealing"
     assert case.sweep.axis.values[0] == pytest.approx(weight)
+
+
+@pytest.mark.parametrize("text", ["pressure=5,10,20 kPa", "pressure=0.5:50 kPa:64", "thickness=0.5:120 %:3"])
+def test_a_range_has_units_at_all_of_its_values_or_at_none(text):
+    """A bare number is SI, and seldom meant so beside one with another unit."""
+    with pytest.raises(ValueError, match="which has a unit at some of its values alone"):
+        parse_axis(text, tuple(PARAMETERS))
+
+
+@pytest.mark.parametrize(
+    "text", ["pipe_length=1,1e1,3e1 m", "pressure=5 Pa:1e-1 kPa:3", "alpha=5:20 1/s:3", "beta=0:20 s:3"]
+)
+def test_ranges_in_si_units_and_from_0_may_be_short(text):
+    assert parse_axis(text, tuple(PARAMETERS)).values[-1] in (30.0, 100.0, 20.0)
 
 
 def test_numbers_that_are_not_given_follow_from_the_model():
