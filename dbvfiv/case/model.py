@@ -371,7 +371,7 @@ class Case(Section):
             As `dbvfiv.case.load.make_case` does.
         """
         data = self.to_dict()
-        changed = {put(type(self), data, dotted, value) for dotted, value in changes.items()}
+        changed = {put(type(self), data, dotted, _plain(value)) for dotted, value in changes.items()}
         self.make_way(data, changed)
         if ("drive", "head") in changed:
             changed.add(("drive", "pressure"))
@@ -425,7 +425,7 @@ def _as_mapping(changes: Changes) -> dict[str, Any]:
     for name, _ in pairs:
         if not isinstance(name, str):
             raise CaseError(f"A key to change is given as {name!r}; it must be a text such as 'drive.pressure'.")
-    return {key.strip(): _plain(value) for key, value in pairs}
+    return {key.strip(): value for key, value in pairs}
 
 
 def _pair(text: Any) -> tuple[str, str]:

@@ -10,6 +10,7 @@ import sys
 from operator import attrgetter
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from dbvfiv.case import Case as PhysicsCase
@@ -124,6 +125,10 @@ def test_replace_leaves_the_original_alone_and_checks_again():
     changed = case.replace({"drive.pressure": "36 kPa", "layers.2.angle": 45, "layers.3.angle": -45})
     assert changed.drive.pressure == 36e3 and [c.angle for c in changed.layers] == [0, 0, 45, -45, 0]
     assert case == Case()
+    counted = case.replace(
+        {"drive.pressure": np.int64(6000), "levels.pressures": [np.float32(2e3)], "modes.count": np.int64(2)}
+    )
+    assert (counted.drive.pressure, counted.levels.pressures, counted.modes.count) == (6e3, (2e3,), 2)
     with pytest.raises(CaseError, match="fluid.density"):
         case.replace({"fluid.density": -1})
 
