@@ -28,6 +28,9 @@ GRAVITY, WATER = 9.80665, 1000.0
 _HEADS = ("m", "ft")
 _HEAD_OF_WATER = re.compile(r"(mm|cm|dm|m|in|ft)\s*H2O")
 
+#: Flows of the water trade, which are units of a project and none of Pint's.
+_TRADE = ("gpm = gallon / minute", "MGD = 1e6 * gallon / day", "cfs = foot ** 3 / second")
+
 # SI unit -> what such a quantity is called in messages and in the reference
 DIMENSION = {
     "m": "length",
@@ -56,6 +59,8 @@ def _registry():
     import pint  # slow to import, and a case of bare numbers does without it
 
     registry = pint.UnitRegistry()
+    for line in _TRADE:
+        registry.define(line)
     # Pint allows dimensionless <-> angle; the two are kept apart in `_to_si`.
     return registry
 

@@ -107,9 +107,12 @@ def test_a_quantity_in_its_usual_unit_is_the_same_float():
         ("2 kHz", "Hz", 2000.0),
         ("60 1/min", "Hz", 1.0),
         ("200 rad/s", "1/s", 200.0),
+        ("100 gpm", "m^3/s", 0.006309019640),
+        ("1 MGD", "m^3/s", 0.0438126363889),
+        ("2 cfs", "m^3/s", 0.056633693184),
     ],
 )
-def test_frequencies_of_angular_velocities_are_turns_per_second(given, si, value):
+def test_units_of_the_trade_and_of_angular_velocities_in_hertz(given, si, value):
     assert Quantity(si).parse(given) == pytest.approx(value, rel=1e-12)
 
 
