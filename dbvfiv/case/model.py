@@ -29,8 +29,9 @@ from .wall import edges_of
 FACE_STIFFNESS, SPREADING_STIFFNESS = 1e10, 1e9
 #: Share of the gap between rough faces in contact below which no passage of a bill that is moulded shut narrows.
 PRESET_FILM = 0.75
-#: Keys of a section that say one thing in different ways.
+#: Keys of a section, and of a table of a material, that say one thing in different ways.
 _ALTERNATIVES = {"drive": ("pressure", "head"), "upstream": ("friction", "roughness"), "valve": PRESETS}
+_STIFFNESS = ("hardness", "shear_modulus")
 
 
 class Case(Section):
@@ -323,8 +324,12 @@ class Case(Section):
     @classmethod
     def make_way(cls, data: dict[str, Any], changed: Collection[tuple[str, ...]]) -> None:
         """A key that is asked for stands in the place of one that was there before and says the same otherwise."""
-        for name, keys in _ALTERNATIVES.items():
-            before, asked = data.get(name), {key for key in keys if (name, key) in changed}
+        own = data.get("materials")
+        tables = {(name,): (data.get(name), keys) for name, keys in _ALTERNATIVES.items()}
+        if isinstance(own, dict):
+            tables |= {("materials", name): (card, _STIFFNESS) for name, card in own.items()}
+        for path, (before, keys) in tables.items():
+            asked = {key for key in keys if (*path, key) in changed}
             if asked and isinstance(before, dict):
                 for other in set(keys) - asked:
                     before.pop(other, None)

@@ -484,6 +484,15 @@ def test_override_stands_in_the_place_of_the_key_that_says_the_same(tmp_path, ov
         assert attrgetter(key)(before) != attrgetter(key)(after) == attrgetter(key)(replaced)
 
 
+@pytest.mark.parametrize("given", ['shear_modulus = "1 MPa"', 'hardness = "60 Shore A"'])
+@pytest.mark.parametrize(("key", "value"), [("hardness", "70 Shore A"), ("shear_modulus", 1.5e6)])
+def test_another_hardness_or_modulus_stands_in_the_place_of_either(tmp_path, given, key, value):
+    path = tmp_path / "case.toml"
+    path.write_text(f"materials.soft = {{ {given}, kind = 'neo-hookean', density = 1100 }}")
+    found = load_case(path, [f"materials.soft.{key}={value}"]).materials.named["soft"].shear_modulus
+    assert found == pytest.approx(shear_modulus_of(70.0) if key == "hardness" else value)
+
+
 @pytest.mark.parametrize(
     ("given", "key"),
     [
