@@ -332,10 +332,12 @@ def refuse_foreign(path: Path) -> None:
     Raises
     ------
     CaseError
-        If it is the name of a folder or of a file that is no result.
+        If it is the name of a folder, of a device, or of a file that is no result.
     """
     if path.is_dir():
         raise CaseError(f"{str(path)!r} is a folder; the result needs the name of a file.")
+    if path.exists() and not path.is_file():
+        raise CaseError(f"{str(path)!r} is no file that can hold a result; choose another name.")
     if path.exists() and path.stat().st_size and not _replaceable(path):
         raise CaseError(
             f"{str(path)!r} exists and is not a result of dbvfiv, so it is not overwritten; choose another name."
@@ -368,10 +370,16 @@ class Attachment:
     data: bytes
 
     def place(self) -> str:
-        """Name of a file with these contents: the original one, or a copy in the cache folder where that can be
-        written.
+        """Name of a file with these contents: the original one, or a copy in the cache folder. Where that cannot be
+        written the original name stands for a file that has gone.
+
+        Raises
+        ------
+        CaseError
+            Where it cannot be written, and the original one has other contents now.
         """
-        if _contents(Path(self.path)) == self.data:
+        now = _contents(Path(self.path))
+        if now == self.data:
             return self.path
         digest = hashlib.sha256(self.data).hexdigest()[:16]
         copy = cache_directory() / "attachments" / digest / Path(self.path).name
@@ -379,7 +387,12 @@ class Attachment:
             if _contents(copy) != self.data:
                 copy.parent.mkdir(parents=True, exist_ok=True)
                 copy.write_bytes(self.data)
-        except OSError:
+        except OSError as error:
+            if now is not None:
+                raise CaseError(
+                    f"{self.path!r} has changed since the result was made, and what it held cannot be put into "
+                    f"{str(copy.parent)!r} ({error.strerror}); DBVFIV_CACHE names another folder."
+                ) from None
             return self.path
         return str(copy)
 

@@ -1,6 +1,7 @@
 """Result files: what is written is read back, a stopped run keeps its states, broken files are told in a sentence."""
 
 import json
+import os
 import shutil
 import subprocess
 import sys
@@ -18,7 +19,8 @@ from dbvfiv.geometry import key_point_table
 from dbvfiv.materials.shipped import published_rubber
 from dbvfiv.model.equilibria import LoadPath
 from dbvfiv.observer import Observer
-from dbvfiv.record.files import Attachment, Header, read_header, write_header
+from dbvfiv.record.files import Attachment, Header, kind_of, read_header, refuse_foreign, write_header
+from dbvfiv.record.record import Journal
 from dbvfiv.shell.recovery import layer_fields
 from dbvfiv.studies.case import Case
 
@@ -160,6 +162,32 @@ def test_key_points_that_are_gone_still_give_their_valve(tmp_path, monkeypatch):
     kept = _kept(tmp_path, case)
     points.unlink()
     assert kept.case == case and _read(tmp_path).case.valve.inlet_radius == pytest.approx(0.06)
+
+
+def test_a_file_that_has_changed_is_not_taken_for_the_one_that_was_kept(tmp_path, monkeypatch, one_sentence):
+    """Where the copy cannot be written either; one that has gone is missed where it is read."""
+    (tmp_path / "taken").write_text("a file where the cache should be")
+    monkeypatch.setenv("DBVFIV_CACHE", str(tmp_path / "taken"))
+    own = Attachment(str(tmp_path / "own.csv"), LATIN)
+    assert own.place() == own.path
+    Path(own.path).write_bytes(b"other")
+    with pytest.raises(CaseError, match="has changed since the result was made") as told:
+        own.place()
+    assert one_sentence(str(told.value))
+    Path(own.path).write_bytes(LATIN)
+    assert own.place() == own.path
+
+
+def test_a_result_takes_the_place_of_a_result_alone(tmp_path, one_sentence):
+    """Not of a device; where a link leads to one, that file."""
+    os.mkfifo(tmp_path / "pipe.h5")
+    with pytest.raises(CaseError, match="no file that can hold a result") as told:
+        refuse_foreign(tmp_path / "pipe.h5")
+    assert one_sentence(str(told.value)) and (tmp_path / "pipe.h5").is_fifo()
+    (tmp_path / "link.h5").symlink_to(tmp_path / "run.h5")
+    with Journal(tmp_path / "link.h5", Header.of("steady", Case()), None, ()):
+        pass
+    assert (tmp_path / "link.h5").is_symlink() and kind_of(tmp_path / "run.h5") == "steady"
 
 
 def test_texts_of_earlier_versions_are_read(tmp_path):
