@@ -13,6 +13,7 @@ from ..case.describe import quantity_of, show_value, toml_name
 from ..case.distribution import samples_file
 from ..case.load import make_case, parse_toml, put, toml_value
 from ..case.parameters import PARAMETERS
+from ..case.physics import LIQUID
 from ..case.quantity import GRAVITY
 from ..case.section import Section
 from ..errors import CaseError
@@ -58,10 +59,6 @@ FORM: dict[str, tuple[tuple[str, str], ...]] = {
         ("mesh.along", "Elements along"),
     ),
 }
-
-
-#: Density of a fluid whose pressures are told as heads, kg/m3.
-LIQUID = 300.0
 
 
 @dataclass(frozen=True)
@@ -130,7 +127,7 @@ def usual_value(section: Section, name: str) -> Any:
 def shown_as(case: Case, name: str) -> dict[str, Any]:
     """Title, unit and its SI value of a parameter as a page shows it: pressures of liquids as heads."""
     row, units = PARAMETERS[name], case.units
-    if name != "pressure" or case.fluid.density <= LIQUID or (units.text and not units.heads):
+    if name != "pressure" or case.fluid.density < LIQUID or (units.text and not units.heads):
         return {"title": row.title, "unit": row.shown_unit, "scale": row.scale}
     scale = units.factor("pressure") if units.heads else GRAVITY * case.fluid.density
     return {"title": "Head of the fluid", "unit": units.name("pressure") if units.heads else "m", "scale": scale}
