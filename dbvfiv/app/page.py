@@ -20,7 +20,7 @@ from ..studies.case import Case
 from .ask import AskPanel
 from .processes import Run
 from .see import RunsPanel, SeePanel, drop_box
-from .sheet import FORM, Checked, change, check, given, read_sheet, usual_value, write_sheet
+from .sheet import FORM, Checked, bring, change, check, data_files, given, read_sheet, usual_value, write_sheet
 
 #: Valves to start from: those of the source tree, and of the folder that the server was started in.
 SHELVES = (Path(__file__).parents[2] / "cases", Path("cases").resolve())
@@ -149,12 +149,13 @@ class Page:
         self.changed(text)
 
     def start_from(self, path: Path) -> None:
-        """Take a case file with the files beside it that it names."""
-        text = path.read_text(encoding="utf-8")
-        for name in re.findall(r'"([\w.-]+\.csv)"', text):
-            if (path.parent / name).is_file():
-                (self.home / name).write_bytes((path.parent / name).read_bytes())
-        self.take(text, path.stem)
+        """Take a case file with the files that it names.
+
+        Raises
+        ------
+        CaseError, OSError, UnicodeDecodeError
+        """
+        self.take(bring(path, self.home), path.stem)
 
     async def keep_result(self, name: str, content: Path | bytes) -> Run:
         """Keep a result file, or what one holds, among the runs.
@@ -190,7 +191,7 @@ class Page:
         ------
         CaseError, OSError
         """
-        text = run.case.read_text(encoding="utf-8")
+        text = bring(run.case, self.home, anew=False)
         if read_sheet(text) != self.data:
             self.take(text, run.case.stem)
 
@@ -228,7 +229,7 @@ class Page:
         if self.checked.case is None:
             return None
         text = write_sheet(self.data)
-        beside = sorted((p.name, p.stat().st_mtime_ns, p.stat().st_size) for p in self.home.glob("*.csv"))
+        beside = sorted((p.name, p.stat().st_mtime_ns, p.stat().st_size) for p in data_files(self.home))
         path = self.home / f"case-{hashlib.sha256(f'{text}{beside}'.encode()).hexdigest()[:16]}.toml"
         if not path.exists():
             for old in sorted(self.home.glob("case-*.toml"), key=lambda file: file.stat().st_mtime)[:-20]:
@@ -238,7 +239,7 @@ class Page:
 
     def files(self) -> dict[str, bytes]:
         """Case and data files of a run."""
-        found = {path.name: path.read_bytes() for path in self.home.glob("*.csv")}
+        found = {path.name: path.read_bytes() for path in data_files(self.home)}
         return found | {f"{self.name}.toml": write_sheet(self.data).encode()}
 
     def run(self, kind: str, title: str, arguments: list[str]) -> Run | None:
@@ -336,7 +337,7 @@ class Page:
                 ).props("flat")
 
     def _data_files(self) -> list[str]:
-        return sorted(path.name for path in self.home.glob("*.csv"))
+        return [path.name for path in data_files(self.home)]
 
     def _rows(self, heading: str, key: str, names: tuple[str, ...]) -> None:
         """Table of a list of the case, with its default where it is not given."""

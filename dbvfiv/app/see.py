@@ -11,10 +11,11 @@ from typing import Any
 
 from nicegui import events, ui
 
-from ..case.parameters import PARAMETERS, Mu
+from ..case.parameters import DESIGN, PARAMETERS, Mu
 from ..errors import CaseError
 from ..studies import KINDS
-from ..studies.case import load_case
+from ..studies.case import Case, load_case
+from ..studies.stability.place import design_value
 from .ask import colour_bar, label_of
 from .processes import RECORD, Run
 from .sheet import shown_as
@@ -171,46 +172,63 @@ async def show_result(page: Any, run: Run) -> None:
         ui.label("\n".join(lines)).classes("text" if is_table else "note")
 
 
-def show_map(page: Any, run: Run, found: dict[str, Any]) -> None:
-    """Draw a stability map with neutral curves and the star of the installation; a click goes to a cell."""
-    axes, grid = (found["x"], found["y"]), found["growth_rate"]
-    names = [axis["parameter"] for axis in axes]
-    case = load_case(run.case)
+def map_figure(case: Case, found: dict[str, Any]) -> tuple[dict[str, Any], str]:
+    """Stability map with neutral curves and the star of the installation, and words below it: under the flow model of
+    the case where the map has two, without cells whose verdict is uncertain.
+    """
+    laws = found.get("laws", [found])
+    picture = next((one for one in laws if one["continuity"] == case.fluid.continuity), laws[0])
+    names = [found[axis]["parameter"] for axis in "xy"]
     rows = [shown_as(case, name) for name in names]
-    x, y = ([value / row["scale"] for value in axis["values"]] for axis, row in zip(axes, rows))
+    x, y = ([value / row["scale"] for value in found[axis]["values"]] for axis, row in zip("xy", rows))
+    rates, certified = picture["growth_rate"], picture["certified"]
+    grid = [[rate if sure else None for rate, sure in zip(*pair)] for pair in zip(rates, certified)]
     limit = max((abs(rate) for row in grid for rate in row if rate is not None), default=1.0)
     cells = {"type": "heatmap", "x": x, "y": y, "z": grid, "colorscale": "RdBu", "zmin": -limit, "zmax": limit}
     drawn = [cells | {"colorbar": colour_bar("Growth rate, 1/s", -0.22)}]
-    curves = [("onset", "solid", curve) for curve in found["onset_curves"]]
-    curves += [(f"damping ratio {one['level']}", "dot", one["points"]) for one in found.get("contours", ())]
+    contours = picture.get("contours", ())
+    curves = [("onset", "solid", curve) for curve in picture["onset_curves"]]
+    curves += [(f"margin {one['level']}", "dot", one["points"]) for one in contours]
     for title, dash, curve in curves:
         points = {name: [point[i] / rows[i]["scale"] for point in curve] for i, name in enumerate("xy")}
         drawn.append(
             {"type": "scatter", "mode": "lines", "line": {"color": "black", "dash": dash}, "name": title} | points
         )
-    own = Mu.of(case)
-    marker = {"symbol": "star", "size": 16, "color": "gold", "line": {"color": "black", "width": 1}}
-    star = {axis: [own[name] / row["scale"]] for axis, name, row in zip("xy", names, rows)}
-    drawn.append({"type": "scatter", "mode": "markers", "marker": marker, "name": "this installation"} | star)
+    own = [design_value(case, name) if name in DESIGN else Mu.of(case).get(name) for name in names]
+    if None not in own:
+        marker = {"symbol": "star", "size": 16, "color": "gold", "line": {"color": "black", "width": 1}}
+        star = {axis: [value / row["scale"]] for axis, value, row in zip("xy", own, rows)}
+        drawn.append({"type": "scatter", "mode": "markers", "marker": marker, "name": "this installation"} | star)
     layout = {"height": 480, "margin": {"t": 40, "r": 10}, "showlegend": False}
-    for name, axis, row in zip("xy", axes, rows):
-        layout[f"{name}axis"] = {"title": {"text": label_of(row)}, "type": "log" if axis.get("log") else "linear"}
+    if len(laws) > 1:
+        layout["title"] = {"text": f"Flow model: {picture['continuity']}", "font": {"size": 14}}
+    for name, row in zip("xy", rows):
+        layout[f"{name}axis"] = {"title": {"text": label_of(row)}, "type": "log" if found[name]["log"] else "linear"}
         layout[f"{name}axis"] |= {"exponentformat": "none", "automargin": True}
+    levels = " and ".join(dict.fromkeys(str(one["level"]) for one in contours))
+    said = ["Solid: onset", *([f"dotted: margin {levels}"] if levels else []), "blank: uncertain."]
     figure = {"data": drawn, "layout": layout, "config": {"responsive": False, "displaylogo": False}}
+    return figure, "; ".join(said)
+
+
+def show_map(page: Any, run: Run, found: dict[str, Any]) -> None:
+    """Draw a stability map; a click goes to a cell."""
+    case = load_case(run.case)
+    figure, said = map_figure(case, found)
+    names = [found[axis]["parameter"] for axis in "xy"]
 
     def go(event: events.GenericEventArguments) -> None:
         point = (event.args.get("points") or [{}])[0]
         if point.get("x") is None:
             return
-        values = {name: float(point[axis]) * row["scale"] for name, row, axis in zip(names, rows, "xy")}
+        values = {name: float(point[axis]) * shown_as(case, name)["scale"] for name, axis in zip(names, "xy")}
         page.take_case_of(run)
         page.panels.value = "Ask"
         page.asking.open(values)
 
     ui.plotly(figure).classes("full").props('data-at="map"').on("plotly_click", go)
-    ui.label("Solid: onset; dotted: margins of 2 and 5 % damping. A click on a cell asks the valve there.").classes(
-        "note"
-    )
+    asks = "" if set(names) & set(DESIGN) else " A click on a cell asks the valve there."
+    ui.label(f"{said}{asks}").classes("note")
 
 
 class SeePanel:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
@@ -9,15 +10,20 @@ from pathlib import Path
 from typing import Any
 
 from ..case.describe import quantity_of, show_value, toml_name
+from ..case.distribution import samples_file
 from ..case.load import make_case, parse_toml, put, toml_value
 from ..case.parameters import PARAMETERS
+from ..case.physics import LIQUID
 from ..case.quantity import GRAVITY
 from ..case.section import Section
 from ..errors import CaseError
+from ..record.files import renamed
 from ..studies.case import Case, contradictions, oddities
 
 #: Sizes that bound what a page may ask for: bytes of a case, elements, processes of a run.
 LONGEST, ELEMENTS, WORKERS = 200_000, 4000, 2
+#: Endings of files beside a case that are no data of it.
+NO_DATA = (".toml", ".h5", ".hdf5")
 #: Keys of the form by heading: key and label; the rest is edited as text.
 FORM: dict[str, tuple[tuple[str, str], ...]] = {
     "Sizes": (
@@ -53,10 +59,6 @@ FORM: dict[str, tuple[tuple[str, str], ...]] = {
         ("mesh.along", "Elements along"),
     ),
 }
-
-
-#: Density of a fluid whose pressures are told as heads, kg/m3.
-LIQUID = 300.0
 
 
 @dataclass(frozen=True)
@@ -125,7 +127,7 @@ def usual_value(section: Section, name: str) -> Any:
 def shown_as(case: Case, name: str) -> dict[str, Any]:
     """Title, unit and its SI value of a parameter as a page shows it: pressures of liquids as heads."""
     row, units = PARAMETERS[name], case.units
-    if name != "pressure" or case.fluid.density <= LIQUID or (units.text and not units.heads):
+    if name != "pressure" or case.fluid.density < LIQUID or (units.text and not units.heads):
         return {"title": row.title, "unit": row.shown_unit, "scale": row.scale}
     scale = units.factor("pressure") if units.heads else GRAVITY * case.fluid.density
     return {"title": "Head of the fluid", "unit": units.name("pressure") if units.heads else "m", "scale": scale}
@@ -139,7 +141,7 @@ def change(data: dict[str, Any], key: str, text: str) -> None:
     CaseError
     """
     if text.strip():
-        put(Case, data, key, toml_value(text.strip()))
+        Case.make_way(data, {put(Case, data, key, toml_value(text.strip()))})
         return
     *path, last = key.split(".")
     table: Any = data
@@ -150,6 +152,39 @@ def change(data: dict[str, Any], key: str, text: str) -> None:
             table = table.get(part) if isinstance(table, dict) else None
     if isinstance(table, dict):
         table.pop(last, None)
+
+
+def bring(path: Path, home: Path, anew: bool = True) -> str:
+    """Text of a case file, of which the files that it names are put into a folder, under names without theirs.
+
+    Parameters
+    ----------
+    path, home : Path
+        Case file, and folder.
+    anew : bool
+        Take the place of files that are there already.
+
+    Raises
+    ------
+    CaseError, OSError, UnicodeDecodeError
+    """
+    text, names = path.read_bytes().decode("utf-8-sig"), {}
+    data = read_sheet(text)
+    for _, value in _leaves(data, ""):
+        name = str(samples_file(value) or value) if isinstance(value, str) else ""
+        source = path.parent / name
+        if name in names or not os.path.isfile(source) or source.suffix.lower() in NO_DATA:
+            continue
+        kept = source.name if source.name not in names.values() else f"{len(names)}-{source.name}"
+        if anew or not (home / kept).exists():
+            (home / kept).write_bytes(source.read_bytes())
+        names[name] = kept
+    return text if all(name == kept for name, kept in names.items()) else write_sheet(renamed(data, names))
+
+
+def data_files(home: Path) -> list[Path]:
+    """Files in a folder that cases may name as data."""
+    return sorted(path for path in home.iterdir() if path.is_file() and path.suffix.lower() not in NO_DATA)
 
 
 def check(data: Mapping[str, Any], folder: Path, text: str = "") -> Checked:
@@ -170,14 +205,16 @@ def check(data: Mapping[str, Any], folder: Path, text: str = "") -> Checked:
         return Checked(None, (f"The case cannot be read ({type(error).__name__}).",))
 
 
-def stay_inside(data: Mapping[str, Any]) -> None:
-    """Refuse names of files outside the folder, and processes elsewhere.
+def stay_inside(data: Mapping[str, Any], runs: bool = True) -> None:
+    """Refuse names of files outside the folder, and processes elsewhere of a case that runs.
 
     Raises
     ------
     CaseError
     """
     for key, value in _leaves(data, ""):
+        if key.endswith("workers") and not runs:
+            continue
         if key.endswith("workers") and not (isinstance(value, int) and value <= WORKERS):
             raise CaseError(f"{key} is given as {value!r}; here it must be a number up to {WORKERS}.", key=key)
         for word in re.split(r"[\s,;:|()\[\]'\"=]+", value) if isinstance(value, str) else ():

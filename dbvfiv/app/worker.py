@@ -23,6 +23,7 @@ from typing import Any
 import numpy as np
 
 from ..api import Valve, load
+from ..case.section import Section
 from ..case.write import case_toml
 from ..drawing.style import style
 from ..drawing.views import ValveSkin, valve_figure
@@ -33,6 +34,7 @@ from ..model.sizes import ValveSizes
 from ..record.files import reading
 from ..record.mesh import MeshData
 from ..shell.recovery import layer_fields
+from ..studies.case import Case
 from ..studies.session import find_study, load_result
 from ..texts import json_value
 from .sheet import shown_as, stay_inside
@@ -68,9 +70,9 @@ class Desk:
         """Kind of a result file, and its case as TOML; one that has to stay inside its folder names no other files."""
         if inside:
             with reading(path) as file:
-                stay_inside(json.loads(file["case/json"].asstr()[()]))
+                stay_inside(json.loads(file["case/json"].asstr()[()]), runs=False)
         found = load_result(path)
-        return {"kind": found.kind, "case": case_toml(found.header.case, comments=False)}
+        return {"kind": found.kind, "case": text_for_page(found.header.case)}
 
     def open(self, case: str) -> dict[str, Any]:
         """Open a case file; the parameters that can be moved, SI, with their rows of the table."""
@@ -152,6 +154,16 @@ class Desk:
         names = {"figures": [file.name for file in drawn], "tables": [file.name for file in tables if file]}
         summary = found.summary() if found.kind == "map" else {}
         return {"kind": found.kind, "lines": said, "complete": found.complete, "summary": summary} | names
+
+
+def text_for_page(case: Case) -> str:
+    """A case as TOML, with the usual number of processes in place of those that made its result."""
+    usual = {
+        f"{name}.workers": part.model_fields["workers"].default
+        for name, part in ((name, type(part)) for name, part in case)
+        if issubclass(part, Section) and "workers" in part.model_fields
+    }
+    return case_toml(case.replace(usual), comments=False)
 
 
 def write_table(result: Any, spec: Any, folder: Path) -> Path | None:

@@ -13,15 +13,13 @@ from pydantic import AfterValidator, StrictStr, ValidationInfo
 
 from ..errors import CaseError
 from .parameters import DESIGN, PARAMETERS, SWEPT, Parameter
-from .quantity import number_or_text
+from .quantity import number_or_text, unit_behind
 from .section import Described, Section
 
 FORM = 'PARAMETER=START:STOP:COUNT, with ":log" behind it for logarithmic steps, or PARAMETER=VALUE,VALUE,...'
 _LARGEST = 100_000
 #: Parameters that say where something was measured.
 PLACES = tuple(name for name in PARAMETERS if name not in DESIGN)
-#: A head of the fluid in the text of a range.
-_HEAD = re.compile(r"\d\s*(m|ft)\s*([:,]|$)")
 
 
 @dataclass(frozen=True)
@@ -68,7 +66,11 @@ def parse_axis(text: str, names: Iterable[str] = SWEPT, density: float | None = 
     listed = len(parts) == 1 and "," in parts[0]
     if not equals or (len(parts) != 3 and not listed):
         raise ValueError("which is not of that form")
-    values = [_value(row, part, density) for part in (parts[0].split(",") if listed else parts[:2])]
+    spans = parts[0].split(",") if listed else parts[:2]
+    values = [_value(row, part, density) for part in spans]
+    units = [unit_behind(part) for part, value in zip(spans, values) if value]
+    if "" in units and any(unit and _value(row, f"1 {unit}", density) != 1.0 for unit in units):
+        raise ValueError("which has a unit at some of its values alone")
     if not listed and (not re.fullmatch("[0-9]{1,6}", parts[2]) or not 2 <= int(parts[2]) <= _LARGEST):
         raise ValueError(f"whose count is not between 2 and {_LARGEST}")
     if any(first >= second for first, second in pairwise(values)):
@@ -162,18 +164,26 @@ class RangeSection(Section):
         return "pressure" if self.axis is None else self.axis.parameter
 
 
+def _needs_density(parse: Callable[..., Any], text: str) -> bool:
+    """True for the text of a range in heads of the fluid."""
+    try:
+        parse(text)
+    except ValueError:
+        return True
+    return False
+
+
 def _readable(parse: Callable[..., Any]) -> AfterValidator:
     """Validator of a text that a function can read, heads of the fluid in a range as pressures."""
 
     def check(text: str, info: ValidationInfo) -> str:
         axis = parse(text, density=(info.context or {}).get("density"))
-        span = text.partition("=")[2]
-        if not isinstance(axis, Axis) or axis.parameter != "pressure" or not _HEAD.search(span):
+        if not isinstance(axis, Axis) or not _needs_density(parse, text):
             return text
         log = ":log" if axis.log else ""
-        if "," in span:
-            return f"pressure={','.join(f'{value!r} Pa' for value in axis.values)}{log}"
-        return f"pressure={axis.values[0]!r} Pa:{axis.values[-1]!r} Pa:{len(axis.values)}{log}"
+        if "," in text:
+            return f"{axis.parameter}={','.join(f'{value!r} Pa' for value in axis.values)}{log}"
+        return f"{axis.parameter}={axis.values[0]!r} Pa:{axis.values[-1]!r} Pa:{len(axis.values)}{log}"
 
     return AfterValidator(check)
 

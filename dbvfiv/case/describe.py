@@ -106,7 +106,8 @@ def show_value(value: Any, quantity: Quantity | None) -> str:
         pairs = (f"{n} = {show_value(getattr(value, n), quantity_of(f))}" for n, f in given.items())
         return "{ " + ", ".join(pairs) + " }"
     if isinstance(value, dict):
-        pairs = ", ".join(f"{toml_name(name)} = {show_value(v, quantity)}" for name, v in value.items())
+        given = ((name, v) for name, v in value.items() if v is not None)
+        pairs = ", ".join(f"{toml_name(name)} = {show_value(v, quantity)}" for name, v in given)
         return f"{{ {pairs} }}" if pairs else "{}"
     return str(value) if isinstance(value, (date, time)) else _quoted(str(value))
 

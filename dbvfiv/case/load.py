@@ -400,4 +400,4 @@ def _default(model: type[Section], path: tuple[str, ...]) -> Any:
         value = getattr(value, part, None) if part in getattr(type(value), "model_fields", {}) else None
     if not isinstance(value, tuple):
         return {}
-    return [item.model_dump(mode="json") if hasattr(item, "model_dump") else item for item in value]
+    return [item.model_dump(mode="json", exclude_none=True) if hasattr(item, "model_dump") else item for item in value]

@@ -29,8 +29,9 @@ from .wall import edges_of
 FACE_STIFFNESS, SPREADING_STIFFNESS = 1e10, 1e9
 #: Share of the gap between rough faces in contact below which no passage of a bill that is moulded shut narrows.
 PRESET_FILM = 0.75
-#: Keys of a section that say one thing in different ways.
+#: Keys of a section, and of a table of a material, that say one thing in different ways.
 _ALTERNATIVES = {"drive": ("pressure", "head"), "upstream": ("friction", "roughness"), "valve": PRESETS}
+_STIFFNESS = ("hardness", "shear_modulus")
 
 
 class Case(Section):
@@ -323,8 +324,12 @@ class Case(Section):
     @classmethod
     def make_way(cls, data: dict[str, Any], changed: Collection[tuple[str, ...]]) -> None:
         """A key that is asked for stands in the place of one that was there before and says the same otherwise."""
-        for name, keys in _ALTERNATIVES.items():
-            before, asked = data.get(name), {key for key in keys if (name, key) in changed}
+        own = data.get("materials")
+        tables = {(name,): (data.get(name), keys) for name, keys in _ALTERNATIVES.items()}
+        if isinstance(own, dict):
+            tables |= {("materials", name): (card, _STIFFNESS) for name, card in own.items()}
+        for path, (before, keys) in tables.items():
+            asked = {key for key in keys if (*path, key) in changed}
             if asked and isinstance(before, dict):
                 for other in set(keys) - asked:
                     before.pop(other, None)
@@ -338,14 +343,29 @@ class Case(Section):
         """Return plain SI data (numbers, strings, lists, dicts) that JSON and HDF5 can hold."""
         return self.model_dump(mode="json")
 
+    @property
+    def given(self) -> dict[str, list[str]]:
+        """Keys that were given, by section, as plain data; ``to_dict`` holds every key."""
+        return {name: sorted(part.model_fields_set) for name, part in self if isinstance(part, Section)}
+
     @classmethod
-    def from_dict(cls, data: Mapping[str, Any]) -> Self:
+    def from_dict(cls, data: Mapping[str, Any], given: Mapping[str, Collection[str]] | None = None) -> Self:
         """Rebuild a case from ``to_dict`` without looking for the files it was made from; one of a version that had no
-        damping.model damps by Rayleigh's constants.
+        damping.model damps by Rayleigh's constants. All keys of the data count as given, or those alone that `given`
+        has of a section.
         """
         if isinstance(data.get("damping"), Mapping):
             data = {**data, "damping": {"model": "rayleigh", **data["damping"]}}
-        return make_case(cls, data, check_files=False)
+        return cls._with_given(data, given or {})
+
+    @classmethod
+    def _with_given(cls, data: Mapping[str, Any], given: Mapping[str, Collection[str]]) -> Self:
+        """A case of which those keys alone count as given that stand there, in the sections that stand there."""
+        made = make_case(cls, data, check_files=False)
+        for name, part in made:
+            if isinstance(part, Section) and name in given:
+                part.model_fields_set.intersection_update(given[name])
+        return made
 
     def replace(self, changes: Mapping[str, Any]) -> Self:
         """Return a validated copy with some keys changed, ``{"drive.pressure": 36e3, ...}``.
@@ -356,16 +376,16 @@ class Case(Section):
             As `dbvfiv.case.load.make_case` does.
         """
         data = self.to_dict()
-        changed = {put(type(self), data, dotted, value) for dotted, value in changes.items()}
+        changed = {put(type(self), data, dotted, _plain(value)) for dotted, value in changes.items()}
         self.make_way(data, changed)
         if ("drive", "head") in changed:
             changed.add(("drive", "pressure"))
-        made = make_case(type(self), data, check_files=False)
-        for name, before in self:  # a dictionary holds every key, but not all were given
-            if isinstance(before, Section) and (name,) not in changed:
-                given = before.model_fields_set | {path[1] for path in changed if path[0] == name}
-                getattr(made, name).model_fields_set.intersection_update(given)
-        return made
+        given = {  # a dictionary holds every key, but not all were given
+            name: {*keys, *(path[1] for path in changed if path[0] == name)}
+            for name, keys in self.given.items()
+            if (name,) not in changed
+        }
+        return self._with_given(data, given)
 
 
 #: What `dbvfiv.load` and `Valve.replace` take.
@@ -410,7 +430,7 @@ def _as_mapping(changes: Changes) -> dict[str, Any]:
     for name, _ in pairs:
         if not isinstance(name, str):
             raise CaseError(f"A key to change is given as {name!r}; it must be a text such as 'drive.pressure'.")
-    return {key.strip(): _plain(value) for key, value in pairs}
+    return {key.strip(): value for key, value in pairs}
 
 
 def _pair(text: Any) -> tuple[str, str]:

@@ -13,6 +13,8 @@ from .section import BrokenRule, Described, Section, key
 
 #: Viscosities by name, Pa s, at 20 degC: water at 0.1 MPa (IAPWS R12-08), dry air at 0.1 MPa (Lemmon & Jacobsen 2004).
 VISCOSITIES = {"none": 0.0, "water": 1.0016e-3, "air": 1.813e-5}
+#: Density below which a fluid is a gas, kg/m3.
+LIQUID = 300.0
 #: That of glycerol and of the heaviest sludges.
 _THICKEST = 10.0
 
@@ -117,6 +119,8 @@ class Fluid(Section):
 
 class Drive(Section):
     """The load."""
+
+    told_by_giving = ("pressure",)
 
     kind: Literal["flow", "uniform"] = key(
         "flow", "Pressure from the flow through the valve, or one uniform pressure without flow."

@@ -28,6 +28,9 @@ GRAVITY, WATER = 9.80665, 1000.0
 _HEADS = ("m", "ft")
 _HEAD_OF_WATER = re.compile(r"(mm|cm|dm|m|in|ft)\s*H2O")
 
+#: Flows of the water trade, which are units of a project and none of Pint's.
+_TRADE = ("gpm = gallon / minute", "MGD = 1e6 * gallon / day", "cfs = foot ** 3 / second")
+
 # SI unit -> what such a quantity is called in messages and in the reference
 DIMENSION = {
     "m": "length",
@@ -56,6 +59,8 @@ def _registry():
     import pint  # slow to import, and a case of bare numbers does without it
 
     registry = pint.UnitRegistry()
+    for line in _TRADE:
+        registry.define(line)
     # Pint allows dimensionless <-> angle; the two are kept apart in `_to_si`.
     return registry
 
@@ -69,6 +74,8 @@ def _factor(unit_text: str, si: str) -> float | None:
         text = re.sub(r"\b([cdm]?m|ft|in)([23])\b", r"\1^\2", text)
         source = registry.Quantity(1.0, registry.parse_units(text))
         target = "degree" if si == "deg" else (si or "dimensionless")
+        if si == "Hz" and "radian" in str(source.to_root_units().units):
+            target = "turn/s"  # of an angular velocity, which pint counts in radians
         return float(source.to(target).magnitude)
     except Exception:  # pint raises a wide family, tokeniser errors included
         return None
@@ -88,6 +95,12 @@ def number_or_text(value: Any) -> Any:
         return value
 
 
+def unit_behind(text: str) -> str:
+    """Unit of a number with a unit; empty for any other text."""
+    match = _QUANTITY.fullmatch(text)
+    return (match[2] or "").strip() if match else ""
+
+
 def head_of(pressure: float, density: float) -> float:
     """Head, m, of a fluid, kg/m3, that a pressure, Pa, carries."""
     return pressure / (density * GRAVITY)
@@ -101,15 +114,15 @@ def _head(text: str, density: float | None) -> float | None:
     ValueError
         For a head of a fluid whose density is not known.
     """
-    match = _QUANTITY.fullmatch(text)
-    unit = (match[2] or "").strip() if match else ""
+    unit = unit_behind(text)
     water = _HEAD_OF_WATER.fullmatch(unit)
     if unit not in _HEADS and water is None:
         return None
     if water is None and density is None:
         raise ValueError("which is a head, and the density of the fluid is not known here; mH2O or a pressure is")
     weight = GRAVITY * (WATER if water else density)
-    return float(f"{float(match[1]) * _factor(water[1] if water else unit, 'm') * weight:.15g}")
+    number = float(_QUANTITY.fullmatch(text)[1])
+    return float(f"{number * _factor(water[1] if water else unit, 'm') * weight:.15g}")
 
 
 def _to_si(text: str, si: str) -> float:

@@ -111,7 +111,7 @@ def _keys(section: Section, comments: bool) -> Iterator[str]:
             if comments:
                 yield f'# {name} = "..."'
             continue
-        mark = "# " if follows else ""
+        mark = "# " if follows or (name in section.told_by_giving and name not in section.model_fields_set) else ""
         yield f"{mark}{name} = {_value(value, field)}"
 
 

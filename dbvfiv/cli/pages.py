@@ -63,6 +63,10 @@ def report(
         raise CaseError(
             f"-o is given as {str(output)!r}, which names a folder; the page is a file, {output.name}.html."
         )
+    if output is not None and output.suffix.lower() not in (".html", ".htm"):
+        raise CaseError(
+            f"-o is given as {str(output)!r}, and the page is HTML; give a name such as {output.stem}.html."
+        )
     case = load_case(case_file, overrides or ())
     require_consistent(case)
     from ..report import gather, write_page, write_pdf  # drawing libraries, which a mistake need not wait for

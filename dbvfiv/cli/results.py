@@ -12,6 +12,7 @@ import typer
 
 from ..errors import CaseError
 from ..observer import Progress
+from ..texts import json_value
 from .terminal import (
     AsJson,
     Override,
@@ -395,7 +396,7 @@ def cfd(
     dbvfiv cfd my.h5 --state "36 kPa" --pipe "330 mm" -o flow36 --plots figures
     """
     from ..cfd.comparison import FlowComparison, draw
-    from ..cfd.foam import WATER_VISCOSITY, FlowCase, read_fields, run_openfoam
+    from ..cfd.foam import FlowCase, read_fields, run_openfoam
     from ..studies.steady.figures import is_published
 
     state = _choose_state(file, pressure)
@@ -410,7 +411,7 @@ def cfd(
         )
     width = result.case.downstream.pipe_diameter if pipe is None else _read_diameter(pipe)
     density = state.mass_flow / state.volume_flow
-    viscosity = result.case.fluid.dynamic_viscosity / density or WATER_VISCOSITY
+    viscosity = _viscosity(result.case.fluid.dynamic_viscosity, density)
     case = FlowCase(result.header.name, result.mesh, state, density, width, fineness, iterations, viscosity)
     case.write(folder)
     if not run:
@@ -420,9 +421,23 @@ def cfd(
     run_openfoam(folder, iterations, Progress(quiet=as_json))
     published = is_published(result.case)
     found = FlowComparison(case, read_fields(folder, len(case.cells.cells)), published)
-    (folder / "comparison.json").write_text(json.dumps(found.document(), indent=1) + "\n")
+    (folder / "comparison.json").write_text(json.dumps(json_value(found.document()), indent=1) + "\n")
     figures = save_figures(dict(draw(found)), plots)
     print_answer(found.document(), found.lines, as_json, (figures, plots), folder)
+
+
+def _viscosity(dynamic: float, density: float) -> float:
+    """Kinematic viscosity, m2/s, of a fluid of a density, kg/m3; of a liquid without one, 0 Pa s, that of water."""
+    from ..case.physics import LIQUID
+    from ..cfd.foam import WATER_VISCOSITY
+
+    if not dynamic and density < LIQUID:
+        raise CaseError(
+            f"fluid.viscosity is 'none' in a fluid of {density:.4g} kg/m3, a gas, whose flow in three dimensions needs "
+            "one; take a state of the case with 'air', or with that of the gas.",
+            key="fluid.viscosity",
+        )
+    return dynamic / density or WATER_VISCOSITY
 
 
 def _read_diameter(text: str) -> float | None:

@@ -136,7 +136,7 @@ class WriterLock:
             self._descriptor = -1
 
 
-def _check_folder(folder: Path) -> None:
+def check_folder(folder: Path) -> None:
     """Try a file without a name in a folder, or in the nearest that there is: nothing can stay behind of it."""
     while not folder.exists():
         folder = folder.parent
@@ -320,7 +320,7 @@ def check_writable(path: str | Path) -> None:
                     _lock(descriptor, path)
                 finally:
                     os.close(descriptor)
-            _check_folder(path.absolute().parent)
+            check_folder(path.absolute().parent)
     except OSError as error:
         raise unwritable(path, error) from None
     refuse_foreign(path)
@@ -332,10 +332,12 @@ def refuse_foreign(path: Path) -> None:
     Raises
     ------
     CaseError
-        If it is the name of a folder or of a file that is no result.
+        If it is the name of a folder, of a device, or of a file that is no result.
     """
     if path.is_dir():
         raise CaseError(f"{str(path)!r} is a folder; the result needs the name of a file.")
+    if path.exists() and not path.is_file():
+        raise CaseError(f"{str(path)!r} is no file that can hold a result; choose another name.")
     if path.exists() and path.stat().st_size and not _replaceable(path):
         raise CaseError(
             f"{str(path)!r} exists and is not a result of dbvfiv, so it is not overwritten; choose another name."
@@ -368,10 +370,16 @@ class Attachment:
     data: bytes
 
     def place(self) -> str:
-        """Name of a file with these contents: the original one, or a copy in the cache folder where that can be
-        written.
+        """Name of a file with these contents: the original one, or a copy in the cache folder. Where that cannot be
+        written the original name stands for a file that has gone.
+
+        Raises
+        ------
+        CaseError
+            Where it cannot be written, and the original one has other contents now.
         """
-        if _contents(Path(self.path)) == self.data:
+        now = _contents(Path(self.path))
+        if now == self.data:
             return self.path
         digest = hashlib.sha256(self.data).hexdigest()[:16]
         copy = cache_directory() / "attachments" / digest / Path(self.path).name
@@ -379,7 +387,12 @@ class Attachment:
             if _contents(copy) != self.data:
                 copy.parent.mkdir(parents=True, exist_ok=True)
                 copy.write_bytes(self.data)
-        except OSError:
+        except OSError as error:
+            if now is not None:
+                raise CaseError(
+                    f"{self.path!r} has changed since the result was made, and what it held cannot be put into "
+                    f"{str(copy.parent)!r} ({error.strerror}); DBVFIV_CACHE names another folder."
+                ) from None
             return self.path
         return str(copy)
 
@@ -478,9 +491,8 @@ class Header:
         """The case, with files that have gone or changed since put back from the attachments."""
         if not self.attachments:
             return self.case
-        return type(self.case).from_dict(
-            renamed(self.case.to_dict(), {one.path: one.place() for one in self.attachments})
-        )
+        data = renamed(self.case.to_dict(), {one.path: one.place() for one in self.attachments})
+        return type(self.case).from_dict(data, self.case.given)
 
 
 def versions() -> dict[str, str]:
@@ -511,6 +523,7 @@ def write_header(file: h5py.File, header: Header) -> None:
     case = file.create_group("case")
     case["toml"] = case_toml(header.case, comments=False)
     case["json"] = json.dumps(header.case.to_dict())
+    case["given"] = json.dumps(header.case.given)
     files = case.create_group("files")
     for number, attachment in enumerate(header.attachments):
         dataset = files.create_dataset(str(number), data=np.frombuffer(attachment.data, "u1"))
@@ -528,9 +541,10 @@ def read_header(file: h5py.File, case_model: type[Case]) -> Header:
     files = file["case/files"]
     attached = [Attachment(str(files[name].attrs["path"]), _bytes_of(files[name])) for name in sorted(files, key=int)]
     places = {one.path: one.place() for one in attached}
+    given = json.loads(file["case/given"].asstr()[()]) if "given" in file["case"] else None  # of an earlier version
     return Header(
         kind=str(attributes["dbvfiv_kind"]),
-        case=_case(renamed(json.loads(file["case/json"].asstr()[()]), places), case_model),
+        case=_case(renamed(json.loads(file["case/json"].asstr()[()]), places), case_model, given),
         versions={name: str(version) for name, version in file["versions"].attrs.items()},
         attachments=tuple(replace(one, path=places[one.path]) for one in attached),
         complete=bool(attributes["complete"]),
@@ -553,11 +567,11 @@ GONE = {
 }
 
 
-def _case(data: dict[str, Any], model: type[Case]) -> Case:
+def _case(data: dict[str, Any], model: type[Case], given: dict[str, list[str]] | None) -> Case:
     for section, names in GONE.items():
         for name in names:
             data.get(section, {}).pop(name, None)
     try:
-        return model.from_dict(data)
+        return model.from_dict(data, given)
     except CaseError as error:  # not the user's slip but the file's
         raise ValueError(f"its case cannot be used, {error}") from error

@@ -79,6 +79,8 @@ class Journal:
         known: Record | None = None,
     ):
         self.path = Path(path)
+        if self.path.is_symlink():  # the file that it leads to is replaced
+            self.path = self.path.resolve()
         self._tables = {table.name: table for table in tables}
         refuse_foreign(self.path)
         try:

@@ -18,6 +18,7 @@ from pydantic import create_model, model_validator
 from ..case.describe import page
 from ..case.load import key_path, read_case_file
 from ..case.model import Case as PhysicsCase
+from ..case.physics import LIQUID
 from ..case.quantity import head_of
 from ..case.section import BrokenRule, Section, key
 from ..case.write import case_toml
@@ -266,12 +267,12 @@ def _unanswered_rating(case: Case) -> Iterator[str]:
 
 
 #: Pressures of a liquid below which a number without its unit is meant, Pa: 5 mm of water, which crack no valve.
-_NO_PRESSURE, _LIQUID = 50.0, 300.0
+_NO_PRESSURE = 50.0
 
 
 def _forgotten_units(case: Case, kind: str | None) -> Iterator[str]:
     """Pressures of a liquid too small to be meant: a bare 5 is 5 Pa."""
-    if case.fluid.density < _LIQUID:
+    if case.fluid.density < LIQUID:
         return
     given = {}
     if kind is None:
@@ -306,7 +307,7 @@ def oddities(case: Case) -> Iterator[str]:
 def _gas(case: Case) -> Iterator[str]:
     """A density of a gas, with heads of it or a jet that compresses it."""
     density, over = case.fluid.density, case.drive.pressure - case.downstream.pressure
-    if density >= _LIQUID or case.drive.kind != "flow" or case.has_pump:
+    if density >= LIQUID or case.drive.kind != "flow" or case.has_pump:
         return
     if case.units.heads:
         yield (

@@ -9,9 +9,22 @@ import pytest
 from hypothesis import given as drawn
 from hypothesis import strategies as st
 
-from dbvfiv.app.see import arguments_of
-from dbvfiv.app.sheet import change, check, given, read_sheet, usual_value, write_sheet
+from dbvfiv.app.see import arguments_of, map_figure
+from dbvfiv.app.sheet import (
+    bring,
+    change,
+    check,
+    data_files,
+    given,
+    read_sheet,
+    stay_inside,
+    usual_value,
+    write_sheet,
+)
+from dbvfiv.app.worker import text_for_page
+from dbvfiv.case.valve import Valve
 from dbvfiv.errors import CaseError
+from dbvfiv.geometry import key_point_table
 from dbvfiv.studies.case import Case, load_case
 from tests.app.server import COARSE
 
@@ -34,6 +47,56 @@ def test_keys_are_set_and_taken_away(tmp_path):
     assert case.drive.pressure == pytest.approx(9806.65) and case.layers[0].thickness == 0.003
     change(data, "drive.pressure", " ")
     assert "pressure" not in data["drive"]
+
+
+def test_an_element_of_a_list_that_was_not_given_is_set_in_its_default(tmp_path):
+    """Keys of a layer without a value are left out of the text that drawing, questions and runs read."""
+    data = {}
+    change(data, "layers.0.thickness", "3 mm")
+    text = write_sheet(data)
+    assert "None" not in text and "None" not in write_sheet({"layers": [{"material": "CR", "begin": None}]})
+    assert read_sheet(text) == data
+    assert check(read_sheet(text), tmp_path).case == Case().replace({"layers.0.thickness": 0.003})
+
+
+def test_a_key_stands_in_the_place_of_one_that_says_the_same(tmp_path):
+    data = {"drive": {"head": "2 m"}}
+    change(data, "drive.pressure", "1 m")
+    assert check(data, tmp_path).case.drive.pressure == pytest.approx(9806.65)
+
+
+@pytest.mark.parametrize("form", ['"{}"', "'{}'"])
+@pytest.mark.parametrize("name", ["my points.txt", "data/POINTS.CSV", "{folder}/points.csv"])
+def test_a_case_brings_the_files_that_it_names(tmp_path, name, form):
+    """Under names that fit the page, wherever they are; a mark in front of its text is none of it."""
+    case, home = tmp_path / "cases/mine.toml", tmp_path / "home"
+    source = case.parent / name.format(folder=tmp_path)
+    for folder in (source.parent, case.parent, home):
+        folder.mkdir(parents=True, exist_ok=True)
+    source.write_text(key_point_table(Valve(), 17))
+    text = f"[valve]\nkey_points = {form.format(name.format(folder=tmp_path))}\n"
+    case.write_text(text, encoding="utf-8-sig")
+    brought = bring(case, home)
+    assert check(read_sheet(brought), home).case.valve.key_points == home / source.name
+    assert (brought == text) == (name == "my points.txt") and data_files(home) == [home / source.name]
+    source.write_text("later")
+    bring(case, home, anew=False)
+    assert (home / source.name).read_text() == key_point_table(Valve(), 17)
+
+
+def test_files_of_one_name_are_kept_apart(tmp_path):
+    (tmp_path / "cases/old").mkdir(parents=True)
+    for name in ("a.csv", "old/a.csv"):
+        (tmp_path / "cases" / name).write_text(f"pressure [kPa], flow [L/s]\n2, {len(name)}\n3, 9\n")
+    (tmp_path / "cases/mine.toml").write_text('[steady]\nmeasured = ["a.csv", "old/a.csv"]')
+    brought = read_sheet(bring(tmp_path / "cases/mine.toml", tmp_path))["steady"]["measured"]
+    assert brought == ["a.csv", "1-a.csv"] and "2, 9" in (tmp_path / "1-a.csv").read_text()
+
+
+def test_a_result_of_many_processes_is_a_case_of_the_page(tmp_path):
+    data = read_sheet(text_for_page(Case().replace({"map.workers": 4, "drive.pressure": 5e3})))
+    assert check(data, tmp_path).case == Case().replace({"drive.pressure": 5e3})
+    stay_inside({"map": {"workers": "tcp://10.0.0.1:8786"}}, runs=False)
 
 
 def test_a_sheet_is_the_case_of_its_file(tmp_path):
@@ -88,3 +151,40 @@ def test_pictures_begin_above_the_pressure_downstream():
     assert arguments_of(case, "Root locus over head") == ["--over", "pressure=5750:12500:10"]
     case = load_case(None, ["drive.pressure=10 kPa"])
     assert arguments_of(case, "Root locus over head") == ["--over", "pressure=1500:15000:10"]
+
+
+PICTURE = {"growth_rate": [[-2.0, 1.0]], "certified": [[True, False]], "onset_curves": []}
+
+
+def found_map(name: str, **more) -> dict:
+    axes = {"x": {"parameter": "pressure", "values": [1e3, 2e3]}, "y": {"parameter": name, "values": [1.0]}}
+    return {axis: row | {"log": False} for axis, row in axes.items()} | PICTURE | {"continuity": "storage"} | more
+
+
+@pytest.mark.parametrize(
+    ("name", "changes", "own"),
+    [
+        ("density", {}, 1000.0),
+        ("sealing", {"valve.sealing_pressure": 1.5e3}, 1.5),
+        ("thickness", {"valve.thickness_factor": 0.8}, 1.0),
+        ("angle", {"layers.2.angle": 40}, None),
+        ("sealing", {}, None),
+        ("pipe_length", {}, None),
+    ],
+)
+def test_the_star_of_a_map_stands_where_the_case_has_both_values(name, changes, own):
+    figure, _ = map_figure(Case().replace({"drive.pressure": 9806.65, **changes}), found_map(name))
+    stars = [(line["x"], line["y"]) for line in figure["data"] if line.get("name") == "this installation"]
+    assert stars == ([] if own is None else [([pytest.approx(1.0)], [pytest.approx(own)])])
+
+
+def test_a_map_of_both_flow_models_is_drawn_for_that_of_the_case():
+    """With its name; cells without a certificate are blank, and words below name the margins that are drawn."""
+    contours = [{"level": "4 %", "points": [[1e3, 1.0]]}]
+    laws = [PICTURE | {"continuity": "quasi-steady"}, PICTURE | {"continuity": "storage", "contours": contours}]
+    laws[1]["growth_rate"] = [[-3.0, 1.0]]
+    figure, said = map_figure(Case(), found_map("density", laws=laws))
+    assert figure["data"][0]["z"] == [[-3.0, None]] and figure["layout"]["title"]["text"] == "Flow model: storage"
+    assert "margin 4 %" in said and "margin 4 %" in [line.get("name") for line in figure["data"]]
+    figure, said = map_figure(Case(), found_map("density"))
+    assert figure["data"][0]["z"] == [[-2.0, None]] and "title" not in figure["layout"] and "margin" not in said

@@ -10,6 +10,7 @@ import sys
 from operator import attrgetter
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from dbvfiv.case import Case as PhysicsCase
@@ -19,6 +20,8 @@ from dbvfiv.case.key_points import read_key_points
 from dbvfiv.case.materials import shear_modulus_of
 from dbvfiv.case.measured import read_measured
 from dbvfiv.case.model import change_case
+from dbvfiv.case.parameters import PARAMETERS
+from dbvfiv.case.quantity import Quantity
 from dbvfiv.case.tables import read_drive_table, read_pump_table
 from dbvfiv.case.write import case_toml
 from dbvfiv.fit.curves import read_curves
@@ -95,6 +98,24 @@ def test_a_quantity_in_its_usual_unit_is_the_same_float():
         assert case.drive.pressure == number * 10.0
 
 
+@pytest.mark.parametrize(
+    ("given", "si", "value"),
+    [
+        ("3000 rpm", "Hz", 50.0),
+        ("200 rad/s", "Hz", 100 / math.pi),
+        ("360 deg/s", "Hz", 1.0),
+        ("2 kHz", "Hz", 2000.0),
+        ("60 1/min", "Hz", 1.0),
+        ("200 rad/s", "1/s", 200.0),
+        ("100 gpm", "m^3/s", 0.006309019640),
+        ("1 MGD", "m^3/s", 0.0438126363889),
+        ("2 cfs", "m^3/s", 0.056633693184),
+    ],
+)
+def test_units_of_the_trade_and_of_angular_velocities_in_hertz(given, si, value):
+    assert Quantity(si).parse(given) == pytest.approx(value, rel=1e-12)
+
+
 def test_overrides_win_over_the_file_and_each_other(tmp_path):
     file = tmp_path / "a.toml"
     file.write_text("[drive]\npressure = '2 kPa'\n[fluid]\ndensity = 10")
@@ -107,6 +128,10 @@ def test_replace_leaves_the_original_alone_and_checks_again():
     changed = case.replace({"drive.pressure": "36 kPa", "layers.2.angle": 45, "layers.3.angle": -45})
     assert changed.drive.pressure == 36e3 and [c.angle for c in changed.layers] == [0, 0, 45, -45, 0]
     assert case == Case()
+    counted = case.replace(
+        {"drive.pressure": np.int64(6000), "levels.pressures": [np.float32(2e3)], "modes.count": np.int64(2)}
+    )
+    assert (counted.drive.pressure, counted.levels.pressures, counted.modes.count) == (6e3, (2e3,), 2)
     with pytest.raises(CaseError, match="fluid.density"):
         case.replace({"fluid.density": -1})
 
@@ -243,6 +268,20 @@ def test_written_text_reads_back_as_the_same_case(tmp_path, changes, comments):
     assert Case.from_dict(case.to_dict()) == case
 
 
+@pytest.mark.parametrize("comments", [True, False])
+@pytest.mark.parametrize(
+    "override", ["drive.pressure=2 kPa", "steady.pressures=[2e3, 6e3]", "closure.rated_pressure=8e3"]
+)
+def test_written_text_asks_for_the_same_pressures(tmp_path, override, comments):
+    """Lists of pressures that were not given are not given in the text either."""
+    case = load_case(None, [override])
+    (tmp_path / "b.toml").write_text(case_toml(case, comments=comments))
+    again = load_case(tmp_path / "b.toml")
+    assert again == case and again.replace({"closure.rated_pressure": 2e3}).closure.pressures == (2e3, 3e3)
+    assert again.steady_pressures() == case.steady_pressures()
+    assert again.straining_pressures() == case.straining_pressures()
+
+
 def test_the_reference_page_is_up_to_date():
     assert (ROOT / "docs/case-reference.md").read_text() == page(Case), "run `make docs`"
 
@@ -324,6 +363,26 @@ def test_heads_in_ranges_are_those_of_the_fluid_of_the_case():
     weight = 1025 * 9.80665
     assert case.onset.axis.log and case.onset.axis.values[::7] == pytest.approx([0.1 * weight, 4 * 0.3048 * weight])
     assert case.sweep.axis.values == pytest.approx([weight, 1.5 * weight, 2 * weight])
+    case = case.replace(
+        {"onset.over": "sealing=0.1 m:.3 m:5", "map.y": "sealing=0.1 m,1. m", "sweep.over": "pressure=1. m:2 m:3"}
+    )
+    assert case.onset.axis.values[::4] == pytest.approx([0.1 * weight, 0.3 * weight])
+    assert case.map.axes[1].values == pytest.approx([0.1 * weight, weight]) and case.map.axes[1].parameter == "sealing"
+    assert case.sweep.axis.values[0] == pytest.approx(weight)
+
+
+@pytest.mark.parametrize("text", ["pressure=5,10,20 kPa", "pressure=0.5:50 kPa:64", "thickness=0.5:120 %:3"])
+def test_a_range_has_units_at_all_of_its_values_or_at_none(text):
+    """A bare number is SI, and seldom meant so beside one with another unit."""
+    with pytest.raises(ValueError, match="which has a unit at some of its values alone"):
+        parse_axis(text, tuple(PARAMETERS))
+
+
+@pytest.mark.parametrize(
+    "text", ["pipe_length=1,1e1,3e1 m", "pressure=5 Pa:1e-1 kPa:3", "alpha=5:20 1/s:3", "beta=0:20 s:3"]
+)
+def test_ranges_in_si_units_and_from_0_may_be_short(text):
+    assert parse_axis(text, tuple(PARAMETERS)).values[-1] in (30.0, 100.0, 20.0)
 
 
 def test_numbers_that_are_not_given_follow_from_the_model():
@@ -423,6 +482,15 @@ def test_override_stands_in_the_place_of_the_key_that_says_the_same(tmp_path, ov
     replaced = before.replace({name: override.partition("=")[2]})
     for key in (name, where):
         assert attrgetter(key)(before) != attrgetter(key)(after) == attrgetter(key)(replaced)
+
+
+@pytest.mark.parametrize("given", ['shear_modulus = "1 MPa"', 'hardness = "60 Shore A"'])
+@pytest.mark.parametrize(("key", "value"), [("hardness", "70 Shore A"), ("shear_modulus", 1.5e6)])
+def test_another_hardness_or_modulus_stands_in_the_place_of_either(tmp_path, given, key, value):
+    path = tmp_path / "case.toml"
+    path.write_text(f"materials.soft = {{ {given}, kind = 'neo-hookean', density = 1100 }}")
+    found = load_case(path, [f"materials.soft.{key}={value}"]).materials.named["soft"].shear_modulus
+    assert found == pytest.approx(shear_modulus_of(70.0) if key == "hardness" else value)
 
 
 @pytest.mark.parametrize(

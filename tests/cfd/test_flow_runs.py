@@ -143,12 +143,17 @@ def test_fields_of_the_last_iteration_are_written(state, iterations, end):
     assert times == end and times % interval == 0 and interval <= 100
 
 
-def test_a_state_with_gravity_is_refused(command_line, tmp_path, one_sentence):
-    keys = ["--set=mesh.around=6", "--set=mesh.along=8", "--set=gravity.direction=-z"]
+@pytest.mark.parametrize(
+    ("key", "blamed"), [("gravity.direction=-z", "gravity.direction"), ("fluid.density=1.2", "fluid.viscosity")]
+)
+def test_a_state_with_gravity_or_of_a_gas_without_viscosity_is_refused(
+    command_line, tmp_path, one_sentence, key, blamed
+):
+    keys = ["--set=mesh.around=6", "--set=mesh.along=8", f"--set={key}"]
     path = tmp_path / "up.h5"
     assert command_line("steady", "-p", "18 kPa", *keys, "-o", path).status == 0
     done = command_line("cfd", path, "--no-run", "-o", tmp_path / "flow")
-    assert done.status == 2 and one_sentence(done.err) and "gravity.direction" in done.err
+    assert done.status == 2 and one_sentence(done.err) and blamed in done.err
 
 
 def test_figures_are_drawn(state):

@@ -7,15 +7,18 @@ import subprocess
 import sys
 import tomllib
 import types
+from pathlib import Path
 
 import pytest
 import typer
 
 from dbvfiv.cli import main, run
 from dbvfiv.cli.main import build
+from dbvfiv.cli.studies import _report
 from dbvfiv.cli.terminal import print_json
 from dbvfiv.errors import CaseError, SolveError
 from dbvfiv.studies.case import Case, load_case
+from dbvfiv.studies.session import Session
 from tests.pages import ROOT
 
 
@@ -234,3 +237,21 @@ def test_a_case_file_that_cannot_be_written_is_refused_before_the_work(tmp_path,
         path.write_text("# of one's own\n")
     told = command_line(*(part.format(tmp_path) for part in command))
     assert told.status == 2 and re.search(words, told.err) and not told.out
+
+
+def test_a_folder_for_figures_that_cannot_be_made_is_refused_first(command_line, one_sentence, tmp_path, monkeypatch):
+    monkeypatch.setattr(Session, "perform", lambda *_, **__: pytest.fail("something was computed"))
+    (tmp_path / "file").write_text("")
+    done = command_line("steady", "-p", "6 kPa", "--plots", tmp_path / "file" / "figures")
+    assert done.status == 2 and "--plots" in done.err and one_sentence(done.err)
+
+
+def test_a_document_is_printed_where_a_figure_fails(capsys):
+    def plot(folder):
+        raise CaseError("No figure.")
+
+    record = types.SimpleNamespace(settled=None)
+    result = types.SimpleNamespace(plot=plot, drawable=True, summary=lambda: {"a": 1}, record=record)
+    with pytest.raises(CaseError, match="No figure"):
+        _report(result, None, Path("figures"), as_json=True)
+    assert json.loads(capsys.readouterr().out) == {"a": 1, "output": None, "figures": []}

@@ -1,9 +1,11 @@
 """Result files: what is written is read back, a stopped run keeps its states, broken files are told in a sentence."""
 
 import json
+import os
 import shutil
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import h5py
@@ -17,7 +19,8 @@ from dbvfiv.geometry import key_point_table
 from dbvfiv.materials.shipped import published_rubber
 from dbvfiv.model.equilibria import LoadPath
 from dbvfiv.observer import Observer
-from dbvfiv.record.files import Header, read_header, write_header
+from dbvfiv.record.files import Attachment, Header, kind_of, read_header, refuse_foreign, write_header
+from dbvfiv.record.record import Journal
 from dbvfiv.shell.recovery import layer_fields
 from dbvfiv.studies.case import Case
 
@@ -109,6 +112,19 @@ def _read(tmp_path, name="h.h5") -> Header:
         return read_header(file, Case)
 
 
+def test_a_kept_case_knows_which_keys_were_given(tmp_path, monkeypatch):
+    """What was not given is asked of no valve: a soft one bears the pressure of its case, and not the usual ones."""
+    monkeypatch.setenv("DBVFIV_CACHE", str(tmp_path / "cache"))
+    case = Case().replace({"drive.pressure": 1e3, "valve.wall_thickness": 0.01})
+    kept = _kept(tmp_path, case)
+    for again in (kept.case, replace(kept, attachments=(Attachment("none.csv", b""),)).rebuildable_case()):
+        assert again == case and again.given == case.given
+        assert again.steady_pressures() == (1e3,) and again.straining_pressures() == (1e3, None)
+    with h5py.File(tmp_path / "h.h5", "a") as file:
+        del file["case/given"]
+    assert _read(tmp_path).case.straining_pressures() == (50e3, 28e3)  # of an earlier version: every key
+
+
 LATIN = "# \u00b5\nfrequency,tan delta\n1,0.1\n200,0.2\n".encode("latin-1")
 
 
@@ -146,6 +162,32 @@ def test_key_points_that_are_gone_still_give_their_valve(tmp_path, monkeypatch):
     kept = _kept(tmp_path, case)
     points.unlink()
     assert kept.case == case and _read(tmp_path).case.valve.inlet_radius == pytest.approx(0.06)
+
+
+def test_a_file_that_has_changed_is_not_taken_for_the_one_that_was_kept(tmp_path, monkeypatch, one_sentence):
+    """Where the copy cannot be written either; one that has gone is missed where it is read."""
+    (tmp_path / "taken").write_text("a file where the cache should be")
+    monkeypatch.setenv("DBVFIV_CACHE", str(tmp_path / "taken"))
+    own = Attachment(str(tmp_path / "own.csv"), LATIN)
+    assert own.place() == own.path
+    Path(own.path).write_bytes(b"other")
+    with pytest.raises(CaseError, match="has changed since the result was made") as told:
+        own.place()
+    assert one_sentence(str(told.value))
+    Path(own.path).write_bytes(LATIN)
+    assert own.place() == own.path
+
+
+def test_a_result_takes_the_place_of_a_result_alone(tmp_path, one_sentence):
+    """Not of a device; where a link leads to one, that file."""
+    os.mkfifo(tmp_path / "pipe.h5")
+    with pytest.raises(CaseError, match="no file that can hold a result") as told:
+        refuse_foreign(tmp_path / "pipe.h5")
+    assert one_sentence(str(told.value)) and (tmp_path / "pipe.h5").is_fifo()
+    (tmp_path / "link.h5").symlink_to(tmp_path / "run.h5")
+    with Journal(tmp_path / "link.h5", Header.of("steady", Case()), None, ()):
+        pass
+    assert (tmp_path / "link.h5").is_symlink() and kind_of(tmp_path / "run.h5") == "steady"
 
 
 def test_texts_of_earlier_versions_are_read(tmp_path):

@@ -533,6 +533,8 @@ def test_without_a_printer_the_pdf_says_what_is_missing(made, monkeypatch, one_s
         (("--without", "mode"), "none of steady, heads"),
         (("--set", "report.heads=1 bar:2 furlong:3"), "report.heads"),
         (("-o", "/proc/none/page.html", "--without", "steady"), "cannot be written"),
+        (("-o", "my.h5"), "such as my.html"),
+        (("-o", "my.toml"), "such as my.html"),
     ],
 )
 def test_bad_arguments(command_line, one_sentence, arguments, words):

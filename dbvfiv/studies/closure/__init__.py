@@ -24,6 +24,8 @@ EXAMINED = 1.5
 class Keys(Section):
     """Back pressure on the outside, no flow."""
 
+    told_by_giving = ("pressures",)
+
     pressures: tuple[LoadPressure, ...] = key(
         _PRESSURES,
         "Static back pressures, outside over inside; where only a rated_pressure is given, the default ones below 1.5 "

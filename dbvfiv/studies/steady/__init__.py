@@ -29,6 +29,8 @@ ORDER = 20
 class Keys(Section):
     """Equilibria over a list of pressures."""
 
+    told_by_giving = ("pressures",)
+
     pressures: tuple[LoadPressure, ...] = key(
         (2e3, 6e3, 12e3, 18e3, 24e3, 29e3, 36e3, 50e3),
         "Static inlet pressures of the head-discharge curve.",

@@ -8,10 +8,11 @@ import typer
 from pydantic import StrictInt
 
 from ...case.axis import Axis, Range, parse_axis
+from ...case.model import Case
 from ...case.parameters import SWEPT, listed
-from ...case.quantity import Number, number_or_text
+from ...case.quantity import Number
 from ...case.section import Section, key
-from ..request import DensityOption, PressureOption, Request, over_option
+from ..request import DensityOption, PressureOption, Request, over_option, ranged_changes
 
 ORDER = 26
 
@@ -45,6 +46,7 @@ class Keys(Section):
 
 
 def command(
+    case: Case,
     over: Annotated[
         str | None, over_option(f"PARAMETER=START:STOP:COUNT[:log] of {listed(SWEPT)}; sweep.over without it.")
     ] = None,
@@ -66,11 +68,5 @@ def command(
     dbvfiv sweep cases/dbv12.toml -p "6 kPa" --set damping.alpha=0 --over density=1:1000:40:log -o sweep.h5 --plots
     figures
     """
-    changes = {
-        "sweep.over": over,
-        "sweep.count": count,
-        "sweep.symmetry": symmetry,
-        "drive.pressure": number_or_text(pressure),
-        "fluid.density": number_or_text(density),
-    }
-    return Request(changes)
+    changes = ranged_changes("sweep", case.sweep.over, over, pressure, density)
+    return Request(changes | {"sweep.count": count, "sweep.symmetry": symmetry})
