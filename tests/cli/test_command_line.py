@@ -2,6 +2,7 @@
 
 import json
 import os
+import re
 import subprocess
 import sys
 import types
@@ -13,6 +14,7 @@ from dbvfiv.cli import main, run
 from dbvfiv.cli.terminal import print_json
 from dbvfiv.errors import CaseError, SolveError
 from dbvfiv.studies.case import Case, load_case
+from tests.pages import ROOT
 
 
 def test_help_lists_every_command(command_line):
@@ -69,6 +71,12 @@ def test_failures_become_exit_statuses(monkeypatch, command_line, one_sentence, 
     assert outcome.status == status
     assert outcome.out == ""
     assert one_sentence(outcome.err), outcome.err
+
+
+def test_the_manual_has_every_exit_status():
+    said = (ROOT / "docs/questions.md").read_text().partition("Exit status: ")[2].partition(";")[0]
+    statuses = [int(number) for number in re.findall(r"\b\d+\b", main.run.__doc__.partition("Exit status: ")[2])]
+    assert [int(number) for number in re.findall(r"\b\d+\b", said)] == statuses == [0, 1, 2, 3, 130, 143]
 
 
 @pytest.mark.parametrize(("failure", "status"), [("KeyboardInterrupt()", 130), ("CaseError('It is wrong.')", 2)])
