@@ -47,7 +47,7 @@ def test_constants_and_an_opening(command_line, tmp_path):
     assert found["T5-1"]["numbers"][1]["ours"] == pytest.approx(0.1 / (2 * np.pi * 11))  # 2 xi/(w1 + w2)
     size = found["7-11"]["numbers"][0]
     assert size["published"] == 0.069 and 0.05 < size["ours"] < 0.065
-    page = (tmp_path / "thesis.html").read_text()
+    page = (tmp_path / "thesis-quick.html").read_text()
     assert all(f"entry-{name}" in page for name in names) and "a coarse mesh" in page
     kept = {path: path.stat().st_mtime_ns for path in (tmp_path / "quick").iterdir()}
     assert len(kept) == 1
