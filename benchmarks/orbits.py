@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from time import process_time
-
 import numpy as np
 
 from continuation import ContinuationOptions, continue_branch, equilibrium, orbits_from_hopf
 from tests.systems.brusselator import brusselator_1d
 
-from .registry import Row, benchmark, medians
+from .registry import Row, benchmark, medians, seconds
 
 #: Nodes of the Brusselator on a line, two unknowns each.
 NODES = 64
@@ -24,9 +22,8 @@ def orbits():
     options = ContinuationOptions(eigenvalues=4, near=2.2j, limits=limits)
     hopf = continue_branch(system, rest, mu, "l", options).of_kind("hopf")[0]
     steady = medians({"steady": lambda: equilibrium(system, 1.01 * rest, mu)}, 5)["steady"]
-    start = process_time()
-    branch = orbits_from_hopf(system, hopf, "l", ContinuationOptions(limits=limits))
-    taken = (process_time() - start) / len(branch)
+    whole, branch = seconds(lambda: orbits_from_hopf(system, hopf, "l", ContinuationOptions(limits=limits)))
+    taken = whole / len(branch)
     most = int(branch.values("harmonics").max())
     yield Row(
         "one orbit with its Floquet exponents over one steady state from a guess",

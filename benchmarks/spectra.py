@@ -24,7 +24,7 @@ REFERENCE = Mu(density=10.0, alpha=0.0, beta=3e-3)
 
 @benchmark("modes")
 def modes():
-    """Ten leading coupled pairs at one state, linearisation included."""
+    """Ten leading coupled pairs at one state, linearisation included but for the assembly of the tangent."""
     model = model_of(28, 48)
     q = find_equilibrium(model, 6e3).q
     factor = refactorisation(model, q)

@@ -14,7 +14,7 @@ from dbvfiv.studies.case import thesis_case
 from dbvfiv.studies.map.column import MapPlan
 from dbvfiv.studies.session import Session
 from dbvfiv.studies.stability.walk import StabilityWalk
-from eigen import leading_modes
+from eigen import Workspace, leading_modes
 
 from .registry import Row, benchmark, seconds
 
@@ -25,8 +25,8 @@ WORKERS = 2
 
 @benchmark("map")
 def stability_map():
-    """Two processes, their start included; the direct way on a sample of cells of the same map, steady states and
-    linearisations left out of its time.
+    """Two processes, their start included; the direct way on a sample of cells of the same map, the sparsity pattern
+    analysed once as the map does, steady states and linearisations left out of its time.
     """
     case = thesis_case(
         [
@@ -44,7 +44,7 @@ def stability_map():
     plan, walk = MapPlan(case), StabilityWalk(case)
     random = np.random.default_rng(1)
     picks = sorted((int(i), int(j)) for i, j in random.integers(0, CELLS, (SAMPLE, 2)))
-    direct, each = [], []
+    direct, each, workspace = [], [], Workspace()
     for part in (picks[: SAMPLE // 2], None, picks[SAMPLE // 2 :]):
         if part is None:  # in the middle, so that a slow spell of the machine meets both
             started, before = time.perf_counter(), _processor()
@@ -56,7 +56,7 @@ def stability_map():
             place = plan.place(plan.x.values[i], plan.y.values[j], plan.laws[0])
             family = walk.family(place)
             begun, own = time.perf_counter(), time.process_time()
-            spectrum = leading_modes(family.at(place), 6, family.search(place))
+            spectrum = leading_modes(family.at(place), 6, family.search(place), workspace=workspace)
             each.append((time.perf_counter() - begun, time.process_time() - own))
             direct.append((i, j, complex(spectrum.eigenvalues[0]), spectrum.unstable_count))
     one, one_work = np.median(each, axis=0)

@@ -13,6 +13,7 @@ import pytest
 import benchmarks
 from benchmarks.registry import BENCHMARKS
 from dbvfiv import cli
+from dbvfiv.case.parameters import PARAMETERS
 from dbvfiv.cli import main, studies
 from dbvfiv.studies import case as cases
 from tests.pages import ROOT, blocks, command_lines, indented_commands, pages, tables
@@ -92,6 +93,25 @@ def test_commands_can_be_given(page, only_parsed):
         shown += re.findall(r"`(dbvfiv [^`]+)`", page.read_text())
     wrong = {line: problem for line in shown if line.startswith("dbvfiv ") and (problem := only_parsed(line))}
     assert not wrong, wrong
+
+
+def test_options_named_in_the_text_are_those_of_their_command():
+    """Inline code such as `modes --law both`, with or without the program's name, up to an option's value."""
+    commands, wrong = main.build().commands, []
+    for page in PAGES:
+        for quoted in re.findall(r"`([^`\n]+)`", page.read_text()):
+            command, *words = quoted.removeprefix("dbvfiv ").split() or [""]
+            if command in commands:
+                known = [option for one in commands[command].params for option in (*one.opts, *one.secondary_opts)]
+                named = [word.partition("=")[0] for word in words if re.match("--[a-z]", word)]
+                wrong += [f"{page.name}: {quoted}" for option in named if option not in (*known, "--help")]
+    assert not wrong, wrong
+
+
+def test_the_manual_names_every_parameter():
+    """That of onsets and maps, where their ranges are told."""
+    (line,) = re.findall(r"^Parameters: .*$", (ROOT / "docs/stability.md").read_text(), re.M)
+    assert set(re.findall(r"`(\w+)`", line)) == set(PARAMETERS)
 
 
 def test_every_figure_says_which_command_makes_it(only_parsed):

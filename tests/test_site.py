@@ -43,6 +43,17 @@ def test_files_that_the_guide_to_the_code_names_are_there():
     assert missing == ["dbvfiv/flow/terms/NAME.py"]  # the reader's own
 
 
+def test_functions_that_the_guide_to_the_code_names_are_there():
+    """Those of `eigen`, by module and name, and rooms of the program, of which every one has a row."""
+    text = (DOCS / "developing.md").read_text()
+    for module, name in re.findall(r"`(\w+)\.(?!py`)(\w+)`", text):
+        if (path := ROOT / f"eigen/{module}.py").exists():
+            assert re.search(rf"^(def|class) {name}\b", path.read_text(), re.M), f"{module}.{name}"
+    rooms = {path.parent.name for path in (ROOT / "dbvfiv").glob("*/__init__.py")}
+    table = text.partition("## Rooms")[2].partition("\n## ")[0]
+    assert rooms - {name.rpartition("/")[2] for name in re.findall(r"`([\w/]+)/`", table)} == set()
+
+
 def test_equations_are_numbered_and_known_to_their_modules():
     """Each number stands at one equation, in the table with its modules, and in their docstrings."""
     text = (DOCS / "theory.md").read_text()

@@ -2,12 +2,12 @@
 
     python tools/onset_numbers.py [FILE.json] [MAP.h5] [KEY=VALUE ...]
 
-
 Densities at 1, 2, 4 and 6 kPa, and all pressures from 0.3 to 36 kPa at 1.2, 10 and 30 kg/m3, under both continuity laws
 (alpha 0, beta 0.003), each with direct eigenvalues and independent counts on both sides, criticality, and uncertainty
 from a mesh of half as many elements each way. Takes some tens of minutes on one core. An interrupted run goes on with
-the searches that are missing. With the result of `dbvfiv map --both` for the same damping it also measures how far the
-onsets lie from the map's curves, and whether the signs of its cells agree with them.
+the searches that are missing; a file of onsets with other keys is refused. With the result of `dbvfiv map --both` for
+the same damping it also measures how far the onsets lie from the map's curves, and whether the signs of its cells agree
+with them.
 """
 
 import json
@@ -30,10 +30,12 @@ LAWS = ("quasi-steady", "storage")
 
 def main(path: Path, keys: list[str]) -> None:
     """Write the onsets, of the case with some keys changed."""
-    base = [f"mesh.around={MESH[0]}", f"mesh.along={MESH[1]}", "damping.alpha=0", "damping.beta=0.003"]
-    case = thesis_case(base + keys)
+    keys = [f"mesh.around={MESH[0]}", f"mesh.along={MESH[1]}", "damping.alpha=0", "damping.beta=0.003", *keys]
+    kept = json.loads(path.read_text()) if path.exists() else {"keys": keys, "onsets": {}}
+    if kept.get("keys") != keys:
+        sys.exit(f"{path} holds onsets with the keys {kept.get('keys', 'of nobody knows what')}; give another file.")
+    done, case = kept["onsets"], thesis_case(keys)
     walk = StabilityWalk(case)
-    done = json.loads(path.read_text()) if path.exists() else {}
 
     def search(law: str, parameter: str, values, fixed: str, value: float) -> None:
         key = f"{parameter} {law} {value:g}"
@@ -51,7 +53,7 @@ def main(path: Path, keys: list[str]) -> None:
             "largest_growth_rate": float(max(leading)),
             "failures": list(found.failures),
         }
-        path.write_text(json.dumps(done, indent=1) + "\n")
+        path.write_text(json.dumps(kept, indent=1) + "\n")
         for line in rows(done[key]):
             print(line, flush=True)
 
@@ -98,7 +100,7 @@ def compare(numbers: Path, map_file: Path) -> None:
             f"curve of law {plan.laws[c.law]:g}: {len(c.x)} points, exact {c.exact}, largest distance of "
             f"{c.mismatch:.1e} from the columns' onsets"
         )
-    for key, entry in json.loads(numbers.read_text()).items():
+    for key, entry in json.loads(numbers.read_text())["onsets"].items():
         fixed, law = entry["fixed"], LAWS.index(entry["law"])
         for p in entry["points"]:
             place = {"pressure": fixed.get("pressure", p["value"]), "density": fixed.get("density", p["value"])}

@@ -2,8 +2,6 @@
 hysteresis?
 
 The densities are gone through downwards, from the steady state with a small kick, and upwards again; each run starts
-from dbvfiv.case.parameters import Mu
-from dbvfiv.case.parameters import Mu
 from the state in which the one before ended, or from a kick where that one had come to rest. Every run is kept in a
 file of the folder: a study that is started again reads those that are finished and goes on with the one that is not.
 The table (CSV) and the figure are written anew after each run. `--theory` adds the Hopf onset, its normal form and the

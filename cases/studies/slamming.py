@@ -111,7 +111,7 @@ def statistics(result, since: float, open_: float = 5.0) -> dict:
         "pressure_min_kPa": 1e-3 * float(h["station_pressure"][kept].min()),
         "work_in_a_step_J": float(work.max()),
         "work_J": float(h["pressure_work"][-1]),
-        "balance_J": float(np.abs(h["balance"] - h["numerical_loss"]).max()),
+        "balance_J": float(np.abs(h["balance"]).max()),
         "wall_kinetic_J": float(h["kinetic_energy"][kept].max()),
     }
 

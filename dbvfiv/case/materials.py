@@ -275,9 +275,9 @@ class Materials(Section):
         AUTO,
         "Strain level of the built-in rubbers CR, SBR and EPDM; between the tested levels "
         "10, 20, 40 and 60 % the constants are interpolated (10 %, the thesis). With auto each has the level that its "
-        "layers strain to at the largest pressure that the case names: of drive.pressure and steady.pressures, and of "
-        "closure.rated_pressure or closure.pressures where one is given. It is settled once, on 14 x 24 elements, to "
-        "0.1 %, and is the same in all studies.",
+        "layers strain to at the largest pressure that the case names: of drive.pressure, steady.pressures and "
+        "report.heads, and of closure.rated_pressure or closure.pressures where one is given. It is settled once, on "
+        "14 x 24 elements, to 0.1 %, and is the same in all studies.",
     )
     constants: Constants = key(
         "stable",

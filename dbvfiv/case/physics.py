@@ -38,7 +38,7 @@ class Shell(Section):
         "first-order",
         'Through-thickness metric: "first-order" of Budiansky and Sanders (the thesis) gives every layer the length of '
         'the mid-surface; "shifted" gives layers their own length, which is what layers of unlike stiffness want, and '
-        "is bounded where the wall folds.",
+        "is bounded where the wall folds; runs in time and cycles with loss factors take first-order alone.",
     )
     shear_correction_plies: Number = key(5 / 6, "Transverse-shear factor of fibre plies.", gt=0, le=1.5)
     shear_correction_rubber: Number = key(1.0, "Transverse-shear factor of all other layers.", gt=0, le=1.5)

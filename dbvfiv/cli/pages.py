@@ -127,7 +127,7 @@ def reproduce(
             print("\n".join(f"{e.name:>5}  {e.label}: {e.title}" for e in chosen))
         return
     workshop = Workshop(folder / ("quick" if quick else "full"), quick, Progress(quiet=as_json))
-    page = folder / "thesis.html"
+    page = folder / f"thesis{'-quick' if quick else ''}.html"
     done, parts, failures = [], [], []
     for entry in chosen:
         try:

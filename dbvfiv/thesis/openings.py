@@ -138,9 +138,9 @@ def _along_the_valve(workshop: Workshop):
     ]
     yield from numbers
     yield (
-        "Ours is Borda and Carnot's loss at the computed area in a tunnel of 12 inches; the thesis's factors differ "
-        f"from it by {spread(numbers)} and are said to depend on experiment. They lie above what its own flows give, "
-        "too."
+        "Ours is Borda and Carnot's loss at the computed area in a tunnel of 12 inches; it differs by "
+        f"{spread(numbers)} from the thesis's factors, which are said to depend on experiment and lie above what the "
+        "thesis's own flows give, too."
     )
     yield picture("thesis-7-9", "", lambda: figures.passage(result))
 

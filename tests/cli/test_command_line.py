@@ -80,6 +80,12 @@ def test_failures_become_exit_statuses(monkeypatch, command_line, one_sentence, 
     assert one_sentence(outcome.err), outcome.err
 
 
+def test_the_manual_has_every_exit_status():
+    said = (ROOT / "docs/questions.md").read_text().partition("Exit status: ")[2].partition(";")[0]
+    statuses = [int(number) for number in re.findall(r"\b\d+\b", main.run.__doc__.partition("Exit status: ")[2])]
+    assert [int(number) for number in re.findall(r"\b\d+\b", said)] == statuses == [0, 1, 2, 3, 130, 143]
+
+
 @pytest.mark.parametrize(("failure", "status"), [("KeyboardInterrupt()", 130), ("CaseError('It is wrong.')", 2)])
 def test_a_reader_that_has_left_changes_no_status(failure, status):
     script = f"""

@@ -7,12 +7,14 @@ from hypothesis import strategies as st
 
 import dbvfiv
 from dbvfiv.case import CaseError
+from dbvfiv.case.materials import Materials
 from dbvfiv.case.write import case_toml
 from dbvfiv.model.material_stability import tension_of
 from dbvfiv.model.strain_level import settle_levels
 from dbvfiv.studies.case import Case, load_case, thesis_case
 from dbvfiv.studies.session import Session
 from tests.observers import Stop
+from tests.pages import ROOT
 
 COARSE = {"mesh.around": 8, "mesh.along": 14}
 AUTO = COARSE | {"materials.strain_level": "auto"}
@@ -95,6 +97,7 @@ def test_pressures_at_which_levels_settle():
         "rated": {"drive.pressure": 6e3, "closure.rated_pressure": 12e3},
         "closed": {"drive.pressure": 6e3, "closure.pressures": [3e3, 5e3]},
         "closure": {"drive.pressure": 6e3, "closure.supports": "held-lips"},
+        "report": {"drive.pressure": 6e3, "report.heads": [2e3, 8e3]},
     }.items():
         pressures[name] = thesis_case(changes).straining_pressures()
     assert pressures == {
@@ -104,7 +107,12 @@ def test_pressures_at_which_levels_settle():
         "rated": (6e3, 12e3),
         "closed": (6e3, 5e3),
         "closure": (6e3, None),
+        "report": (8e3, None),
     }
+    said = Materials.model_fields["strain_level"].description
+    page = (ROOT / "docs/your-own-valve.md").read_text()
+    for key in ("drive.pressure", "steady.pressures", "report.heads", "closure.rated_pressure", "closure.pressures"):
+        assert key in said and f"`{key}`" in page
 
 
 def test_a_closed_valve_strains_its_rubbers():

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+from itertools import islice
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -10,6 +12,8 @@ import pytest
 from dbvfiv.thesis import ENTRIES, Number
 from dbvfiv.thesis.materials import deflections
 from dbvfiv.thesis.openings import layup
+from dbvfiv.verdict import judge_record
+from tests.verification.test_recovery import OURS
 
 
 def test_entries_stand_in_the_order_of_the_thesis():
@@ -43,7 +47,7 @@ def test_constants_and_an_opening(command_line, tmp_path):
     assert found["T5-1"]["numbers"][1]["ours"] == pytest.approx(0.1 / (2 * np.pi * 11))  # 2 xi/(w1 + w2)
     size = found["7-11"]["numbers"][0]
     assert size["published"] == 0.069 and 0.05 < size["ours"] < 0.065
-    page = (tmp_path / "thesis.html").read_text()
+    page = (tmp_path / "thesis-quick.html").read_text()
     assert all(f"entry-{name}" in page for name in names) and "a coarse mesh" in page
     kept = {path: path.stat().st_mtime_ns for path in (tmp_path / "quick").iterdir()}
     assert len(kept) == 1
@@ -66,6 +70,35 @@ def test_a_list_and_a_name_that_is_none(command_line, one_sentence, tmp_path):
     assert outcome.status == 0 and len(outcome.out.splitlines()) == len(ENTRIES)
     outcome = command_line("reproduce", "7-99", "-o", tmp_path)
     assert outcome.status == 2 and one_sentence(outcome.err) and "7-99" in outcome.err
+
+
+def told(name, workshop, count):
+    """First findings of an entry, before its pictures."""
+    return list(islice(next(entry for entry in ENTRIES if entry.name == name).tell(workshop), count))
+
+
+def test_losses_of_the_tunnel_differ_by_what_the_table_says():
+    """Areas of the lips on 28 x 48; ours lie below the thesis's."""
+    areas = {p: 0.25 * np.pi * 0.3048**2 * (1 - np.sqrt(k)) for p, k in OURS.items()}
+    result = SimpleNamespace(nearest=lambda p: SimpleNamespace(outlet_area=areas[p]))
+    *numbers, sentence = told("7-9", SimpleNamespace(steady=lambda pressures: result), 4)
+    assert [number.row[-1] for number in numbers] == ["-4.7 %", "-6.5 %", "-4.2 %"]
+    assert "it differs by -6.5 to -4.2 % from the thesis's factors" in sentence
+
+
+def test_the_flow_of_a_cycle_has_its_amplitude_and_only_that_of_a_cycle():
+    """Half the way between the extremes, so 2 of 3 + 2 sin."""
+    time = np.linspace(0.0, 2.0, 4001)
+    kinds = {"2 ms": 3 + 2 * np.sin(80 * np.pi * time), "1 ms": 3 + 1e-3 * np.exp(2 * time) * np.sin(80 * np.pi * time)}
+
+    def run(_kind, _changes, name):
+        found = judge_record(time, kinds.get(name, kinds["1 ms"]))
+        return SimpleNamespace(verdict={"verdict": found.name, "mass_flow": found.summary()})
+
+    workshop = SimpleNamespace(quick=False, duration=lambda full, quick: full, run=run)
+    number, other = told("7-14", workshop, 2)
+    assert number.what == "amplitude of the flow, 2 ms" and number.ours == pytest.approx(2.0, rel=1e-3)
+    assert other == "1 ms: growing, so no amplitude."
 
 
 @pytest.mark.slow

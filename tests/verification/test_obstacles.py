@@ -28,6 +28,9 @@ COURSE = {
     "thin twisted beam across": (lambda e, n: obstacles.twisted_beam(e, 2 * n, n // 4, 0.0032, 2), (4, 8, 16)),
 }
 
+#: Shares on 16 x 16 elements, of the plain element too, as docs/evidence/shell.md prints them.
+PRINTED = {"Cook's panel": (0.997, 0.978), "skewed hemisphere": (0.991, 0.948), "roof": (0.998, 0.989)}
+
 
 @pytest.mark.parametrize("name", COURSE)
 def test_obstacle(name):
@@ -38,17 +41,22 @@ def test_obstacle(name):
     steps = np.abs(np.diff(values))
     print(f"\n{name}: {dict(zip(meshes, np.round(values, 4)))}, orders {np.round(observed_order(steps), 2)}")
     print(f"  MITC4: {dict(zip(meshes, np.round(plain, 4)))}")
-    assert values[meshes.index(16)] == pytest.approx(1.0, abs=0.02)
+    found = values[meshes.index(16)], plain[meshes.index(16)]
+    assert found[0] == pytest.approx(1.0, abs=0.02)
+    assert found == pytest.approx(PRINTED.get(name, found), abs=6e-4)
 
 
-@pytest.mark.parametrize("shape, least", [("rectangles", 0.95), ("parallelograms", 0.62), ("trapezoids", 0.05)])
-def test_beam_of_six_elements(shape, least):
-    """MacNeal's slender cantilever loaded in its plane; 0.09, 0.03 and 0.03 with the plain element."""
+@pytest.mark.parametrize(
+    "shape, printed",
+    [("rectangles", (0.993, 0.093)), ("parallelograms", (0.632, 0.034)), ("trapezoids", (0.052, 0.027))],
+)
+def test_beam_of_six_elements(shape, printed):
+    """MacNeal's slender cantilever loaded in its plane, with the element and the plain one."""
     coarse, fine = (obstacles.straight_beam(ELEMENT, shape, 6 * k, k) for k in (1, 2))
     plain = obstacles.straight_beam("MITC4", shape)
     print(f"\n{shape}: 6 x 1 {coarse:.4f}, 12 x 2 {fine:.4f}, MITC4 6 x 1 {plain:.4f}")
-    assert coarse > least and fine > coarse - 1e-3
-    assert coarse > 1.8 * plain
+    assert (coarse, plain) == pytest.approx(printed, abs=6e-4)
+    assert fine > coarse - 1e-3
     assert obstacles.straight_beam(ELEMENT, shape, load=2) == pytest.approx(1.0, abs=0.04)  # across
 
 
@@ -88,6 +96,9 @@ def test_pinched_cylinder(skew):
     print(f"\npinched cylinder, skewed {skew}: {np.round(values, 4)}, orders {np.round(observed_order(1 - values), 2)}")
     assert np.all(np.diff(values) > 0)
     assert values[2] > 0.9 and values[3] == pytest.approx(1.0, abs=0.02)
+    if not skew:
+        plain = obstacles.pinched_cylinder("MITC4", 16, obstacles.regular)
+        assert (values[2], plain) == pytest.approx((0.933, 0.930), abs=6e-4)
 
 
 def test_pinched_cylinder_graded_to_its_dent():

@@ -71,6 +71,15 @@ def test_openings_of_the_six_inch_valve(given):
         held(table.place, [numbers(cell)[0] for cell in row], found)
 
 
+def test_flows_of_the_quick_start(given, command_line, tmp_path):
+    """Of the case that `dbvfiv case --new` writes, on its own mesh; test_tutorials follows the page on a coarse one."""
+    text, case = (ROOT / "docs/tutorials/quick-start.md").read_text(), tmp_path / "my.toml"
+    said = re.search(r"At 6, 18 and 36 kPa the flow is ([\d.]+), ([\d.]+) and ([\d.]+) kg/s", text)
+    assert command_line("case", "--new", case).status == 0
+    points = given(f"dbvfiv steady {case} -p '6 kPa' -p '18 kPa' -p '36 kPa'")["points"]
+    held("docs/tutorials/quick-start.md", list(said.groups()), [point["mass_flow"] for point in points])
+
+
 def test_flows_of_the_twelve_inch_valve(given):
     """In the comparison with the thesis, in the README and in the findings."""
     table = table_of("thesis.md", " | 18 kPa")

@@ -68,5 +68,5 @@ def test_balloon(load):
     limits = np.array([richardson(found[:, k]) for k in range(2)])
     values = limits[:, 1] + refined - found[1]
     print(f"\nP {load}: meshes {found.tolist()} step halved {in_time}; orders {limits[:, 0]}, limits {values}")
-    assert values == pytest.approx(REFERENCE[load], rel=5e-4)
+    assert np.all(np.abs(values / REFERENCE[load] - 1) < (5e-5, 3e-4))  # docs/evidence/time.md
     assert limits[:, 0] == pytest.approx(2.0, abs=0.3)

@@ -14,7 +14,7 @@ from matplotlib.figure import Figure
 from ...case.parameters import Mu
 from ...case.statement import QUANTITIES, Statement
 from ...case.write import case_toml
-from ...drawing.style import headline, limits, log_axis, new_figure
+from ...drawing.style import headline, limits, log_axis, new_figure, parameter_label
 from ...errors import SolveError
 from ...model.closed import close_valve
 from ...model.leading import other_end
@@ -465,7 +465,7 @@ def draw(result: StudyResult) -> Iterator[tuple[str, Callable[[], Figure]]]:
 
 
 def draw_heads(result: StudyResult) -> Figure:
-    """Margin, loss and opening over the inlet pressure, of the case and its designs."""
+    """Margin, loss and opening over the driving pressure, of the case and its designs."""
     figure = new_figure(9.6, 3.6)
     axes = figure.subplots(1, len(_DRAWN))
     several = len(result.best) > 1
@@ -476,7 +476,7 @@ def draw_heads(result: StudyResult) -> Figure:
             style = {"color": "0.45", "ls": "--"} if number < 0 else {}
             place.plot(rows["pressure"] / 1e3, factor * rows[name], marker="o", ms=3, label=label, **style)
     for place, (label, _) in zip(axes, _DRAWN.values()):
-        place.set_xlabel("Static inlet pressure, kPa")
+        place.set_xlabel(parameter_label(result.case, "pressure"))
         place.set_ylabel(label)
         log_axis(place.xaxis, *limits(result.verified(CASE)["pressure"] / 1e3, log=True))
     axes[0].axhline(0.0, color="0.25", lw=1.0)

@@ -27,8 +27,8 @@ def command(
     """Strain level of each rubber that agrees with what its layer strains (Eq. 7.1), and the flow with it.
 
     Each rubber has the constants of a level, 10 to 60 %; with them 99 % of its layer strain by less than so much; that
-    is the next level, until both agree. `materials.strain_level = "auto"` does the same at the pressure of any other
-    command.
+    is the next level, until both agree. `materials.strain_level = "auto"` does the same at the largest pressure that
+    the case names.
 
     dbvfiv levels cases/dbv12.toml -p "18 kPa" -p "36 kPa"
     """

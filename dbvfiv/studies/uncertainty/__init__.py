@@ -46,7 +46,7 @@ class Keys(RangeSection):
     method: Literal["plain", "rare", "subset"] = key(
         "plain",
         "Samples of the inputs as they are, or, at one state, (rare) about the inputs of a rare flutter, with weights, "
-        "or (subset) in levels towards it, which take ten times as many and assume nothing of where it lies.",
+        "or (subset) in levels towards it, which take 10 to 20 times as many and assume nothing of where it lies.",
     )
     continuity: Literal["case", "both"] = key(
         "case", "The flow model of the case, or both models with the same samples."

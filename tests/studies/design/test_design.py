@@ -8,8 +8,9 @@ import pytest
 import dbvfiv
 from dbvfiv.case.statement import parse_statement
 from dbvfiv.errors import CaseError
+from dbvfiv.studies.case import thesis_case
 from dbvfiv.studies.design.problem import DesignProblem, Variable, statements_of, together
-from dbvfiv.studies.design.study import CASE, DesignResult, _changed
+from dbvfiv.studies.design.study import CASE, DesignResult, _changed, draw_heads
 from dbvfiv.studies.inputs import Plan, quasi_random
 from dbvfiv.studies.stability.place import redesigned
 from dbvfiv.studies.stability.verdict import OUTCOMES
@@ -31,6 +32,16 @@ def valve():
 def found(valve, tmp_path_factory):
     folder = tmp_path_factory.mktemp("design")
     return valve.design(VARIABLES, aim=AIM, constraints=CONSTRAINTS, cases=folder, output=folder / "d.h5")
+
+
+def test_heads_are_drawn_over_the_pressure_that_drives():
+    """Behind a line that in its reservoir, which the axis called a static inlet pressure."""
+    case, one = thesis_case({"upstream.length": 20}), np.array([6e3, 9e3])
+    rows = {"pressure": one, "margin": 1e-5 * one, "loss_coefficient": 1e-3 * one, "opening": 1e-6 * one}
+    named = SimpleNamespace(name="line", text="as it is")
+    result = SimpleNamespace(case=case, best={0: None}, verified=lambda number: rows, header=named, statements=[named])
+    labels = {axes.get_xlabel() for axes in draw_heads(result).axes}
+    assert labels == {"Pressure in the reservoir, kPa"}
 
 
 LOSSY = {
