@@ -28,8 +28,8 @@ from .history import HISTORY, STATES, Keeper, Progress, Reader, tables_of
 
 #: Columns of a history by name.
 Columns = Mapping[str, np.ndarray]
-#: Smallest area over that of the lip gap at rest up to which faces shut a valve; those of a bill that is moulded shut
-#: part at another.
+#: Smallest area over that of lips in touch up to which faces shut a valve; those of a bill that is moulded shut part at
+#: another.
 SHUT = 0.5
 #: Load on the lips, over the unit of loads, from which stops bear one: rounding is some 1e-8 of that unit.
 BORNE = 1e-3
@@ -148,7 +148,7 @@ def assess(
 
 
 def shut_share(model: ValveModel) -> float:
-    """Smallest area over that of the lip gap at rest up to which the faces of a valve are shut."""
+    """Smallest area over that of lips in touch up to which the faces of a valve are shut."""
     return model.parting if model.case.valve.is_preset else SHUT
 
 
@@ -160,16 +160,16 @@ def parting(history: Columns, model: ValveModel) -> np.ndarray:
     if model.case.valve.is_preset:  # drawn without a gap
         middle = 0.5 * history["lip_opening"] / ((share - 1.0) * gap)
     else:
-        middle = (gap + history["lip_displacement"]) / (share * gap)
+        middle = (gap + model.lens + history["lip_displacement"]) / (share * gap)
     return np.minimum(history["smallest_area"] / (share * lip_gap(model)), middle)
 
 
 def openness(history: Columns, model: ValveModel) -> np.ndarray:
     """Distance of a valve from shut (k,), at most 1 where it is: passage and flows over those of a shut one.
 
-    Faces shut it where they leave at most `shut_share` of the gap at rest. Stops hold lips where they are at rest; they
-    shut it where nothing drives fluid out and as many as a row has bear a load, which the rounding of a valve that
-    stands at rest is not. A shut valve leaks at most what a jet through that gap carries.
+    Faces shut it where they leave at most `shut_share` of what lips in touch do. Stops hold lips where they are at
+    rest; they shut it where nothing drives fluid out and as many as a row has bear a load, which the rounding of a
+    valve that stands at rest is not. A shut valve leaks at most what a jet through that gap carries.
     """
     gap = lip_gap(model)
     area = history["smallest_area"] / (shut_share(model) * gap)
@@ -188,9 +188,8 @@ def openness(history: Columns, model: ValveModel) -> np.ndarray:
 
 
 def lip_gap(model: ValveModel) -> float:
-    """Flow area of the whole valve at the lip at rest, m2."""
-    mesh = model.mesh
-    return mesh.part.copies * float(mesh.rest_area[0] - mesh.wall_deduction[0])
+    """Flow area of the whole valve at the lip, m2, that lips in touch leave."""
+    return model.mesh.part.copies * model.mesh.lip_gap
 
 
 def beyond_model(history: Columns) -> str | None:

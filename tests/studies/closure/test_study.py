@@ -196,6 +196,16 @@ def test_the_opening_at_rest_is_the_gap_over_the_lips_width():
     assert passage.area[-1] == pytest.approx(0.25 * np.pi * inner**2, rel=0.02)
 
 
+def test_a_seventh_of_a_lens_is_open(case):
+    """Lips bowed apart by 40 mm are shut where they leave a fifth of their gap, and not before."""
+    model = ClosedValve(case.replace({"valve.lip_rise": "40 mm"}))
+    nodes, down = model.mesh.nodes, np.zeros((len(model.mesh.nodes), 5))
+    down[:, 1] = -6.0 / 7.0 * np.maximum(nodes[:, 1] - 6e-3, 0.0) * (nodes[:, 2] < 0.9 * case.valve.duckbill_length)
+    passage = model.passage(model.shell.dofs.restrict(down))
+    assert model.reference_opening == pytest.approx(4 * 1e-4 * 0.125, rel=0.05)
+    assert passage.left > 10 and not passage.shut_intervals
+
+
 @pytest.mark.slow
 def test_work_and_energies_balance_the_better_the_smaller_the_steps(case):
     """Work of the pressure against strain energy and energy of the contact, from the first touch on."""

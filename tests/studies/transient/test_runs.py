@@ -10,7 +10,7 @@ from dbvfiv.motion.control import Drive
 from dbvfiv.motion.start import steady_positions
 from dbvfiv.studies.case import thesis_case
 from dbvfiv.studies.session import load_result
-from dbvfiv.studies.transient.run import Runner, assess, beyond_model, lip_gap
+from dbvfiv.studies.transient.run import Runner, assess, beyond_model, lip_gap, parting
 
 from .runs import SHORT, transient
 
@@ -205,6 +205,19 @@ def test_a_valve_is_closed_that_is_shut_and_lets_nothing_flow(valve, share, flow
     """A passage of half the gap at rest or less is shut, if no more passes than leaks out of it."""
     model = valve()
     assert assess(made_history(model, share, flow), model).name == name
+
+
+@pytest.mark.parametrize("apart", [{"valve.lip_rise": 0.04}, {"valve.lip_radius": 0.01, "supports.contact": "faces"}])
+def test_lips_that_stand_apart_are_shut_where_they_meet(valve, apart):
+    """Two fifths of what they leave at rest is open, and a lip that swings about its place at rest meets nothing."""
+    model = valve(apart)
+    at_rest = model.mesh.part.copies * float(model.mesh.rest_area[0] - model.mesh.wall_deduction[0])
+    history = made_history(model, 0.4 * at_rest / lip_gap(model))
+    assert assess(history, model).name == "steady"
+    swing = 2e-4 * np.sin(2 * np.pi * 16.0 * history["time"])
+    assert assess(history | {"lip_displacement": swing}, model).name not in ("closed", "chatters")
+    assert np.allclose(parting(history | {"lip_displacement": np.full(101, -model.lens)}, model), 2.0)
+    assert assess(made_history(model, 0.4), model).name == "closed"
 
 
 def test_faces_that_part_and_meet_again_and_again_chatter(valve):
