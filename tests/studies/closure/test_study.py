@@ -4,6 +4,8 @@ depend on how it was found.
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from scipy.sparse import diags
@@ -12,7 +14,7 @@ from dbvfiv.errors import SolveError
 from dbvfiv.model.closed import ClosedValve, Passage, load_steps
 from dbvfiv.model.load_steps import LoadSteps
 from dbvfiv.studies.case import Case, thesis_case
-from dbvfiv.studies.closure.buckling import spectrum_of
+from dbvfiv.studies.closure.buckling import follow_past_limits, spectrum_of
 from dbvfiv.studies.session import Session
 from tests.observers import Stop
 from tests.small_valves import EVEN
@@ -146,16 +148,30 @@ def test_stiffness_is_followed_at_every_step(pressed):
     assert state.asymmetry < 1e-3
 
 
-@pytest.mark.slow
+@pytest.mark.parametrize("beyond", [(400.0, 500.0, 900.0, 2e3), (40.0, 50.0, 60.0, 70.0)])
 @pytest.mark.parametrize("count", [1, 2, 4])
 @pytest.mark.parametrize("least", [-500.0, -50.0, 10.0])
-def test_the_lowest_eigenvalue_is_found_behind_nearer_ones(least, count):
-    values = np.array([least, 30.0, 32.0, 35.0, 400.0, 500.0, 900.0, 2e3])
+def test_the_lowest_eigenvalue_is_found_behind_nearer_ones(least, count, beyond):
+    values = np.array([least, 30.0, 32.0, 35.0, *beyond])
     found = spectrum_of(diags(values).tocsr(), diags(np.ones(8)).tocsr(), 1e3, count)
     assert found.values.real == pytest.approx(values[:count]) == found.symmetric_values
     assert found.lowest == pytest.approx(least) and abs(found.shape[0]) == 1.0
 
 
+def test_the_eigenvalue_of_a_limit_point_is_the_one_that_vanishes():
+    """And not a lower one of bifurcations before it."""
+    stiffness = diags([-500.0, -30.0, 1e-9, 40.0, 50.0, 60.0, 70.0, 80.0]).tocsr()
+    shell = SimpleNamespace(dofs=SimpleNamespace(matrix=lambda part: part))
+    tangent = SimpleNamespace(stiffness=stiffness)
+    model = SimpleNamespace(shell=shell, tangent=lambda q, p: tangent, mass=lambda q: diags(np.ones(8)).tocsr())
+    at = 3e3, np.zeros(8), np.eye(8)[2]
+    curve = SimpleNamespace(model=model, limit_states=lambda: [at], pressures=[0.0, 4e3], states=[at[1]] * 2, reason="")
+    curve.extend = lambda target: None
+    (limit,) = follow_past_limits(curve, 4e3).limits
+    assert limit.eigenvalue == pytest.approx(1e-9, rel=1e-3)
+
+
+@pytest.mark.slow
 def test_without_arclength_a_walk_ends_at_its_limit_point(case):
     """A thin wall ends where arclength finds its first limit point, and says where."""
     thin = case.replace({"valve.thickness_factor": 0.25, "closure.max_step": "0.5 kPa"})
