@@ -198,7 +198,8 @@ def load_steps(model: ClosedValve) -> LoadStepOptions:
     jump = LARGEST_JUMP * float(np.mean(model.mesh.thickness))
     newton = NewtonOptions(steady.tolerance, steady.max_iterations)
     smallest = MIN_STEP if closure.arclength else MIN_STEP_TO_LIMIT
-    return LoadStepOptions(newton, smallest, closure.max_step / FIRST_SHARE, closure.max_step, jump)
+    gap = float(model.gaps(model.nodal(model.rest()))[model.mesh.rows[0]].max())
+    return LoadStepOptions(newton, smallest, closure.max_step / FIRST_SHARE, closure.max_step, jump, jump + gap)
 
 
 def close_valve(case: Case, pressure: float) -> tuple[ClosedValve, np.ndarray]:

@@ -15,6 +15,7 @@ from dbvfiv.model.closed import ClosedValve, Passage, load_steps
 from dbvfiv.model.load_steps import LoadSteps
 from dbvfiv.studies.case import Case, thesis_case
 from dbvfiv.studies.closure.buckling import follow_past_limits, spectrum_of
+from dbvfiv.studies.closure.walk import ClosureWalk
 from dbvfiv.studies.session import Session
 from tests.observers import Stop
 from tests.small_valves import EVEN
@@ -210,6 +211,16 @@ def test_the_opening_at_rest_is_the_gap_over_the_lips_width():
     # the flange is a circle of the inner radius
     inner = case.valve.flange_radius - 0.008
     assert passage.area[-1] == pytest.approx(0.25 * np.pi * inner**2, rel=0.02)
+
+
+def test_the_first_load_step_stays_on_the_path_from_rest_which_is_stable():
+    """At 50 Pa a step from rest ended with the lip curled up by 18 mm, and the walk went on from there."""
+    coarse = {"mesh.around": 6, "mesh.along": 10, "closure.max_step": "1 kPa"}
+    walk = ClosureWalk(ClosedValve(thesis_case(coarse)), SimpleNamespace(rows=lambda table: 0))
+    assert walk._resume() == 0 and walk.own._stable.pressure == 0.0 < walk.own._stable.lowest
+    steps = LoadSteps(walk.model, load_steps(walk.model))
+    steps.reach(50.0)
+    assert np.abs(walk.model.nodal(steps.q)[:, :3]).max() < 3e-4
 
 
 def test_a_seventh_of_a_lens_is_open(case):
