@@ -93,9 +93,11 @@ class LipSizes:
         corner = (0.25 * math.pi - 0.5 * turn) * (self.radius**2 - inner**2)
         if turn == 0:
             return corner + self.half_width * (half_wall - gap)
-        return (
-            corner + half_wall * self.bow_length - 0.5 * turn * half_wall**2 - max(self.widest - half_wall, 0.0) * gap
-        )
+        return corner + half_wall * self.bow_length - 0.5 * turn * half_wall**2 - self.slit(half_wall) * gap
+
+    def slit(self, half_wall: float) -> float:
+        """Width in m of the slit between inner faces half a wall (m) inside the section, of a quarter."""
+        return self.half_width if self.turn == 0 else max(self.widest - half_wall, 0.0)
 
 
 #: What key points say in place of the case's keys.

@@ -405,8 +405,6 @@ class FrozenFluid(MovingFluid):
     moves, but are not changed by it.
     """
 
-    moves = False
-
     def step(self, old, passage, h, theta, rate, inlet) -> FrozenStep:
         return FrozenStep(FluidStep(self.facing(old.area, old.speed, inlet), old, h, 1.0, 1.0, inlet), passage)
 

@@ -46,6 +46,9 @@ class ValveMesh:
         nodes.
     wall_deduction : (rows,) array, m2
         Area taken by the wall (Th. 4.12-4.14), less the initial gap.
+    lip_gap : float, m2
+        Area at the lip that lips in touch leave: the passage at rest, or what the initial gap is of it where they stand
+        apart there.
     perimeter : (rows,) array, m
         Arc of the inner face. A face inside a section of length L that turns by a right angle and takes the area T off
         it has the length (L^2 - pi T)^(1/2) (Steiner);
@@ -66,6 +69,7 @@ class ValveMesh:
     element_columns: np.ndarray
     rest_area: np.ndarray
     wall_deduction: np.ndarray
+    lip_gap: float
     perimeter: np.ndarray
     missed_rows: np.ndarray
     missed_columns: np.ndarray
@@ -75,6 +79,11 @@ class ValveMesh:
     def centre_line(self) -> np.ndarray:
         """(rows,) nodes in the middle of the lips and behind it, from the lip on."""
         return self.rows[:, self.part.centre(self.rows.shape[1])]
+
+    @property
+    def stands_apart(self) -> bool:
+        """True where the lips leave more than their gap at rest."""
+        return self.lip_gap < self.rest_area[0] - self.wall_deduction[0]
 
     @property
     def mirrored(self) -> np.ndarray | None:
@@ -145,6 +154,7 @@ def valve_mesh(valve: Valve, mesh: Mesh, column_breaks=(), parts: Sequence[Exten
         element_columns=np.tile(np.sort(np.abs([columns[:-1], columns[1:]]), axis=0).T, (mesh.along, 1)),
         rest_area=rest_area,
         wall_deduction=taken,
+        lip_gap=_lip_gap(valve, surface, float(rest_area[0] - taken[0])),
         perimeter=np.sqrt(np.array([surface.length(level) for level in z]) ** 2 - 2.0 * part.turn * taken),
         missed_rows=along.missed,
         missed_columns=across.missed,
@@ -162,6 +172,25 @@ def _element_thickness(valve: Valve, element_z: np.ndarray, across: np.ndarray) 
     the centre."""
     shares = np.tile(across, len(element_z) // len(across))
     return np.array([valve.thickness_at(level, share) for level, share in zip(element_z, shares)])
+
+
+#: Part of the gap by which the passage at rest exceeds it from which lips stand apart: areas of sections are rounded.
+_APART = 1e-3
+
+
+def _lip_gap(valve: Valve, surface: Surface, passage: float) -> float:
+    """Area, m2, that lips in touch leave of the passage at rest; those of a bill that is moulded shut touch at rest."""
+    slit = valve.initial_gap * _slit_width(valve, surface)
+    return slit if 0.0 < (1.0 + _APART) * slit < passage and not valve.is_preset else passage
+
+
+def _slit_width(valve: Valve, surface: Surface) -> float:
+    """Width of the slit between the inner faces, m, of the part."""
+    quarters, half = surface.part.quarters, valve.duckbill_wall_deduction
+    if valve.key_points is None:
+        return quarters * valve.lip.slit(half)
+    other, edge = surface.section(surface.breaks[0], np.array([surface.part.begin, 1.0]))[:, 0]
+    return max(edge - (0.0 if surface.part.is_quarter else other) - quarters * half, 0.0)
 
 
 #: Pieces of a section over which a wall that varies around it is summed up.
@@ -216,9 +245,8 @@ def _key_point_deductions(valve: Valve, surface: Surface) -> tuple[float, float,
     cuff = flange if valve.flare_length == 0 else valve.duckbill_length + valve.saddle_length
     halves = {"duckbill": valve.duckbill_wall_deduction, "flange": valve.flange_wall_deduction}
     for place, name, z in (("lip", "duckbill", lip), ("cuff", "flange", cuff), ("flange", "flange", flange)):
-        half, (other, edge) = halves[name], surface.section(z, np.array([surface.part.begin, 1.0]))[:, 0]
-        width = edge - (0.0 if surface.part.is_quarter else other)
-        gap = valve.initial_gap * max(width - surface.part.quarters * half, 0.0) if place == "lip" else 0.0
+        half = halves[name]
+        gap = valve.initial_gap * _slit_width(valve, surface) if place == "lip" else 0.0
         found.append(half * surface.length(z) - 0.5 * surface.part.turn * half**2 - gap)
         if found[-1] >= surface.area(z):
             raise ValueError(

@@ -123,9 +123,8 @@ def build_flow(case: Case, mesh: ValveMesh) -> FlowLaw:
     """Flow law of a case on the stations of its mesh."""
     if case.drive.kind == "uniform":
         return UniformLoad(len(mesh.z), 1.0 if case.drive.side == "inside" else -1.0)
-    gap_area = mesh.rest_area[0] - mesh.wall_deduction[0]
     storage = 1.0 if case.fluid.continuity == "storage" else 0.0
-    terms, floor = terms_of(case), case.film_share * gap_area
+    terms, floor = terms_of(case), case.film_share * mesh.lip_gap
     given = {"back": case.downstream.pressure, "perimeter": mesh.perimeter, "density": case.fluid.density}
     given |= _levels(case, mesh)
     bowed = case.mesh.inertia == "parabolic"

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -44,7 +45,7 @@ class Passage:
     area : (rows,) array, m2
         Between inner face and closing plane; overlapping faces count as shut.
     reference : float, m2
-        Area at the lip at rest.
+        Area at the lip at rest, or of lips that stand apart there what their gap is of it.
     shut_fraction : float
         A section is shut where less than this share of the reference is left.
     """
@@ -56,7 +57,7 @@ class Passage:
 
     @property
     def left(self) -> float:
-        """Narrowest section over that of the lip at rest."""
+        """Narrowest section over the reference."""
         return float(self.area.min() / self.reference)
 
     @property
@@ -134,13 +135,20 @@ class ClosedValve(ValveModel):
 
     def passage(self, q: np.ndarray) -> Passage:
         """Passage of a state (n,); at rest the lip has the initial gap at least."""
-        nodal, rows, valve = self.nodal(q), self.mesh.rows, self.case.valve
+        nodal, rows = self.nodal(q), self.mesh.rows
         gap, x = self._points(nodal)
-        at_rest, x_rest = self._points(np.zeros_like(nodal))
         area = area_under(gap[rows], x[rows])
         area[self.held] = 0.0
-        reference = float(area_under(np.maximum(at_rest[rows[:1]], valve.initial_gap), x_rest[rows[:1]])[0])
-        return Passage(self.mesh.z, area, reference, self.case.closure.shut_fraction)
+        return Passage(self.mesh.z, area, self._reference, self.case.closure.shut_fraction)
+
+    @cached_property
+    def _reference(self) -> float:
+        """Area, m2, that `Passage` compares with."""
+        if self.mesh.stands_apart:
+            return self.mesh.lip_gap
+        lip = self.mesh.rows[:1]
+        gap, x = (part[lip] for part in self._points(self.nodal(np.zeros(self.size))))
+        return float(area_under(np.maximum(gap, self.case.valve.initial_gap), x)[0])
 
     def _points(self, nodal: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Gap (nn,) and x position (nn,) of the inner face at all nodes; the clamped flange is no contact node but has
@@ -156,8 +164,10 @@ class ClosedValve(ValveModel):
 
     @property
     def reference_opening(self) -> float:
-        """Passage between the inner faces of the lip at rest, whole valve, m2."""
-        return self.mesh.part.copies * self.passage(np.zeros(self.size)).reference
+        """Passage between the inner faces of the lip at rest, whole valve, m2; that of touching lips where they stand
+        apart.
+        """
+        return self.mesh.part.copies * self._reference
 
     def start_warnings(self) -> Iterator[str]:
         """Warnings about where the inner face starts, and about supports that hold it."""
@@ -188,7 +198,8 @@ def load_steps(model: ClosedValve) -> LoadStepOptions:
     jump = LARGEST_JUMP * float(np.mean(model.mesh.thickness))
     newton = NewtonOptions(steady.tolerance, steady.max_iterations)
     smallest = MIN_STEP if closure.arclength else MIN_STEP_TO_LIMIT
-    return LoadStepOptions(newton, smallest, closure.max_step / FIRST_SHARE, closure.max_step, jump)
+    gap = float(model.gaps(model.nodal(model.rest()))[model.mesh.rows[0]].max())
+    return LoadStepOptions(newton, smallest, closure.max_step / FIRST_SHARE, closure.max_step, jump, jump + gap)
 
 
 def close_valve(case: Case, pressure: float) -> tuple[ClosedValve, np.ndarray]:

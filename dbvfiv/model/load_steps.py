@@ -38,6 +38,8 @@ class LoadStepOptions:
     largest_jump : float, m
         An equilibrium farther from the prediction than this is taken for one on another path, and the step is halved;
         so is one whose path from the last one is not resolved, see `ALIKE`.
+    first_jump : float, m
+        The same from where the walk starts, whose slope is not known.
     straight : int, optional
         Most iterations of a wide step, which is halved then: those that wander longer may end at another equilibrium,
         and two halves take fewer. Where the path ends, wide steps may wander.
@@ -48,6 +50,7 @@ class LoadStepOptions:
     first_step: float = np.inf
     max_step: float = np.inf
     largest_jump: float = np.inf
+    first_jump: float = np.inf
     straight: int | None = None
 
 
@@ -165,13 +168,14 @@ class LoadSteps:
         """The result of a solver, refused if it lies far from the prediction or if the path to it is not resolved, and
         dq/dP there.
         """
-        slope, limit = _slope(solver, result, pressure), self.options.largest_jump
-        if not result.converged or self.slope is None or not np.isfinite(limit):
+        slope = _slope(solver, result, pressure)
+        limit = self.options.first_jump if self.slope is None else self.options.largest_jump
+        if not result.converged or not np.isfinite(limit):
             return result, slope
         jump, move, reason = self._size(result.q - predicted), result.q - self.q, ""
         if jump > limit:
             reason = f"the equilibrium found lies {jump:.2g} m from the predicted one"
-        elif slope is not None and self._size(move) > SMALL * limit:
+        elif slope is not None and self.slope is not None and self._size(move) > SMALL * limit:
             sizes = [self._size(along) for along in (self.slope, slope, move / (pressure - self.pressure))]
             if max(sizes) > ALIKE * min(sizes):
                 reason = "the path to the equilibrium found is not resolved"

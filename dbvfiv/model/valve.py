@@ -399,6 +399,17 @@ class ValveModel(PressedShell):
         """Areas (m,), m2, that rough faces in contact leave, of a bill that is moulded shut: those at rest; else 0."""
         return 0.0 if self.shell.stress_free is None else self.rows.areas(self.nodal(self.rest()))
 
+    @cached_property
+    def lens(self) -> float:
+        """Height at rest, m, of the middle of one lip over where its face meets the other; 0 of lips that touch at rest
+        or rest on stops.
+        """
+        if self.contact is None or not self.mesh.stands_apart:
+            return 0.0
+        middle = int(np.searchsorted(self.contact.nodes, self.mesh.centre_line[0]))
+        left = (1.0 - self.case.film_share) * self.case.valve.initial_gap
+        return max(0.0, float(self.contact.start[middle]) - left)
+
     @property
     def parting(self) -> float:
         """Section in which the faces of a bill that is moulded shut just part, over that at rest, where they press on

@@ -116,7 +116,7 @@ class AdaptiveSteps:
                 if 0.5 * h < smallest:
                     raise
                 self.h, self.halvings = 0.5 * h, self.halvings + 1
-                self.stepper.forget(all=False)
+                self.stepper.retry()
                 continue
             if np.isnan(result.error):
                 return result
@@ -180,6 +180,10 @@ class Drive:
         return cls((0.0,), (case.drive.pressure,))
 
 
+#: Fewest adaptive steps between restart points: the error of a step behind one is not known.
+FEWEST = 20
+
+
 @dataclass(frozen=True)
 class RunOptions:
     """Options of a run.
@@ -237,6 +241,6 @@ class RunOptions:
             control=ControlOptions(t.step, t.adaptive, t.local_error, t.smallest_step),
             step=StepOptions(tolerance=t.tolerance),
             save_every=t.save_every,
-            restart_every=t.restart_every,
+            restart_every=max(t.restart_every, FEWEST) if t.adaptive else t.restart_every,
             stop_when=tuple(t.stop_when),
         )

@@ -373,6 +373,11 @@ class Stepper:
         self._factored: tuple[float, bool, float] | None = None
         self._past = Predictor()
 
+    def retry(self) -> None:
+        """Drop factors and what the predictor knows but the last step, by which the error of the next is told."""
+        self._factored = None
+        self._past.shorten()
+
     def take_back(self) -> None:
         """Forget the last step, which its caller does not go on from."""
         self._past.drop()

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from ..materials.shipped import shipped_loss, shipped_loss_names
-from ..studies.closure.safety import BUCKLING, CROSSING, END, SEAL, rated_verdict
+from ..studies.closure.safety import BUCKLING, CROSSING, END, OWN, SEAL, FirstBuckling, buckles_first, rated_verdict
 from ..studies.onset.search import NO_ONSET
 from ..studies.stability.verdict import DIVERGES, FLUTTERS, Verdict
 from ..texts import digits, listed
@@ -324,16 +324,16 @@ def seals(found: Gathered) -> Answer:
 
 def _collapse(result, rated: float) -> str:
     """Clause on a wall that gives way below a back pressure, Pa; empty where it does not."""
-    at, units = result.critical_pressure, result.case.units
-    if at is None or at >= rated:
+    first, units = buckles_first(result), result.case.units
+    if first is None or first.pressure >= rated:
         return ""
     below = "rated back pressure" if result.case.closure.rated_pressure is not None else "largest one examined"
-    return f"{_gives_way(result)} at {units.pressure(at, 3)}, below the {below}"
+    return f"{_gives_way(first)} at {units.pressure(first.pressure, 3)}, below the {below}"
 
 
-def _gives_way(result) -> str:
+def _gives_way(first: FirstBuckling) -> str:
     """Clause on a wall at its critical back pressure: at a limit point it snaps to a state far away."""
-    return "the wall collapses" if result.buckling[0].kind == "limit point" else "the wall buckles"
+    return "the wall collapses" if first.kind == "limit point" else "the wall buckles"
 
 
 def _seal(told: dict[str, Any]) -> str:
@@ -351,8 +351,9 @@ def _margin(result) -> str:
         return ""
     times = f", {safety.factor:.2f} times the rated" if result.case.closure.rated_pressure is not None else ""
     if safety.at_least:
-        return f"no limit up to {units.pressure(safety.followed_to, 3)}{times}"
-    limit = f"{_gives_way(result)} at" if safety.limit == BUCKLING else _LIMITS[safety.limit]
+        within = "" if result.classes else f" {OWN}"
+        return f"no limit{within} up to {units.pressure(safety.followed_to, 3)}{times}"
+    limit = f"{_gives_way(buckles_first(result))} at" if safety.limit == BUCKLING else _LIMITS[safety.limit]
     return f"{limit} {units.pressure(safety.limit_pressure, 3)}{times}"
 
 

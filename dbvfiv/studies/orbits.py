@@ -131,6 +131,11 @@ class Orbit:
         return -float(peak(-self.lip)), float(peak(self.lip))
 
     @property
+    def clearance(self) -> float:
+        """Least height of the middle of the lip over where it touches the other, m."""
+        return self.lip_extremes[0] + self.model.lens
+
+    @property
     def lip_harmonics(self) -> np.ndarray:
         """(H + 1,) amplitudes of the harmonics of the lip's displacement, m; the mean first."""
         number = self.model.shell.dofs.index[self.model.mesh.centre_line[0], 1]
@@ -206,6 +211,7 @@ class Follower:
         model = self.system.model(place.for_system())
         #: Number of the displacement in y of the lip at x = z = 0 among the unknowns.
         self.lip = int(model.shell.dofs.index[model.mesh.centre_line[0], 1])
+        self.lens = model.lens
 
     def from_onset(self, onset: Onset) -> tuple[Cycle, Cycle, Cycle]:
         """The steady state at an onset, as a cycle at rest, and two small cycles beside it, of the amplitude asked for
@@ -329,7 +335,7 @@ class Follower:
         shape = OrbitOptions(
             harmonics=1, max_harmonics=asked.max_harmonics, tail=asked.tolerance, exponents=asked.exponents
         )
-        events = {TOUCHING: lambda cycle: self.orbit(cycle).lip_extremes[0]}
+        events = {TOUCHING: lambda cycle: self.orbit(cycle).clearance}
         return CycleTracer(self.solver, self.name, options, shape, values, events)
 
     def orbit(self, cycle: Cycle) -> Orbit:

@@ -64,9 +64,19 @@ def test_bills_narrower_and_wider_than_the_pipe(half_width):
 
 def test_curved_lips_leave_a_lens_open():
     """Faces that start apart: the lens between two arcs of rise 8 mm and half width 125 mm, 2/3 of rise times width."""
-    _, mesh = mesh_of(lip_rise=0.008)
+    valve, mesh = mesh_of(lip_rise=0.008)
     lens = 2.0 / 3.0 * 0.008 * 0.125 + 0.125 * 1e-4
     assert mesh.rest_area[0] - mesh.wall_deduction[0] == pytest.approx(lens, rel=2e-2)
+    assert mesh.stands_apart and mesh.lip_gap == pytest.approx(1e-4 * (valve.lip.widest - 0.006), rel=1e-9)
+
+
+def test_lips_in_touch_leave_the_passage_at_rest_or_the_gap_alone():
+    for changes in ({}, {"lip_half_width": 0.3}, {"initial_gap": 5e-4}, {"sealing_pressure": 2e3}):
+        _, mesh = mesh_of(**changes)
+        assert not mesh.stands_apart and mesh.lip_gap == mesh.rest_area[0] - mesh.wall_deduction[0]
+    _, mesh = mesh_of(lip_radius=0.008)
+    assert mesh.rest_area[0] - mesh.wall_deduction[0] == pytest.approx(2.1e-3 * 0.125, rel=2e-2)
+    assert mesh.stands_apart and mesh.lip_gap == pytest.approx(1e-4 * 0.125)
 
 
 def test_cuff_and_flare():

@@ -73,6 +73,9 @@ def test_the_gap_of_a_bowed_lip_is_its_lens(make_model):
     gap = model.contact.state(model.rest()).gap[middle]
     inside = valve.duckbill_wall_deduction - (1 - model.case.fluid.area_floor) * valve.initial_gap
     assert gap == pytest.approx(valve.lip.height - inside, rel=1e-3)
+    assert model.lens == pytest.approx(valve.lip.height - valve.duckbill_wall_deduction, rel=1e-3)
+    assert make_model(**FACES).lens == make_model(valve__lip_radius=8e-3).lens == 0.0
+    assert model.flow.floor == pytest.approx(0.05 * 1e-4 * 0.125, rel=1e-2)
 
 
 @pytest.mark.slow

@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from dbvfiv.motion.control import ControlOptions, FixedSteps, step_control
+from dbvfiv.motion.control import AdaptiveSteps, ControlOptions, FixedSteps, RunOptions, step_control
 from dbvfiv.motion.equations import ValveMotion
 from dbvfiv.motion.scheme import scheme
 from dbvfiv.motion.start import steady_positions
@@ -166,7 +166,45 @@ class Fails:
         return SimpleNamespace(state=SimpleNamespace(time=state.time + h), error=0.0)
 
     def forget(self, all=True):
+        self.known = False
+
+    def retry(self):
         pass
+
+    def take_back(self):
+        self.taken.pop()
+
+
+class Misses(Fails):
+    """A stepper whose error, the cube of its step over 0.1 ms, is known where it has not forgotten its past."""
+
+    known = True
+
+    def step(self, state, h):
+        result = super().step(state, h)
+        result.error = (h / 1e-4) ** 3 if self.known else np.nan
+        return result
+
+
+def test_a_step_behind_a_failure_is_judged():
+    stepper = Misses((0.0, 1.0), 6e-4)
+    result = AdaptiveSteps(stepper, ControlOptions(1e-3, True, 1.0)).advance(SimpleNamespace(time=0.0), 1.0)
+    assert result.error < 3.0 and stepper.taken == [result.state.time] and stepper.taken[0] < 1.5e-4
+
+
+def test_few_adaptive_steps_go_without_a_judgement(valve):
+    for adaptive, every in ((True, 20), (False, 3)):
+        changes = {"transient.adaptive": adaptive, "transient.restart_every": 3}
+        assert RunOptions.of(valve(changes).case).restart_every == every
+
+
+@pytest.mark.parametrize("drop, known", [("retry", True), ("forget", False)])
+def test_a_stepper_remembers_the_last_step_for_a_retry(valve, open_state, drop, known):
+    motion = ValveMotion(valve({"fluid.density": 300.0}))
+    stepper = Stepper(motion, scheme("generalised-alpha", 0.1), lambda t: 12e3)
+    first = stepper.step(flowing(motion, open_state), 1e-3)
+    getattr(stepper, drop)()
+    assert np.isfinite(stepper.step(first.state, 5e-4).error) == known
 
 
 def test_halved_steps_come_back_to_the_grid():

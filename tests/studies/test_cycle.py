@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -15,6 +16,7 @@ from dbvfiv.motion.scheme import scheme
 from dbvfiv.motion.stepper import Stepper, consistent_state
 from dbvfiv.studies.case import thesis_case
 from dbvfiv.studies.life import Life, motion_of
+from dbvfiv.studies.orbits import Orbit
 from dbvfiv.studies.session import Session, load_result, resume_result
 from tests.observers import Stop
 
@@ -118,6 +120,12 @@ def test_a_record_is_the_run_that_it_is(tmp_path, command_line):
     assert lines[0]["says"].startswith("It is run")
     faster = beside(command_line, tmp_path, (0.5 * time, lip + noise), tmp_path / "run.h5", "--within", "1")
     assert faster[0]["says"].startswith("None of them")
+
+
+def test_lips_that_stand_apart_touch_where_their_faces_meet():
+    orbit = Orbit(SimpleNamespace(lens=3e-3), {}, None)
+    vars(orbit)["lip"] = 1e-3 - 2e-3 * np.cos(orbit.phases)
+    assert orbit.lip_extremes[0] == pytest.approx(-1e-3) and orbit.clearance == pytest.approx(2e-3)
 
 
 def test_values_asked_for_are_met(found):

@@ -17,6 +17,7 @@ LINE = {"upstream.length": 20.0, "upstream.diameter": 0.3, "upstream.friction": 
 DAMPED = {"damping.alpha": 0.0, "damping.beta": 1e-3}
 ROWS = [[0, 3.0], [0.03, 2.6], [0.06, 1.8], [0.1, 0.3]]
 PUMP = {"upstream.pump": ROWS}
+STAGGERED = {"transient.coupling": "staggered", "transient.duration": 0.04}
 
 
 def load(*keys):
@@ -72,9 +73,15 @@ def test_a_run_stays_at_the_operating_point_and_comes_back_to_it(operating):
     run = load(PUMP, steady, {"transient.duration": 0.04}).transient()
     assert np.abs(run.history["mass_flow"] / operating.mass_flow - 1).max() < 1e-9
     low = {"drive.pressure": 0.97 * operating.pressure, "transient.duration": 0.4}
-    away = load(PUMP, low, steady).transient().history["mass_flow"] / operating.mass_flow - 1
+    moved = load(PUMP, low, steady).transient()
+    away = moved.history["mass_flow"] / operating.mass_flow - 1
     slowest = load(PUMP).modes(count=1).modes[0]
     assert slowest.frequency == 0 and away[0] < -0.01
+    for name, run in (("monolithic", moved), ("staggered", load(PUMP, low, steady, STAGGERED).transient())):
+        flow, pressure = run.history["inlet_mass_flow"] / 1000.0, run.history["inlet_pressure"]
+        curve = PchipInterpolator(*np.array(ROWS).T)(flow)
+        assert pressure == pytest.approx(1000.0 * GRAVITY * curve, rel=1e-9), name
+        assert np.ptp(pressure) > 10.0
     assert away[-1] / away[50] == pytest.approx(np.exp(0.2 * slowest.growth_rate), rel=0.02)
 
 

@@ -31,6 +31,8 @@ from ...model.load_steps import LoadStepOptions, LoadSteps
 TOLERANCE = 1e-7
 #: Eigenvalues nearest to zero among which the lowest are looked for, at least.
 _FEWEST = 4
+#: Shift next to which lower eigenvalues are looked for, over the largest one known in magnitude.
+BELOW = 16.0
 #: How often a state that is not of the path is done without before the search for a nearer one ends.
 _REFUSALS = 6
 
@@ -96,19 +98,17 @@ def spectrum_of(stiffness, mass, pressure: float, count: int = 4, tolerance: flo
     """Lowest eigenvalues of two sparse matrices (n, n) by shift-and-invert Arnoldi (ARPACK) with sparse LU factors.
 
     Those nearest to zero are found, and what lies below them is looked for until nothing more is found: negative ones
-    may be farther from zero than many positive ones. It is a search and no proof.
+    may be farther from zero than many positive ones. It is a search and no proof: next to a shift, what lies below it
+    by more than the others above is not seen.
 
     Raises
     ------
     SolveError
         If the eigenvalues did not converge, or did not to the accuracy asked for.
     """
-    nearest, most = partial(_nearest, stiffness, mass), _among(count, stiffness)
+    nearest = partial(_nearest, stiffness, mass)
     try:
-        found = nearest(most, 0.0)
-        if found[2].max() > tolerance:
-            # An eigenvalue next to the shift drowns the others; stand off by a fraction of their distance.
-            found = nearest(most, -0.1 * float(np.abs(found[0]).max()))
+        found = _about_zero(nearest, _among(count, stiffness), tolerance)
         values, vectors, residuals = _with_those_below(found, nearest)
     except (spla.ArpackError, ArithmeticError) as error:
         raise SolveError(f"The lowest stiffness eigenvalues at {pressure:.6g} Pa were not found ({error}).") from error
@@ -118,6 +118,15 @@ def spectrum_of(stiffness, mass, pressure: float, count: int = 4, tolerance: flo
             f"{residuals.max():.2g} only, not to {tolerance:.2g}."
         )
     return StiffnessSpectrum(values[:count], vectors[:, :count], stiffness, mass)
+
+
+def _about_zero(nearest: Callable[[int, float], Sequence[np.ndarray]], count: int, tolerance: float = 1e-8):
+    """Eigenvalues nearest to zero with vectors and residuals."""
+    found = nearest(count, 0.0)
+    if found[2].max() > tolerance:
+        # An eigenvalue next to the shift drowns the others; stand off by a fraction of their distance.
+        found = nearest(count, -0.1 * float(np.abs(found[0]).max()))
+    return found
 
 
 def _among(count: int, matrix) -> int:
@@ -130,7 +139,7 @@ def _with_those_below(found: Sequence[np.ndarray], nearest: Callable[[int, float
     next to shifts farther down finds.
     """
     while True:
-        shift = -2.0 * float(np.abs(found[0]).max())
+        shift = -BELOW * float(np.abs(found[0]).max())
         below = nearest(1, shift)
         if not below[0].real[0] < found[0].real[0] + 1e-6 * shift:
             return found
@@ -313,8 +322,23 @@ def follow_past_limits(curve: LoadCurve, target: float) -> LimitPath:
     curve.extend(target)
     limits = []
     for pressure, q, shape in curve.limit_states():
-        values = stiffness_spectrum(curve.model, q, pressure, 2).values
-        nearest = float(values[np.argmin(np.abs(values))].real)
-        limits.append(Buckling("limit point", pressure, q, shape / shape[np.argmax(np.abs(shape))], nearest))
+        vanishing = _least_in_magnitude(curve.model, q, pressure)
+        limits.append(Buckling("limit point", pressure, q, shape / shape[np.argmax(np.abs(shape))], vanishing))
     points = list(zip(map(float, curve.pressures), curve.states))
     return LimitPath(points, limits, abs(points[-1][0] - target) <= 1e-9 * target, curve.reason)
+
+
+def _least_in_magnitude(model: Any, q: np.ndarray, pressure: float) -> float:
+    """Stiffness eigenvalue nearest to zero, 1/s2, of a state (n,) at a pressure, Pa.
+
+    Raises
+    ------
+    SolveError
+    """
+    matrix = model.shell.dofs.matrix
+    stiffness, mass = matrix(model.tangent(q, pressure).stiffness), matrix(model.mass(q))
+    try:
+        values = _about_zero(partial(_nearest, stiffness, mass), _among(1, stiffness))[0]
+    except (spla.ArpackError, ArithmeticError) as error:
+        raise SolveError(f"The stiffness eigenvalue that vanishes at {pressure:.6g} Pa was not found.") from error
+    return float(values[np.argmin(np.abs(values))].real)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -16,9 +16,11 @@ from .walk import BUCKLED_CLASS, CROSSED, LOWEST
 
 BUCKLING, SEAL, CROSSING, END = "buckling", "loss of seal", "faces crossing", "end of the path"
 MEANING = (
-    "Back pressure at the first limit met as it rises (buckling within the symmetry of the model, loss of seal, inner "
-    "faces crossing, end of the equilibria found) over the rated one"
+    "Back pressure at the first limit met as it rises (buckling {}, loss of seal, inner faces crossing, end of the "
+    "equilibria found) over the rated one"
 )
+#: Motions among which buckling was looked for: those of the path, or of every symmetry class.
+OWN, EVERY = "within the symmetry of the model", "in any symmetry class"
 
 
 @dataclass(frozen=True)
@@ -44,6 +46,8 @@ class SafetyFactor:
         The supports hold the lips shut, so that a loss of seal cannot be seen.
     is_rated : bool
         The case names a rated back pressure.
+    watched : str
+        Motions among which buckling was looked for: `OWN` or `EVERY`.
     """
 
     factor: float
@@ -54,10 +58,12 @@ class SafetyFactor:
     followed_to: float
     seal_assumed: bool = False
     is_rated: bool = False
+    watched: str = OWN
 
     def summary(self) -> dict[str, Any]:
         """Plain SI numbers for JSON."""
-        return {name: value for name, value in vars(self).items() if name != "is_rated"} | {"meaning": MEANING}
+        told = {name: value for name, value in vars(self).items() if name not in ("is_rated", "watched")}
+        return told | {"meaning": MEANING.format(self.watched)}
 
     @property
     def sentence(self) -> str:
@@ -68,7 +74,7 @@ class SafetyFactor:
             seal = "its seal is an assumption of the supports," if self.seal_assumed else "does not lose its seal,"
             return (
                 f"Safety factor at least {self.factor:.3g}: up to {self.followed_to / 1e3:.6g} kPa, {rated}, it does "
-                f"not buckle within the symmetry of the model, {seal} and its faces do not cross; "
+                f"not buckle {self.watched}, {seal} and its faces do not cross; "
                 "higher pressures tell more" + (", and so does closure.rated_pressure." if not self.is_rated else ".")
             )
         if self.limit == SEAL and not self.limit_pressure:
@@ -87,7 +93,8 @@ def find_safety(result: StudyResult) -> SafetyFactor | None:
     closure = result.case.closure
     rated, is_rated = closure.rated_pressure or max(closure.pressures), closure.rated_pressure is not None
     followed = rising[-1].pressure
-    limits = [(b.pressure, BUCKLING) for b in result.buckling[:1]]
+    first, watched = buckles_first(result), watched_by(result)
+    limits = [] if first is None else [(first.pressure, BUCKLING)]
     held = result.supports == HELD_LIPS
     if not held:
         limits += [(at, SEAL) for at in _last_before(rising, _lost_seal(rising))]
@@ -97,9 +104,35 @@ def find_safety(result: StudyResult) -> SafetyFactor | None:
     if result.walk_failure is not None and not result.buckling:
         limits.append((followed, END))
     if not limits:
-        return SafetyFactor(followed / rated, True, None, None, rated, followed, held, is_rated)
+        return SafetyFactor(followed / rated, True, None, None, rated, followed, held, is_rated, watched)
     pressure, limit = min(limits, key=lambda found: found[0])
-    return SafetyFactor(pressure / rated, False, limit, pressure, rated, followed, held, is_rated)
+    return SafetyFactor(pressure / rated, False, limit, pressure, rated, followed, held, is_rated, watched)
+
+
+class FirstBuckling(NamedTuple):
+    """Back pressure, Pa, at which a wall buckles first, and the kind of that state: "limit point", "bifurcation", or
+    "unstable" of a class that was not followed to where it buckles.
+    """
+
+    pressure: float
+    kind: str
+
+
+def buckles_first(result: StudyResult) -> FirstBuckling | None:
+    """Where a wall buckles first in any symmetry class that was watched: on its path the first state met, as the path
+    turns back beyond it; None where it does not.
+    """
+    found = [FirstBuckling(b.pressure, b.kind) for b in result.buckling[:1]]
+    for part in result.classes:
+        found += [FirstBuckling(b["pressure"], b["kind"]) for b in part.buckling]
+        if not part.buckling and part.unstable_from is not None:
+            found.append(FirstBuckling(part.unstable_from, "unstable"))
+    return min(found, default=None)
+
+
+def watched_by(result: StudyResult) -> str:
+    """Motions among which buckling was looked for, `OWN` or `EVERY`."""
+    return EVERY if result.classes else OWN
 
 
 def rated_verdict(result: StudyResult) -> dict[str, Any] | None:
@@ -120,7 +153,7 @@ def rated_verdict(result: StudyResult) -> dict[str, Any] | None:
         "shut": bool(state.closed) if seen else None,
         "sealed": state.leak == 0.0 if seen else None,
         "leak": state.leak if seen else None,
-        "buckles_at": result.critical_pressure,
+        "buckles_at": first.pressure if (first := buckles_first(result)) else None,
         "examined_to": safety.followed_to,
         "margin": safety.factor - 1.0,
         "at_least": safety.at_least,
@@ -146,9 +179,8 @@ def rated_sentence(result: StudyResult) -> str | None:
         still = " at most, as fluid.viscosity is none" if ideal else ""
         seal = f"{'shut' if told['shut'] else 'open'}, leak {digits(told['leak'] * 3.6e6)} L/h{still}"
         seal = "sealed, leak 0 L/h" if told["sealed"] else seal
-    buckles = (
-        f"no buckling up to {told['examined_to'] / 1e3:.6g} kPa" if at is None else f"buckles at {at / 1e3:.6g} kPa"
-    )
+    buckles = f"no buckling {watched_by(result)} up to {told['examined_to'] / 1e3:.6g} kPa"
+    buckles = buckles if at is None else f"buckles at {at / 1e3:.6g} kPa"
     least = "at least " if told["at_least"] else ""
     return f"{begin} {seal}; {buckles}; margin {least}{told['margin']:.0%}."
 
@@ -202,6 +234,11 @@ class ClassBuckling:
         return min((found["pressure"] for found in self.buckling), default=None)
 
     @property
+    def unstable_from(self) -> float | None:
+        """Lowest pressure, Pa, of an equilibrium that is unstable to motions of the class."""
+        return next((p for p, least in zip(self.pressures, self.lowest) if least <= 0), None)
+
+    @property
     def softest(self) -> int:
         """Number of the state with the lowest eigenvalue."""
         return min(range(len(self.lowest)), key=self.lowest.__getitem__)
@@ -224,6 +261,8 @@ class ClassBuckling:
         motion = f"class {self.symmetry} ({symmetry_named(self.symmetry).words})"
         if self.buckling:
             return f"Buckling in {motion} at {self.critical_pressure / 1e3:.6g} kPa."
+        if self.unstable_from is not None:
+            return f"Unstable in {motion} at {self.unstable_from / 1e3:.6g} kPa; where it buckles was not followed."
         share = self.lowest[self.softest] / self.lowest[0]
         return (
             f"No buckling in {motion} up to {max(self.pressures) / 1e3:.4g} kPa; the stiffness is least at "
@@ -288,9 +327,11 @@ def _buckling(result: StudyResult) -> list[str]:
     softest = result.softest
     if softest is None:
         return []
+    if softest.lowest_eigenvalue <= 0:
+        return [f"Unstable {OWN} at {softest.pressure / 1e3:.6g} kPa; where it buckles was not followed."]
     followed = [point for point in result.walk if np.isfinite(point.lowest_eigenvalue)]
     share = softest.lowest_eigenvalue / followed[0].lowest_eigenvalue
     return [
-        f"No buckling within the symmetry of the model up to {max(p.pressure for p in followed) / 1e3:.4g} kPa; the "
+        f"No buckling {OWN} up to {max(p.pressure for p in followed) / 1e3:.4g} kPa; the "
         f"stiffness is least at {softest.pressure / 1e3:.4g} kPa, {share:.0%} of that at the start."
     ]

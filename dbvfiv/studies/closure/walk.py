@@ -461,13 +461,17 @@ class ClosureWalk:
         return {"step": steps.step, "slope": self.model.nodal(steps.slope), "energy": self.energy.totals}
 
     def _resume(self) -> int:
-        """Stand at the last state that was asked for, if there is one, and say how many there are."""
-        record, steps = self.record, self.steps
-        rows = [row for row in range(record.rows(STATES)) if not self._value("before_limit", row)]
-        last = rows[-1] if rows else None
-        if last is None:
-            return 0
-        restrict = self.model.shell.dofs.restrict
+        """Stand at the last state that was asked for, or at rest, and say how many there are."""
+        rows = [row for row in range(self.record.rows(STATES)) if not self._value("before_limit", row)]
+        if rows:
+            self._take_up(rows[-1])
+        for watch in self.watches.values():
+            watch.see(self.steps.pressure, self.steps.q)
+        return len(rows)
+
+    def _take_up(self, last: int) -> None:
+        """Stand at the state of a row."""
+        record, steps, restrict = self.record, self.steps, self.model.shell.dofs.restrict
         steps.pressure, steps.step = float(self._value("pressure", last)), float(self._value("way/step", last))
         steps.q, steps.slope = restrict(self._value("nodal", last)), restrict(self._value("way/slope", last))
         self.energy.begin(steps.q, steps.pressure, steps.slope)
@@ -479,9 +483,6 @@ class ClosureWalk:
             self.own.found.append(Buckling(str(b["kind"]), float(b["pressure"]), q, shape, float(b["eigenvalue"])))
         self._kept[next(iter(self.watches))] = len(self.own.found)
         self._limit_met = bool(self.own.found)
-        for watch in self.watches.values():
-            watch.see(steps.pressure, steps.q)
-        return len(rows)
 
     def _value(self, column: str, row: int) -> Any:
         return self.record.value(STATES, column, row)

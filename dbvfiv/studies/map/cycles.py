@@ -30,7 +30,7 @@ _COLUMNS = (
     Column(
         "growing", "", "Dimension in which perturbations of the cycle grow; -1 without a cycle or where not asked", "i8"
     ),
-    Column("least", "m", "Least displacement of the lip over the cycle; the lips touch at zero"),
+    Column("least", "m", "Least displacement of the lip over the cycle; lips that touch at rest do so at zero"),
     Column(
         "residual", "", "Correction that the amplitude equation's residual asks for over the amplitude; NaN of branches"
     ),
@@ -141,7 +141,7 @@ def _answered(plan: MapPlan, near: CycleCells, follower: Follower, onset: Onset,
             if beside is None:
                 break
             equation, rest = follower.amplitude(beside)
-            if not equation.residual <= TRUSTED or rest + equation.extremes()[0] <= 0:
+            if not equation.residual <= TRUSTED or rest + follower.lens + equation.extremes()[0] <= 0:
                 break
             expected = beside.eigenvalue
             low, high = equation.extremes()

@@ -74,7 +74,9 @@ class Keys(Section):
     save_every: Time = key(
         0.0, "Distance in time of full states in the result file; zero keeps the first and the last.", ge=0, le=1e5
     )
-    restart_every: StrictInt = key(500, "Steps between restart points.", ge=1, le=10_000_000)
+    restart_every: StrictInt = key(
+        500, "Steps between restart points; of adaptive steps at least 20.", ge=1, le=10_000_000
+    )
     stop_when: tuple[Verdict, ...] = key(
         (),
         "Verdicts that end the run once they are certain: steady, decaying, limit cycle, growing, closed, chatters, "

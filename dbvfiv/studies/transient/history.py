@@ -52,6 +52,11 @@ class Instant:
         self.throat = int(np.argmin(load.area))
 
     @property
+    def inlet(self) -> float:
+        """Pressure at the far end, Pa: that of the drive, or of a pump at its flow."""
+        return supplied_pressure(self.motion, self.state, self.load.inlet)
+
+    @property
     def balance(self) -> float:
         """Energy gained less what has gone in and out."""
         books, memory = self.books, self.state.memory
@@ -84,6 +89,18 @@ class Instant:
     def touch(self) -> Any:
         """State of touching faces."""
         return self.model.contact.state(self.state.q)
+
+
+def pumped_flow(model: ValveModel, state: MotionState) -> float:
+    """Flow rate at the pump, m3/s."""
+    velocity, mesh = model.flow.far_velocity(state.fluid.inner), model.mesh
+    return mesh.part.copies * float(mesh.rest_area[-1] - mesh.wall_deduction[-1]) * velocity
+
+
+def supplied_pressure(motion: ValveMotion, state: MotionState, drive: float) -> float:
+    """Pressure at the far end, Pa: that of the drive, or of a pump at its flow."""
+    pump = motion.model.pump
+    return drive if pump is None or not motion.fluid.moves else pump.pressure(drive, pumped_flow(motion.model, state))
 
 
 def _whole(name: str, words: str, of: Callable[[Instant], Any], units: str = "J") -> Column:
@@ -127,7 +144,7 @@ _STOPS = "Lip stops, or nodes with their inner face, in contact, of the computed
 #: One number a step; of the whole valve.
 SCALARS = (
     Column("time", "s", "Time", read=lambda s: s.state.time),
-    Column("inlet_pressure", "Pa", _FAR_END, read=lambda s: s.load.inlet),
+    Column("inlet_pressure", "Pa", _FAR_END, read=lambda s: s.inlet),
     _whole("mass_flow", "Mass flow leaving at the lip", lambda s: s.flows[0], "kg/s"),
     _whole("inlet_mass_flow", "Mass flow entering at the flange", lambda s: s.flows[1], "kg/s"),
     _whole("outlet_area", "Flow area at the lip; below zero where lips cross", lambda s: s.load.area[0], "m^2"),

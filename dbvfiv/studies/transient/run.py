@@ -24,17 +24,15 @@ from ...record.record import GrowingRecord, Record, StoredRecord
 from ...record.states import state_table
 from ...verdict import JudgeOptions, Shuttings, Verdict, judge
 from ..case import Case
-from .history import HISTORY, STATES, Keeper, Progress, Reader, tables_of
+from .history import HISTORY, STATES, Keeper, Progress, Reader, pumped_flow, supplied_pressure, tables_of
 
 #: Columns of a history by name.
 Columns = Mapping[str, np.ndarray]
-#: Smallest area over that of the lip gap at rest up to which faces shut a valve; those of a bill that is moulded shut
-#: part at another.
+#: Smallest area over that of lips in touch up to which faces shut a valve; those of a bill that is moulded shut part at
+#: another.
 SHUT = 0.5
 #: Load on the lips, over the unit of loads, from which stops bear one: rounding is some 1e-8 of that unit.
 BORNE = 1e-3
-#: Pascal; no fluid's pressure falls further below that of the surroundings.
-ATMOSPHERE = 101_325.0
 #: Numbers of the mass flow that stand in the document of a verdict itself.
 NUMBERS = ("amplitude", "frequency", "mean", "cycles_observed", "periodicity_error")
 #: Kind of the note that says why the constants of the rubber do not hold at the state that was kicked.
@@ -147,8 +145,16 @@ def assess(
     return RunVerdict(*found, residual, len(time) - 1, float(time[-1]), chatter)
 
 
+def judged_from(time: np.ndarray, drive: Drive) -> float:
+    """Time, s, of a run up to a step from which on it is judged: where the drive holds still, once it has held for two
+    steps; else the start.
+    """
+    since = drive.settled_at
+    return since if np.count_nonzero(time >= since) > 1 else 0.0
+
+
 def shut_share(model: ValveModel) -> float:
-    """Smallest area over that of the lip gap at rest up to which the faces of a valve are shut."""
+    """Smallest area over that of lips in touch up to which the faces of a valve are shut."""
     return model.parting if model.case.valve.is_preset else SHUT
 
 
@@ -160,16 +166,16 @@ def parting(history: Columns, model: ValveModel) -> np.ndarray:
     if model.case.valve.is_preset:  # drawn without a gap
         middle = 0.5 * history["lip_opening"] / ((share - 1.0) * gap)
     else:
-        middle = (gap + history["lip_displacement"]) / (share * gap)
+        middle = (gap + model.lens + history["lip_displacement"]) / (share * gap)
     return np.minimum(history["smallest_area"] / (share * lip_gap(model)), middle)
 
 
 def openness(history: Columns, model: ValveModel) -> np.ndarray:
     """Distance of a valve from shut (k,), at most 1 where it is: passage and flows over those of a shut one.
 
-    Faces shut it where they leave at most `shut_share` of the gap at rest. Stops hold lips where they are at rest; they
-    shut it where nothing drives fluid out and as many as a row has bear a load, which the rounding of a valve that
-    stands at rest is not. A shut valve leaks at most what a jet through that gap carries.
+    Faces shut it where they leave at most `shut_share` of what lips in touch do. Stops hold lips where they are at
+    rest; they shut it where nothing drives fluid out and as many as a row has bear a load, which the rounding of a
+    valve that stands at rest is not. A shut valve leaks at most what a jet through that gap carries.
     """
     gap = lip_gap(model)
     area = history["smallest_area"] / (shut_share(model) * gap)
@@ -188,16 +194,21 @@ def openness(history: Columns, model: ValveModel) -> np.ndarray:
 
 
 def lip_gap(model: ValveModel) -> float:
-    """Flow area of the whole valve at the lip at rest, m2."""
-    mesh = model.mesh
-    return mesh.part.copies * float(mesh.rest_area[0] - mesh.wall_deduction[0])
+    """Flow area of the whole valve at the lip, m2, that lips in touch leave."""
+    return model.mesh.part.copies * model.mesh.lip_gap
 
 
-def beyond_model(history: Columns) -> str | None:
+def beyond_model(history: Columns, ambient: float) -> str | None:
     """Sentence on speeds and pressures beyond what the equations are for, None without any.
 
     An ideal incompressible fluid pays any price for passing a gap that shuts; a real one separates, cavitates or is
     compressed. What follows such an instant is the solution of the equations and no prediction.
+
+    Parameters
+    ----------
+    history : mapping of str to array
+    ambient : float, Pa
+        Absolute pressure of the surroundings; no fluid's pressure falls further below it.
     """
     fastest = np.asarray(history["mach"]) if "mach" in history else np.zeros(1)
     if fastest.max() > 1.0:
@@ -208,7 +219,7 @@ def beyond_model(history: Columns) -> str | None:
             "is a loss of head here, and the air that lips draw in then is a rough estimate."
         )
     lowest = np.min(history["station_pressure"], axis=1)
-    beyond = np.flatnonzero(lowest < -ATMOSPHERE)
+    beyond = np.flatnonzero(lowest < -ambient)
     if not len(beyond):
         return None
     time, share = history["time"][beyond[0]], len(beyond) / len(lowest)
@@ -408,7 +419,7 @@ class Runner:
         if not self.interrupted and not self.failures:
             self._checkpoint(needed=True)
         self.verdict = self._judge() if self.history.rows > 1 else None
-        if sentence := beyond_model(self.history):
+        if sentence := beyond_model(self.history, self.case.fluid.ambient_pressure):
             self.record.warn(sentence)
         return self
 
@@ -461,32 +472,23 @@ class Runner:
 
     def _judge(self) -> RunVerdict:
         state, model = self.progress.state, self.model
-        inlet, residual, since = self.drive(state.time), np.nan, 0.0
+        inlet, residual = self.drive(state.time), np.nan
         if state.time >= self.drive.settled_at:
-            since = self.drive.settled_at
-            if model.pump is not None and self.motion.fluid.moves:
-                inlet = model.pump.pressure(inlet, self._pumped(state))
+            inlet = supplied_pressure(self.motion, state, inlet)
             if inlet > model.flow.back:
                 scale = model.force_scale(state.q, inlet)
                 residual = float(np.linalg.norm(model.residual(state.q, inlet)) / scale)
-        if np.count_nonzero(self.history["time"] >= since) < 2:
-            since = 0.0
-        verdict = assess(self.history, model, residual, since=since)
+        verdict = assess(self.history, model, residual, since=judged_from(self.history["time"], self.drive))
         self.record.note("verdict", **verdict.summary())
         self.record.progress(f"{verdict.name}{'' if verdict.decided else '?'} at {state.time:.4g} s")
         return verdict
-
-    def _pumped(self, state: MotionState) -> float:
-        """Flow rate at the pump, m3/s."""
-        velocity, mesh = self.model.flow.far_velocity(state.fluid.inner), self.model.mesh
-        return mesh.part.copies * float(mesh.rest_area[-1] - mesh.wall_deduction[-1]) * velocity
 
     def _beyond_pump(self, state: MotionState) -> str:
         """Sentence where the flow has left the pump's table; empty otherwise."""
         pump = self.model.pump
         if pump is None or not self.motion.fluid.moves:
             return ""
-        flow = self._pumped(state)
+        flow = pumped_flow(self.model, state)
         if pump.holds(flow):
             return ""
         return (

@@ -12,7 +12,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from ...errors import CaseError
-from ...motion.control import RunOptions
+from ...motion.control import Drive, RunOptions
 from ...record.mesh import MeshData, WholeValve
 from ...record.record import GrowingRecord, Record
 from ...record.vtkhdf import Step
@@ -24,7 +24,7 @@ from ..stability.verdict import DIVERGES, FLUTTERS, STABLE, UNDECIDED, Verdict
 from ..state import StateSteps
 from . import figures
 from .history import HISTORY, RESTART, STATE_COLUMNS, STATES, rows_to_keep, tables_of
-from .run import NUMBERS, REFUSAL, Runner, assess
+from .run import NUMBERS, REFUSAL, Runner, assess, judged_from
 
 
 def run(session: Session, record: GrowingRecord) -> None:
@@ -160,7 +160,8 @@ class TransientResult(StudyResult):
         if not self.begun:
             return dict(_NO_VERDICT)
         # a run that goes on or was killed has an older one, or none
-        return assess(self.history, self.model).summary()
+        since = judged_from(self.history["time"], Drive.of(self.case))
+        return assess(self.history, self.model, since=since).summary()
 
     @cached_property
     def stability(self) -> Verdict | None:

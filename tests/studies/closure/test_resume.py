@@ -74,7 +74,6 @@ def test_a_walk_that_is_stopped_beyond_a_limit_meets_it_again(tmp_path):
     assert last.before_limit is not None and np.array_equal(last.before_limit.nodal, complete.before_limit.nodal)
 
 
-@pytest.mark.slow
 def test_what_buckles_in_another_class_is_said_again(whole):
     """By a walk that has seen no state itself."""
     walk, said = object.__new__(ClosureWalk), []
@@ -84,6 +83,7 @@ def test_what_buckles_in_another_class_is_said_again(whole):
     assert len(said) == 1 and said[0].startswith("The wall buckles at 7000 Pa in class SA: ")
 
 
+@pytest.mark.slow
 def test_a_killed_run_has_lost_no_finished_state(whole, tmp_path):
     path = tmp_path / "run.h5"
     words = [f"--set={key}={value}" for key, value in (THESIS | COARSE).items()]

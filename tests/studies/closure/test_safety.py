@@ -8,22 +8,33 @@ import numpy as np
 import pytest
 
 import dbvfiv
+from dbvfiv.report.answers import _collapse, _margin
 from dbvfiv.studies.case import thesis_case
-from dbvfiv.studies.closure.safety import find_safety
+from dbvfiv.studies.closure.safety import ClassBuckling, _buckling, find_safety, rated_sentence, rated_verdict
 from dbvfiv.studies.closure.walk import film_leak
 from dbvfiv.studies.session import load_result
 from tests.small_valves import FORMER
 
 
-def result(pressures, sealed, overlap=None, buckling=(), supports="contact", failure=None, **changes):
+def result(pressures, sealed, overlap=None, buckling=(), supports="contact", failure=None, classes=(), **changes):
     overlap = np.zeros(len(pressures)) if overlap is None else overlap
     walk = [
         SimpleNamespace(pressure=p, sealed_length=s, overlap=o, arclength=False)
         for p, s, o in zip(pressures, sealed, overlap)
     ]
     case = thesis_case({"closure.pressures": [max(pressures)]} | {f"closure.{k}": v for k, v in changes.items()})
-    buckled = [SimpleNamespace(pressure=p) for p in buckling]
-    return SimpleNamespace(walk=walk, case=case, buckling=buckled, supports=supports, walk_failure=failure)
+    buckled = [SimpleNamespace(pressure=p, kind="limit point") for p in buckling]
+    found = SimpleNamespace(walk=walk, case=case, buckling=buckled, supports=supports, walk_failure=failure)
+    found.classes, found.states = classes, [SimpleNamespace(pressure=p, beyond_limit=False) for p in pressures]
+    for state in found.states:
+        vars(state).update(closed=True, leak=0.0)
+    found.safety = find_safety(found)
+    return found
+
+
+def sway(lowest, *at):
+    """Buckling of the class of swaying lips, with its lowest stiffness at 1 and 2 kPa."""
+    return ClassBuckling("SA", (1e3, 2e3), lowest, tuple({"kind": "bifurcation", "pressure": p} for p in at))
 
 
 def test_without_a_limit_the_factor_is_a_lower_bound_and_says_so():
@@ -40,6 +51,29 @@ def test_the_first_of_several_limits_counts():
     found = find_safety(result([1e3, 7e3, 28e3], [0.1, 0.1, 0.1], buckling=[20e3, 9e3], rated_pressure=10e3))
     assert (found.limit, found.limit_pressure) == ("buckling", 20e3)  # as met: the path turns back beyond it
     assert not found.at_least and "buckling at 20 kPa" in found.sentence
+
+
+def test_buckling_in_another_class_is_a_limit():
+    asked = {"pressures": [1e3, 2e3], "sealed": [0.1, 0.1], "rated_pressure": 2e3}
+    for lowest, at, limit in (((1.0, -1.0), (1.2e3,), 1.2e3), ((10.0, -2.0), (), 2e3)):
+        found = result(classes=(sway(lowest, *at),), **asked)
+        assert (found.safety.limit, found.safety.limit_pressure) == ("buckling", limit)
+        assert rated_verdict(found)["buckles_at"] == limit
+        assert f"buckles at {limit / 1e3:g} kPa" in rated_sentence(found)
+        assert _collapse(found, 3e3).startswith("the wall buckles at") and _margin(found).startswith("the wall buckles")
+    every, own = result(classes=(sway((3.0, 2.0)),), **asked), result(**asked)
+    assert "in any symmetry class" in every.safety.summary()["meaning"] and not _collapse(every, 3e3)
+    assert _margin(every).startswith("no limit up to")
+    assert _margin(own).startswith("no limit within the symmetry of the model up to")
+    assert "no buckling within the symmetry of the model up to 2 kPa" in rated_sentence(own) and own.safety.at_least
+
+
+def test_a_class_that_is_unstable_without_buckling_is_not_said_to_hold():
+    assert sway((10.0, -2.0)).sentence.startswith("Unstable in class SA (the lips sway together in y) at 2 kPa")
+    assert sway((10.0, 2.0)).sentence.startswith("No buckling in class SA")
+    walk = [SimpleNamespace(pressure=p, lowest_eigenvalue=v) for p, v in ((1e3, -1.0), (2e3, -2.5))]
+    (said,) = _buckling(SimpleNamespace(buckling=(), walk=walk, softest=walk[1]))
+    assert said.startswith("Unstable within the symmetry of the model at 2 kPa")
 
 
 def test_a_seal_that_never_was_is_no_seal_that_was_lost():
@@ -89,7 +123,8 @@ def test_a_rated_valve_is_answered_up_to_one_and_a_half_times_its_rating():
     assert told["examined"] and told["pressure"] == 2e3 and told["examined_to"] == 3e3
     assert told["shut"] and not told["sealed"] and told["leak"] == found.states[0].leak > 0
     (sentence,) = (line for line in found.lines() if line.startswith("Rated back pressure 2 kPa"))
-    assert "L/h" in sentence and "no buckling up to 3 kPa" in sentence and "margin at least 50%" in sentence
+    assert "L/h" in sentence and "margin at least 50%" in sentence
+    assert "no buckling within the symmetry of the model up to 3 kPa" in sentence
 
 
 THIN = {

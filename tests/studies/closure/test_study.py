@@ -4,6 +4,8 @@ depend on how it was found.
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from scipy.sparse import diags
@@ -12,7 +14,8 @@ from dbvfiv.errors import SolveError
 from dbvfiv.model.closed import ClosedValve, Passage, load_steps
 from dbvfiv.model.load_steps import LoadSteps
 from dbvfiv.studies.case import Case, thesis_case
-from dbvfiv.studies.closure.buckling import spectrum_of
+from dbvfiv.studies.closure.buckling import follow_past_limits, spectrum_of
+from dbvfiv.studies.closure.walk import ClosureWalk
 from dbvfiv.studies.session import Session
 from tests.observers import Stop
 from tests.small_valves import EVEN
@@ -146,16 +149,30 @@ def test_stiffness_is_followed_at_every_step(pressed):
     assert state.asymmetry < 1e-3
 
 
-@pytest.mark.slow
+@pytest.mark.parametrize("beyond", [(400.0, 500.0, 900.0, 2e3), (40.0, 50.0, 60.0, 70.0)])
 @pytest.mark.parametrize("count", [1, 2, 4])
 @pytest.mark.parametrize("least", [-500.0, -50.0, 10.0])
-def test_the_lowest_eigenvalue_is_found_behind_nearer_ones(least, count):
-    values = np.array([least, 30.0, 32.0, 35.0, 400.0, 500.0, 900.0, 2e3])
+def test_the_lowest_eigenvalue_is_found_behind_nearer_ones(least, count, beyond):
+    values = np.array([least, 30.0, 32.0, 35.0, *beyond])
     found = spectrum_of(diags(values).tocsr(), diags(np.ones(8)).tocsr(), 1e3, count)
     assert found.values.real == pytest.approx(values[:count]) == found.symmetric_values
     assert found.lowest == pytest.approx(least) and abs(found.shape[0]) == 1.0
 
 
+def test_the_eigenvalue_of_a_limit_point_is_the_one_that_vanishes():
+    """And not a lower one of bifurcations before it."""
+    stiffness = diags([-500.0, -30.0, 1e-9, 40.0, 50.0, 60.0, 70.0, 80.0]).tocsr()
+    shell = SimpleNamespace(dofs=SimpleNamespace(matrix=lambda part: part))
+    tangent = SimpleNamespace(stiffness=stiffness)
+    model = SimpleNamespace(shell=shell, tangent=lambda q, p: tangent, mass=lambda q: diags(np.ones(8)).tocsr())
+    at = 3e3, np.zeros(8), np.eye(8)[2]
+    curve = SimpleNamespace(model=model, limit_states=lambda: [at], pressures=[0.0, 4e3], states=[at[1]] * 2, reason="")
+    curve.extend = lambda target: None
+    (limit,) = follow_past_limits(curve, 4e3).limits
+    assert limit.eigenvalue == pytest.approx(1e-9, rel=1e-3)
+
+
+@pytest.mark.slow
 def test_without_arclength_a_walk_ends_at_its_limit_point(case):
     """A thin wall ends where arclength finds its first limit point, and says where."""
     thin = case.replace({"valve.thickness_factor": 0.25, "closure.max_step": "0.5 kPa"})
@@ -194,6 +211,26 @@ def test_the_opening_at_rest_is_the_gap_over_the_lips_width():
     # the flange is a circle of the inner radius
     inner = case.valve.flange_radius - 0.008
     assert passage.area[-1] == pytest.approx(0.25 * np.pi * inner**2, rel=0.02)
+
+
+def test_the_first_load_step_stays_on_the_path_from_rest_which_is_stable():
+    """At 50 Pa a step from rest ended with the lip curled up by 18 mm, and the walk went on from there."""
+    coarse = {"mesh.around": 6, "mesh.along": 10, "closure.max_step": "1 kPa"}
+    walk = ClosureWalk(ClosedValve(thesis_case(coarse)), SimpleNamespace(rows=lambda table: 0))
+    assert walk._resume() == 0 and walk.own._stable.pressure == 0.0 < walk.own._stable.lowest
+    steps = LoadSteps(walk.model, load_steps(walk.model))
+    steps.reach(50.0)
+    assert np.abs(walk.model.nodal(steps.q)[:, :3]).max() < 3e-4
+
+
+def test_a_seventh_of_a_lens_is_open(case):
+    """Lips bowed apart by 40 mm are shut where they leave a fifth of their gap, and not before."""
+    model = ClosedValve(case.replace({"valve.lip_rise": "40 mm"}))
+    nodes, down = model.mesh.nodes, np.zeros((len(model.mesh.nodes), 5))
+    down[:, 1] = -6.0 / 7.0 * np.maximum(nodes[:, 1] - 6e-3, 0.0) * (nodes[:, 2] < 0.9 * case.valve.duckbill_length)
+    passage = model.passage(model.shell.dofs.restrict(down))
+    assert model.reference_opening == pytest.approx(4 * 1e-4 * 0.125, rel=0.05)
+    assert passage.left > 10 and not passage.shut_intervals
 
 
 @pytest.mark.slow
