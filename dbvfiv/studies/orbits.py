@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -12,12 +12,14 @@ from continuation.amplitude import AmplitudeEquation, amplitude_equation
 from continuation.cycle_branch import CycleTracer
 from continuation.cycle_points import CyclePoint, SpecialCycle
 from continuation.cycles import Cycle, CycleSolver, cycles_beside_onset
-from continuation.options import ContinuationError, ContinuationOptions, OrbitOptions
+from continuation.options import ContinuationError, ContinuationOptions, OrbitOptions, OutOfDomain
 from continuation.periodic import PeriodicMotion, peak
 
 from ..case.parameters import PARAMETERS, Mu
 from ..errors import SolveError
+from ..flow.law import FlowLaw
 from ..flow.stepping import MovingFluid
+from ..flow.terms.pump import with_static_lift
 from ..model.forms import ValveForms
 from ..model.state import LipCentre
 from ..model.valve import ValveModel
@@ -200,12 +202,36 @@ class Follower:
 
     def __init__(self, case: Case, walk: StabilityWalk, place: Mu, parameter: str, spectrum):
         self.case, self.walk, self.place, self.parameter = case, walk, place, parameter
-        self.system = PeriodicValve(models_of(case, walk.built(Mu.of(case)).model), place.for_system())
+        self._flows: dict[float, FlowLaw] = {}
+        models = models_of(case, walk.built(Mu.of(case)).model)
+        flow = self._flow if models(place.for_system()).pump is not None else None
+        self.system = PeriodicValve(models, place.for_system(), flow)
         self.solver = CycleSolver(self.system, _basis(self.system, spectrum))
         self.name = PARAMETERS[parameter].system_name or parameter
         model = self.system.model(place.for_system())
         #: Number of the displacement in y of the lip at x = z = 0 among the unknowns.
         self.lip = int(model.shell.dofs.index[model.mesh.centre_line[0], 1])
+
+    def _flow(self, mu: Mapping[str, float]) -> FlowLaw:
+        """Flow law behind a pump, with the static lift that makes the pressure that of the steady state, as spectra
+        have it.
+
+        Raises
+        ------
+        OutOfDomain
+            If there is no steady state.
+        """
+        value, model = float(mu[self.name]), self.system.model(mu)
+        if value not in self._flows:
+            if len(self._flows) > 8:
+                self._flows.clear()
+            try:
+                q = self.walk.equilibrium(self.place.at(**{self.parameter: value}))
+            except SolveError as error:
+                raise OutOfDomain(f"Behind a pump cycles need the steady state: {error}") from error
+            area = model.rows.areas(model.nodal(q))
+            self._flows[value] = with_static_lift(model.flow, area, model.flow.steady_inner(area, mu), mu)
+        return self._flows[value]
 
     def at_rest(self, onset: Onset) -> Cycle:
         """The steady state at an onset, as a cycle at rest.
