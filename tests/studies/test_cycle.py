@@ -171,13 +171,15 @@ def test_file_figures_and_fields(found, file, tmp_path):
 
 def test_interrupted_and_resumed(found, tmp_path):
     path = tmp_path / "part.h5"
-    part = session_of(cycle__exponents=0).perform("cycle", path, Stop(2))
-    assert part.interrupted and len(part.points) == 2 and part.points[0].stable is None
+    part = session_of(cycle__exponents=0).perform("cycle", path, Stop(3))
+    assert part.interrupted and len(part.points) == 3 and part.points[0].stable is None
     whole = resume_result(path)
     assert whole.complete and np.allclose(
         [p.amplitude for p in whole.points[:2]], [p.amplitude for p in found.points[:2]]
     )
     assert whole.points[-1].value == 230.0
+    # the same steps, so also the cycles between those that were asked for
+    assert np.allclose([p.value for p in whole.points], [p.value for p in found.points], rtol=1e-5)
     assert np.isclose(whole.points[-1].amplitude, found.points[-1].amplitude, rtol=1e-4)
     with pytest.raises(CaseError, match="nothing to resume"):
         resume_result(path)
