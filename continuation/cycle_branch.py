@@ -48,6 +48,8 @@ from continuation.tracer import KNOWN
 
 #: Change of the parameter over its unit that is rounding.
 STILL = 1e-9
+#: Change of it from an origin, which is located no closer, that counts.
+BEGUN = 1e-4
 
 
 class CycleTracer:
@@ -75,6 +77,8 @@ class CycleTracer:
         Why it ended.
     next_step : float
         Arclength step that the step control takes next.
+    known : list
+        Kinds (or titles) and values of special points that an earlier run has reported, which are not reported again.
     """
 
     def __init__(
@@ -95,7 +99,7 @@ class CycleTracer:
         self.reason, self.next_step = Reason.RUNNING(), options.step
         self._origin: list[CyclePoint] = []
         self._doubtful: tuple[CyclePoint, CyclePoint] | None = None
-        self._known: list[tuple[str, float]] = []
+        self.known: list[tuple[str, float]] = []
         self._weight = 1.0 / (np.asarray(solver.system.scales) * (options.state_scale or 1.0)) ** 2
 
     # -- the branch
@@ -115,30 +119,37 @@ class CycleTracer:
         """
         point = self._accept(cycle, asked)
         if origin is not None:
-            length = -self._distance(point.cycle, origin)
-            self._origin = [CyclePoint(origin, origin.mu[self.parameter], length, None)]
+            self._begin_at(origin)
+        if len(self.points) > 1:
+            self._report(report, self._between(*self.points[-2:]))
         report(point)
 
-    def restore(self, points: Sequence[CyclePoint]) -> None:
-        """Go on from points that are known; `extend` where there is but one."""
+    def restore(self, points: Sequence[CyclePoint], origin: Cycle | None = None) -> None:
+        """Go on from points that are known, with the `origin` of `extend`; `extend` where there is but one."""
         require(len(points) >= 1, "A branch goes on from one point at least.")
         self.points = [
             replace(p, tests={name: float(event(p.cycle)) for name, event in self.events.items()}) for p in points
         ]
-        if len(self.points) > 2 and self._change(*self.points[-2:]) == FOLD and not self._has_turned():
+        if origin is not None:
+            self._begin_at(origin)
+        if len(self.points) > 1 and self._change(*self.points[-2:]) == FOLD and not self._has_turned():
             self._doubtful = self.points[-2], self.points[-1]
+
+    def _begin_at(self, origin: Cycle) -> None:
+        length = self.points[0].arclength - self._distance(self.points[0].cycle, origin)
+        self._origin = [CyclePoint(origin, origin.mu[self.parameter], length, None)]
 
     def run(
         self,
         report: Callable[[CyclePoint | SpecialCycle], None] = lambda item: None,
         step: float | None = None,
-        known: Iterable[tuple[str, float]] = (),
+        known: Iterable[tuple[str, float]] | None = None,
     ) -> Said:
         """Go on until the parameter leaves its limits, the cycles shrink to nothing, the points are used up or no cycle
-        is found; the reason of the end. `step` is the first step, that of the options by default; `known` are kinds
-        (or titles) and values of special points that an interrupted run has reported, which are not reported again.
+        is found; the reason of the end. `step` is the first step, that of the options by default; `known` takes the
+        place of the attribute.
         """
-        self._known = list(known)
+        self.known = self.known if known is None else list(known)
         self.reason = self._steps(report, self.options.step if step is None else step)
         self._report(report, self._left_over())
         return self.reason
@@ -165,7 +176,7 @@ class CycleTracer:
 
     def _report(self, report, found: list[SpecialCycle]) -> None:
         for special in found:
-            alike = (value for kind, value in self._known if kind in (special.kind, special.title))
+            alike = (value for kind, value in self.known if kind in (special.kind, special.title))
             if all(abs(value - special.value) > KNOWN * self.scale for value in alike):
                 self.special.append(special)
                 report(special)
@@ -365,9 +376,9 @@ class CycleTracer:
     def _between(self, a: CyclePoint, b: CyclePoint) -> list[SpecialCycle]:
         found, turned = [], self._has_turned()
         if turned:
-            before = self.points[-3]
+            before = self._last()[-3]
             if max(abs(a.value - before.value), abs(b.value - a.value)) > STILL * self.scale:
-                found.append(self._fold(before, a, b))
+                found.append(self._fold(*self._about_fold(before, a, b)))
         for name in self.events:
             if a.tests[name] * b.tests[name] < 0:
                 found.append(self._located(name, a, b, lambda p, n=name: p.tests[n]))
@@ -383,9 +394,12 @@ class CycleTracer:
         return found
 
     def _has_turned(self) -> bool:
-        """True when the parameter went back in the last step."""
-        values = [p.value for p in self.points[-3:]]
-        return len(values) > 2 and (values[1] - values[0]) * (values[2] - values[1]) < 0
+        """True when the parameter went back in the last step; a step from the origin is one too."""
+        before = self._origin if len(self.points) == 2 else []
+        values = [p.value for p in [*before, *self.points][-3:]]
+        if len(values) < 3 or (before and abs(values[1] - values[0]) < BEGUN * self.scale):
+            return False
+        return (values[1] - values[0]) * (values[2] - values[1]) < 0
 
     def _change(self, a: CyclePoint, b: CyclePoint) -> str | None:
         """Kind of the change of stability between two points; None without one, or without exponents."""
@@ -405,6 +419,16 @@ class CycleTracer:
         if (found.point.value - b.value) * (b.value - a.value) > 0:
             return [self._fold(a, found.point, b)]
         return [found]
+
+    def _about_fold(self, before: CyclePoint, a: CyclePoint, b: CyclePoint) -> tuple[CyclePoint, ...]:
+        """Three points about a fold: the first two of a branch and one between them say on which side of it the origin
+        is.
+        """
+        middle = self._interpolated([a, b], 0.5 * (a.arclength + b.arclength)) if len(self.points) == 2 else None
+        if middle is None:
+            return before, a, b
+        turned = (middle.value - a.value) * (b.value - middle.value) < 0
+        return (a, middle, b) if turned else (before, a, middle)
 
     def _fold(self, before: CyclePoint, a: CyclePoint, b: CyclePoint) -> SpecialCycle:
         """The extreme value of the parameter of a parabola through points, renewed until it stays."""

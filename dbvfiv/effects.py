@@ -36,7 +36,9 @@ EFFECTS = {
     "and its jet of": ("a density that changes by half the Mach number squared", "fluid.sound_speed"),
     "a gas, of which": ("unknown", "drive.pressure"),
     "held shut by its supports": ("no answer on sealing", "closure.supports"),
+    "of its power below": ("root mean squares without that share", "response.count"),
     "of its power above": ("root mean squares without that share", "response.max_frequency"),
+    "turns round beside the onset": ("no cycles between the onset and the fold", "-"),
     "asks for all symmetry classes": ("none within the class of the model", "closure.symmetry"),
 }
 

@@ -5,6 +5,7 @@ from tempfile import NamedTemporaryFile
 import pytest
 
 from dbvfiv.effects import EFFECTS, explained
+from dbvfiv.errors import CaseError
 from dbvfiv.fit import outside_band
 from dbvfiv.model import ValveModel
 from dbvfiv.model.closed import ClosedValve
@@ -24,7 +25,13 @@ def of_spectrum(case):
     with NamedTemporaryFile("w", suffix=".csv") as file:
         file.write("10, 4\n50, 2\n60, 0\n")
         file.flush()
-        return [*filter(None, [left_out(case.replace({"response.spectrum": file.name}))])]
+        return left_out(case.replace({"response.spectrum": file.name}))
+
+
+def test_noise_without_power_within_the_frequencies_is_refused():
+    for most, count in (("9 Hz", 16), ("100 kHz", 16)):
+        with pytest.raises(CaseError, match="has no power between"):
+            of_spectrum(load_case(None, [f"response.max_frequency={most}", f"response.count={count}"]))
 
 
 def of_closed(case):
@@ -81,6 +88,7 @@ MENDED = {
     "and its jet of": (oddities, ["fluid.density=1"], "343 m/s"),
     "a gas, of which": (oddities, ["fluid.density=1", "drive.pressure=1 m"], "1 mH2O"),
     "held shut by its supports": (of_closed, ["closure.supports=held-lips"], "contact"),
+    "of its power below": (of_spectrum, ["response.max_frequency=20 kHz", "response.count=16"], "400"),
     "of its power above": (of_spectrum, ["response.max_frequency=40 Hz"], "60 Hz"),
     "asks for all symmetry classes": (of_closed, ["closure.supports=held-lips", "closure.symmetry=all"], "SS"),
 }

@@ -139,7 +139,9 @@ def describe_state(model: ValveModel, q: np.ndarray, pressure: float, **solution
     nodal = model.nodal(q)
     area = model.rows.areas(nodal)
     density = model.case.fluid.density
-    velocity = model.flow.inlet_velocity(area, pressure, density)
+    given = {"inlet": pressure, "density": density}
+    inner = model.flow.steady_inner(area, given) if model.flow.has_fluid else np.zeros(1)
+    velocity = float(inner[0])
     if not np.isfinite(velocity):
         raise SolveError(_boundless(model, area, pressure))
     share = model.open_share(area)
@@ -156,7 +158,7 @@ def describe_state(model: ValveModel, q: np.ndarray, pressure: float, **solution
         pressure=float(pressure),
         head=head_of(pressure, density),
         flange_pressure=float(pressure if line is None else flange),
-        line_loss=0.0 if line is None else line.lost_head(float(area[-1]), velocity) / GRAVITY,
+        line_loss=0.0 if line is None else line.lost_head(float(area[-1]), model.flow.far_velocity(inner)) / GRAVITY,
         outlet_pressure=outlet,
         recovered_pressure=recovered,
         downstream_velocity=tail_speed,

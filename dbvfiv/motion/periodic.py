@@ -30,7 +30,7 @@ from eigen.factor import SingularShiftError, Workspace
 from eigen.operator import FLUID_PARTS, CoupledPencil
 
 from ..errors import SolveError
-from ..flow.law import FlowMotion
+from ..flow.law import FlowLaw, FlowMotion
 from ..model.relaxing import Branches
 from ..model.valve import ValveModel
 from ..shell.memory import WallMemory
@@ -273,6 +273,9 @@ class PeriodicValve:
     ----------
     rebuild : callable
         From parameters mu, by the names of `dbvfiv.model.forms.ValveForms`, to the model for them.
+    mu : mapping
+    flow : callable, optional
+        From parameters to the flow law for them; that of the model without it.
 
     Raises
     ------
@@ -282,8 +285,13 @@ class PeriodicValve:
 
     autonomous = True
 
-    def __init__(self, rebuild: Callable[[Mapping[str, float]], ValveModel], mu: Mapping[str, float]):
-        self._model = rebuild
+    def __init__(
+        self,
+        rebuild: Callable[[Mapping[str, float]], ValveModel],
+        mu: Mapping[str, float],
+        flow: Callable[[Mapping[str, float]], FlowLaw] | None = None,
+    ):
+        self._model, self._flow = rebuild, flow or (lambda mu: rebuild(mu).flow)
         model = rebuild(mu)
         check_periodic(model)
         self.inner, self.size = model.flow.inner, model.size + model.flow.inner
@@ -318,7 +326,7 @@ class PeriodicValve:
 
     def pressures(self, motion: PeriodicMotion, mu: Mapping[str, float]) -> tuple[np.ndarray, np.ndarray]:
         """Pressures (N, m), Pa, and the flow's equations (N, l)."""
-        flow = self.model(mu).flow
+        flow = self._flow(mu)
         p, rest = zip(*(flow.evaluate(passage, mu) for passage in self.passages(motion, mu)))
         return np.array(p), np.array(rest)
 
@@ -363,10 +371,10 @@ class PeriodicValve:
         """
         model, rates = self.model(mu), motion.rates
         q, _ = self._split(motion.samples)
-        passages = self.passages(motion, mu)
-        slopes = [model.flow.linearise(passage, mu).parts() for passage in passages]
+        passages, flow = self.passages(motion, mu), self._flow(mu)
+        slopes = [flow.linearise(passage, mu).parts() for passage in passages]
         parts = {name: np.array([one[name] for one in slopes]) for name in FLUID_PARTS}
-        p = np.array([model.flow.evaluate(passage, mu)[0] for passage in passages])
+        p = np.array([flow.evaluate(passage, mu)[0] for passage in passages])
         memory = self._memory(mu)
         geometric = None
         if memory is not None:

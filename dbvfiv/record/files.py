@@ -417,6 +417,11 @@ def renamed(data: Any, names: Mapping[str, str]) -> Any:
     return data if there is None else there if samples is None else f"samples({there})"
 
 
+def is_read_by(case: Case, path: Path) -> bool:
+    """True for a file that a case names, under whatever name."""
+    return path.exists() and any(named.exists() and path.samefile(named) for named in _paths(case))
+
+
 def _paths(value: Any) -> Iterator[Path]:
     if isinstance(value, Path):
         yield value

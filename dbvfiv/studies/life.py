@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from itertools import combinations
 from typing import Any
 
 import matplotlib
@@ -48,6 +49,10 @@ GIVEN = ("rate", "exponent", "threshold", "crystallisation")
 LONG, DEEP = 1e6, 20.0
 
 
+#: Options that go with the kinds of results.
+TAKES = {"cycle": ("--at",), "transient": ("--since", "--per-day"), "steady": ("--per-day",), "closure": ("--per-day",)}
+
+
 @dataclass(frozen=True, eq=False)
 class Motion:
     """A motion that repeats.
@@ -90,6 +95,12 @@ def motion_of(
         If the result holds no motion.
     """
     name = f"The {result.kind} result of {result.header.name!r}"
+    given = {"--at": value, "--since": since, "--per-day": per_day}
+    takes = TAKES.get(result.kind, tuple(given))
+    for option in (option for option, number in given.items() if number is not None and option not in takes):
+        raise CaseError(
+            f"{option} does not go with a result of kind {result.kind!r}, which takes {' and '.join(takes)}."
+        )
     if result.kind == "cycle":
         return _limit_cycle(result, value)
     if result.kind == "transient":
@@ -118,6 +129,8 @@ def _run(result: Any, since: float | None, per_day: float | None) -> Motion:
     history, verdict = result.history, result.verdict
     begin, end, advice = *history["time"][[0, -1]], 'compute it with --set transient.save_every="1 ms", for instance'
     if since is not None:
+        if since < begin:
+            raise CaseError(f"--since is {since:g} s, and the run begins at {begin:g} s.")
         begin = since
     elif per_day is None and verdict["verdict"] == "limit cycle":
         lip, flow = verdict["lip_displacement"], verdict["mass_flow"]
@@ -269,16 +282,21 @@ class Life:
             yield self._part(self.titles[i], i, [i + 1], np.concatenate(history[i], axis=1), faces)
 
     def _bonds(self) -> Iterator[Part]:
-        """Joints of a rubber and another material, by the energy of the interlaminar shear in the rubber."""
-        count = len(self.motion.shell.section.layers)
-        joints = [(a, a + 1) for a in range(count - 1) if (a in self.laws) != (a + 1 in self.laws)]
+        """Joints of a rubber and another material, by the energy of the interlaminar shear in the rubber where they
+        meet: in a part of the wall a layer may be missing.
+        """
+        zones, count = self.motion.shell.zones, len(self.motion.shell.section.layers)
+        present = np.ones((1, count), bool) if zones is None else zones.presence[zones.of_element]
+        pairs = [(a, b) for a, b in combinations(range(count), 2) if (a in self.laws) != (b in self.laws)]
+        meet = [present[:, a] & present[:, b] & ~present[:, a + 1 : b].any(axis=1) for a, b in pairs]
+        joints = {pair: there for pair, there in zip(pairs, meet) if there.any()}
         shear = np.stack([interlaminar_shear(self.motion.shell, q) for q in self.motion.states if joints] or [0])
         strain = np.outer([0.0, *np.geomspace(1e-5, 2.0, 400)], [0.0, 0.0, 0.0, 1.0, 0.0])
-        for a, b in joints:
+        for (a, b), there in joints.items():
             rubber = a if a in self.laws else b
             law = self.laws[rubber]
             stress = stress_at(MOONEY_RIVLIN, law.parameters[None], strain[:, None])[:, 0, 3]
-            energy = np.interp(shear[:, :, a].T, stress, 0.5 * np.asarray(law.energy(strain.T)))
+            energy = there[:, None] * np.interp(shear[:, :, a].T, stress, 0.5 * np.asarray(law.energy(strain.T)))
             name = f"{self.titles[a]} to {self.titles[b]}"
             yield self._part(name, rubber, [a + 1, b + 1], energy, np.full(len(self.place), "bond"))
 

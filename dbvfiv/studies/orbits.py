@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -10,14 +10,16 @@ import numpy as np
 
 from continuation.amplitude import AmplitudeEquation, amplitude_equation
 from continuation.cycle_branch import CycleTracer
-from continuation.cycle_points import CyclePoint
+from continuation.cycle_points import CyclePoint, SpecialCycle
 from continuation.cycles import Cycle, CycleSolver, cycles_beside_onset
-from continuation.options import ContinuationError, ContinuationOptions, OrbitOptions
+from continuation.options import ContinuationError, ContinuationOptions, OrbitOptions, OutOfDomain
 from continuation.periodic import PeriodicMotion, peak
 
 from ..case.parameters import PARAMETERS, Mu
 from ..errors import SolveError
+from ..flow.law import FlowLaw
 from ..flow.stepping import MovingFluid
+from ..flow.terms.pump import with_static_lift
 from ..model.forms import ValveForms
 from ..model.state import LipCentre
 from ..model.valve import ValveModel
@@ -176,8 +178,8 @@ UNIT = 10e-3
 STEP = 0.2
 #: Harmonics of the first cycles.
 HARMONICS = 4
-#: Amplitude of the second cycle over that of the first.
-SECOND = 2.0
+#: Amplitude of the second cycle over that of the first, and where a fold lies between these two.
+SECOND, NEARER = 2.0, 1.25
 #: The lips just touch at their middle.
 TOUCHING = "lips touch"
 
@@ -205,7 +207,10 @@ class Follower:
 
     def __init__(self, case: Case, walk: StabilityWalk, place: Mu, parameter: str, spectrum):
         self.case, self.walk, self.place, self.parameter = case, walk, place, parameter
-        self.system = PeriodicValve(models_of(case, walk.built(Mu.of(case)).model), place.for_system())
+        self._flows: dict[float, FlowLaw] = {}
+        models = models_of(case, walk.built(Mu.of(case)).model)
+        flow = self._flow if models(place.for_system()).pump is not None else None
+        self.system = PeriodicValve(models, place.for_system(), flow)
         self.solver = CycleSolver(self.system, _basis(self.system, spectrum))
         self.name = PARAMETERS[parameter].system_name or parameter
         model = self.system.model(place.for_system())
@@ -213,29 +218,65 @@ class Follower:
         self.lip = int(model.shell.dofs.index[model.mesh.centre_line[0], 1])
         self.lens = model.lens
 
-    def from_onset(self, onset: Onset) -> tuple[Cycle, Cycle, Cycle]:
+    def _flow(self, mu: Mapping[str, float]) -> FlowLaw:
+        """Flow law behind a pump, with the static lift that makes the pressure that of the steady state, as spectra
+        have it.
+
+        Raises
+        ------
+        OutOfDomain
+            If there is no steady state.
+        """
+        value, model = float(mu[self.name]), self.system.model(mu)
+        if value not in self._flows:
+            if len(self._flows) > 8:
+                self._flows.clear()
+            try:
+                q = self.walk.equilibrium(self.place.at(**{self.parameter: value}))
+            except SolveError as error:
+                raise OutOfDomain(f"Behind a pump cycles need the steady state: {error}") from error
+            area = model.rows.areas(model.nodal(q))
+            self._flows[value] = with_static_lift(model.flow, area, model.flow.steady_inner(area, mu), mu)
+        return self._flows[value]
+
+    def at_rest(self, onset: Onset) -> Cycle:
+        """The steady state at an onset, as a cycle at rest.
+
+        Raises
+        ------
+        SolveError
+        """
+        mu, q = onset.place.for_system(), self.walk.equilibrium(onset.place)
+        model = self.system.model(mu)
+        rest = np.concatenate([q, model.flow.steady_inner(model.rows.areas(model.nodal(q)), mu)])
+        motion = PeriodicMotion.of_waves((rest, np.zeros_like(rest)), HARMONICS, abs(onset.eigenvalue.imag))
+        return Cycle(motion, mu, 0.0, 0, 0)
+
+    def from_onset(self, onset: Onset) -> tuple[Cycle, Cycle, Cycle, bool]:
         """The steady state at an onset, as a cycle at rest, and two small cycles beside it, of the amplitude asked for
-        and somewhat more.
+        and somewhat more; and whether the branch goes on from the onset without a fold up to the second one.
 
         Raises
         ------
         SolveError
         """
         mu, mode = onset.place.for_system(), onset.mode
-        model = self.system.model(mu)
-        q, amplitude = self.walk.equilibrium(onset.place), self.case.cycle.amplitude
-        inner = model.flow.steady_inner(model.rows.areas(model.nodal(q)), mu)
+        still, amplitude = self.at_rest(onset).motion.coefficients[0], self.case.cycle.amplitude
         shape = np.concatenate([mode.q, mode.u])
         if abs(shape[self.lip]) < 1e-6 * np.abs(mode.q).max():
             raise SolveError(
                 "The mode that becomes unstable does not move the middle of the lips, by which cycles are told."
             )
-        waves = np.concatenate([q, inner]), 0.5 * amplitude * shape / shape[self.lip]
+        waves = still, 0.5 * amplitude * shape / shape[self.lip]
         small = PeriodicMotion.of_waves(waves, HARMONICS, abs(onset.eigenvalue.imag))
         row = np.zeros_like(small.coefficients)
         row[1, self.lip] = 1.0
         try:
-            return cycles_beside_onset(self.solver, small, mu, self.name, row, SECOND)
+            for ratio in (SECOND, NEARER):
+                rest, first, second = cycles_beside_onset(self.solver, small, mu, self.name, row, ratio)
+                if rises := _goes_on(*(cycle.mu[self.name] for cycle in (rest, first, second)), ratio):
+                    break
+            return rest, first, second, rises
         except ContinuationError as error:
             raise SolveError(
                 f"The oscillation that starts at {self.parameter} = {onset.value:.6g} was not found with an amplitude "
@@ -294,22 +335,33 @@ class Follower:
         return found
 
     def begin(
-        self, onset: Onset, values: Sequence[float], tell: Callable[[CyclePoint], None]
+        self,
+        onset: Onset,
+        values: Sequence[float],
+        tell: Callable[[CyclePoint | SpecialCycle], None],
+        known: Iterable[tuple[str, float]] = (),
     ) -> tuple[CycleTracer, list[str]]:
         """Tracer of the branch of an onset through ascending values, with its first cycles found and reported.
 
         The first cycles are two small ones, and those at the values nearer to the onset. The second value returned is
-        why some of the latter were not found.
+        why some of the latter were not found. `known` are special points as `CycleTracer.run` takes them.
         """
-        rest, first, second = self.from_onset(onset)
-        ends, cycles, missed = sorted((onset.value, second.mu[self.name])), [first, second], []
+        rest, first, second, rises = self.from_onset(onset)
+        last, cycles, missed = second if rises else first, [first, second], []
+        if not rises:
+            missed.append(
+                f"The branch turns round beside the onset at {self.parameter} = {onset.value:.6g}, so cycles between "
+                "there and its fold may be passed over; a smaller cycle.amplitude begins nearer to the onset."
+            )
+        ends = sorted((onset.value, last.mu[self.name]))
         for value in (v for v in values if ends[0] < v < ends[1]):
             try:
                 cycles.append(self.beside(onset, first, value))
             except SolveError as error:
                 missed.append(str(error))
-        cycles.sort(key=lambda cycle: abs(cycle.mu[self.name] - onset.value))
+        cycles.sort(key=lambda cycle: np.linalg.norm(cycle.motion.coefficients[1:3, self.lip]))
         tracer = self.tracer(values, first.motion)
+        tracer.known = list(known)
         asked = [cycle.mu[self.name] in values for cycle in cycles]
         tracer.extend(cycles[0], asked[0], tell, rest)
         for cycle, is_asked in zip(cycles[1:], asked[1:]):
@@ -341,6 +393,14 @@ class Follower:
     def orbit(self, cycle: Cycle) -> Orbit:
         """Orbit of a cycle, from which its results are taken."""
         return Orbit(self.system.model(cycle.mu), cycle.mu, cycle.motion)
+
+
+def _goes_on(rest: float, first: float, second: float, ratio: float) -> bool:
+    """True where values a r^2 + b r^4 over those at rest, of cycles with amplitudes of a ratio, have no extreme up to
+    the second one.
+    """
+    square = ratio**2
+    return (2 * square - 1) * (second - rest) * np.sign(first - rest) > square**2 * abs(first - rest)
 
 
 class _AtRest:

@@ -26,7 +26,7 @@ from ..model.state import SteadyState
 from ..model.strain_level import SettledLevels, settle_levels
 from ..model.valve import ValveModel
 from ..observer import Observer
-from ..record.files import Header, check_writable, kind_of
+from ..record.files import Header, check_writable, is_read_by, kind_of
 from ..record.mesh import MeshData
 from ..record.record import GrowingRecord, Record, StoredRecord
 from ..record.table import Column, TableSpec, printed_head, printed_row
@@ -312,6 +312,10 @@ class Session:
         for name in study.files:
             _require_new(choices.get(name), study.files[name])
         study.check(self.case)
+        if output is not None and is_read_by(self.case, Path(output)):
+            raise CaseError(
+                f"The result is given the name {str(output)!r}, a file that the case reads; choose another."
+            )
         session = self.asked(kind, observer)
         if session is not self:
             return session.perform(kind, output, observer, **choices)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
@@ -169,6 +170,10 @@ def states_of(result: StudyResult, table: str) -> tuple[State, ...]:
     return tuple(State(**vars(state), results=result, table=table, index=i) for i, state in found)
 
 
+#: Note on a pressure that was not reached.
+UNREACHED = "unreached"
+
+
 def reach_states(
     model: ValveModel,
     case: Case,
@@ -187,7 +192,7 @@ def reach_states(
     case : Case
         With the options of the walk.
     record, table : GrowingRecord, str
-        States that it holds are not found again; the walk goes on from the last one.
+        States and failures that it holds are not looked for again; the walk goes on from the last state.
     pressures : iterable of float, Pa
     states : list of SteadyState
         Takes the states, those that the record holds first.
@@ -203,15 +208,22 @@ def reach_states(
     states.extend(read_states(record, table))
     if states:
         restore_path(path, record, table, len(states) - 1, states[-1])
-    known, failures = {state.pressure for state in states}, []
+    missed, failures = record.notes(UNREACHED), []
+    # each as often as it was met: pressures may come back
+    left = Counter([*(state.pressure for state in states), *(note["pressure"] for note in missed)])
+    for note in missed:
+        failures.append(note["text"])
+        record.fail(note["text"])
     for pressure in pressures:
-        if pressure in known:
+        if left[pressure] > 0:
+            left[pressure] -= 1
             continue
         record.progress(f"steady state at {pressure:.6g} Pa")
         try:
             state = path.go_to(pressure)
         except SolveError as error:
             failures.append(str(error))
+            record.note(UNREACHED, pressure=pressure, text=str(error))
             record.fail(str(error))
             continue
         record.append(table, state_row(model, state) | restart_row(path))

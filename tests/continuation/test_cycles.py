@@ -8,7 +8,7 @@ from scipy.integrate import solve_ivp
 from continuation import ContinuationOptions, NotConverged, OrbitOptions, OutOfDomain
 from continuation.cycle_branch import CycleTracer
 from continuation.cycle_points import DOUBLING, FOLD, TORUS
-from continuation.cycles import CycleSolver
+from continuation.cycles import Cycle, CycleSolver
 from continuation.harmonics import Harmonics, Rates
 from continuation.hill import floquet_exponents
 from continuation.orbit_branches import find_orbit
@@ -239,6 +239,42 @@ def test_events_are_located():
     again.restore(tracer.points[:3])
     again.run()
     assert np.isclose(again.points[-1].value, tracer.points[-1].value) and len(again.special) == 1
+    for known, count in (((), 1), ([("radius", 0.36)], 0)):  # between the two cycles that a branch starts with
+        between = CycleTracer(tracer.solver, "mu", options, events=event)
+        between.known, told = list(known), []
+        for radius in (0.5, 0.65):
+            between.extend(tracer.solver.solve(guess, {"mu": radius**2}), report=told.append)
+        assert len(told) == 2 + count and [s.kind for s in between.special] == ["radius"] * count
+
+
+def test_a_fold_between_the_origin_and_the_first_cycles():
+    """Cycles mu = r^4 - r^2 with radii on either side of the fold at r^2 = 1/2, mu = -1/4; a branch that is restored
+    predicts from the origin as the whole one does.
+    """
+
+    def rate(u, mu):
+        own = mu["mu"] + u @ u - (u @ u) ** 2
+        return jnp.stack([own * u[0] - u[1], u[0] + own * u[1]])
+
+    system = periodic.of_first_order(rate, 2)
+    solver = CycleSolver(system, system.basis, EXACT)
+    options = ContinuationOptions(limits={"mu": (-1.0, 0.3)}, parameter_scales={"mu": 2.0})
+    rest = PeriodicMotion.of_samples(0.0 * CIRCLE, 2, 1.0)
+    origin = Cycle(rest, {"mu": 0.0}, 0.0, 0, 0)
+    tracer = CycleTracer(solver, "mu", options)
+    for radius, start in ((0.65, origin), (0.85, None)):
+        guess = PeriodicMotion.of_samples(radius * CIRCLE, 2, 1.0)
+        tracer.extend(solver.solve(guess, {"mu": radius**4 - radius**2}), origin=start)
+    assert tracer.points[1].value > tracer.points[0].value
+    (fold,) = tracer.special
+    assert fold.kind == FOLD and fold.located and abs(fold.value + 0.25) < 1e-6
+    steps = {}
+    tracer.run(lambda _: steps.setdefault(len(tracer.points), tracer.next_step))
+    assert len(tracer.special) == 1
+    again = CycleTracer(solver, "mu", options)
+    again.restore(tracer.points[:3], origin)
+    again.run(step=steps[3])
+    assert np.allclose([p.value for p in again.points], [p.value for p in tracer.points], rtol=0, atol=1e-9)
 
 
 def test_a_restored_branch_tells_what_its_last_step_met():

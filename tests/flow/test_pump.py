@@ -10,8 +10,9 @@ from scipy.interpolate import PchipInterpolator
 from dbvfiv.case.quantity import GRAVITY
 from dbvfiv.flow import Channel
 from dbvfiv.flow.elastic_line import ElasticLine, LineChannel
+from dbvfiv.flow.law import FlowMotion
 from dbvfiv.flow.terms.line import Line
-from dbvfiv.flow.terms.pump import Pump
+from dbvfiv.flow.terms.pump import Pump, with_static_lift
 from eigen import CoupledPencil, certified_spectrum, leading_modes
 from tests.flow.test_channel import FLOOR, passage
 from tests.flow.test_line import DAMPING, INLET, LENGTH, LIP, MASS, STIFFNESS, WIDTH, one_degree
@@ -48,6 +49,14 @@ def test_its_slope_stands_beside_the_velocity(speed):
     ours, theirs = (x.linearise_still(area, given) for x in (law(pump), law()))
     velocity = law().inlet_velocity(area, SUPPLY, DENSITY)
     assert law(pump).inlet_velocity(area, SUPPLY, DENSITY) == velocity
+    # with a static lift the steady flow at another pressure than the pump's is one in time, too
+    inner = law().steady_inner(area, given)
+    lifted = with_static_lift(law(pump), area, inner, given)
+    for own, off in ((lifted, False), (law(pump), True)):
+        pressure, balance = own.evaluate(FlowMotion.still(area, inner), given)
+        left = np.append(np.abs(pressure - own.steady_pressure(area, SUPPLY)), np.abs(balance)).max()
+        assert (left > 1e-3 * SUPPLY) == off and (off or left < 1e-8 * SUPPLY)
+    assert np.allclose(lifted.linearise_still(area, given).S0, ours.S0, rtol=1e-12)
     slope = DENSITY * GRAVITY * float(jax.grad(pump.curve)(4 * area[-1] * velocity)) * 4 * area[-1]
     assert slope < 0
     place = (0, 0) if speed is None else (1, 1)  # the velocity at the far end and its equation

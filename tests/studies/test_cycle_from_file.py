@@ -8,12 +8,15 @@ import numpy as np
 import pytest
 
 from continuation.cycle_points import SpecialCycle
+from continuation.cycles import Cycle
+from continuation.harmonics import Harmonics
 from continuation.options import Reason
+from continuation.periodic import PeriodicMotion
 from dbvfiv.errors import CaseError, SolveError
 from dbvfiv.observer import Observer
 from dbvfiv.record.record import GrowingRecord
-from dbvfiv.studies.cycle import study
-from dbvfiv.studies.orbits import Follower
+from dbvfiv.studies.cycle import start, study
+from dbvfiv.studies.orbits import Follower, _goes_on
 from dbvfiv.studies.session import load_result, resume_result
 from tests.observers import Stop
 from tests.studies.test_cycle import session_of
@@ -92,6 +95,53 @@ def test_special_points_of_the_part_before_are_told_to_the_branch(file):
     )
     keeper.follow(tracer)
     assert told == [("fold", 240.0), ("fold", 241.0)]
+
+
+def made_cycle(size, value):
+    return Cycle(PeriodicMotion(Harmonics(1), np.array([[0.0], [size], [0.0]]), 1.0), {"density": value}, 0.0, 0, 0)
+
+
+def test_a_branch_that_turns_round_at_once_begins_with_its_smaller_cycles():
+    """The second cycle lies nearer to the onset than the first; a value asked for lies nearer than both."""
+    follower, taken, tracer = object.__new__(Follower), [], SimpleNamespace()
+    tracer.extend = lambda cycle, asked, *_: taken.append((cycle.mu["density"], asked))
+    vars(follower).update(name="density", parameter="density", lip=0, tracer=lambda *_: tracer)
+    follower.from_onset = lambda _: (made_cycle(0.0, 240.0), made_cycle(1.0, 238.0), made_cycle(1.25, 239.0), False)
+    follower.beside = lambda _onset, _first, value: made_cycle(0.5, value)
+    _, missed = follower.begin(SimpleNamespace(value=240.0), [200.0, 239.5], None)
+    assert taken == [(239.5, True), (238.0, False), (239.0, False)]
+    assert len(missed) == 1 and "turns round beside the onset" in missed[0]
+
+
+@pytest.mark.parametrize("side", [1.0, -1.0])
+@pytest.mark.parametrize("ratio", [2.0, 1.25])
+def test_a_fold_up_to_the_second_cycle_is_seen_by_its_value(side, ratio):
+    for fold, goes_on in ((0.9 * ratio, False), (1.1 * ratio, True)):
+        values = [5.0 + side * r**2 * (1 - 0.5 * (r / fold) ** 2) for r in (0.0, 1.0, ratio)]
+        assert _goes_on(*values, ratio) == goes_on
+
+
+def test_the_last_period_of_a_run_is_at_the_pressure_of_its_drive(tmp_path, monkeypatch):
+    """Of its hold at 6 kPa, 18 kPa of its case; only the lip is in a limit cycle, so that it gives the frequency."""
+    table = tmp_path / "hold.csv"
+    table.write_text("time [s], pressure [kPa]\n0, 0\n0.1, 6\n")
+    steady, lasting = ({"verdict": name, "frequency": f} for name, f in (("steady", None), ("limit cycle", 40.0)))
+    run = SimpleNamespace(
+        kind="transient",
+        case=session_of(drive__pressure=18e3, transient__drive_table=str(table)).case,
+        mesh=SimpleNamespace(nodes=np.zeros((3, 3))),
+        history={"time": np.array([0.0, 0.5])},
+        verdict={"verdict": "limit cycle", "frequency": None, "mass_flow": steady, "lip_displacement": lasting},
+    )
+    monkeypatch.setattr(start, "load_result", lambda _: run)
+    model = SimpleNamespace(mesh=run.mesh, flow=SimpleNamespace(inner=2))
+    walk = SimpleNamespace(built=lambda _: SimpleNamespace(model=model))
+    asked = started(table, cycle__over="pressure=4 kPa:8 kPa:3").case
+    with pytest.raises(CaseError, match="an elastic line, or a compressed fluid, does not start"):
+        start.given_motion(asked, walk)
+    monkeypatch.setattr(start, "_last_period", lambda _model, _case, place, _run: place.pressure)
+    given = start.given_motion(asked, walk)
+    assert given.value == given.motion == 6e3
 
 
 def test_a_series_without_its_cycle_is_cut(file):

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -13,7 +15,7 @@ from dbvfiv.case.measured import DISCHARGE, read_measured
 from dbvfiv.case.quantity import GRAVITY
 from dbvfiv.studies.case import thesis_case
 from dbvfiv.studies.measured import FLOW, MeasuredCurve
-from dbvfiv.studies.steady.figures import draw_together
+from dbvfiv.studies.steady.figures import draw_together, left_by_line
 from dbvfiv.studies.steady.study import flow_at
 from tests.small_valves import SMALL, load_small, make_valve, settings
 
@@ -153,6 +155,16 @@ def test_line_and_valve_cross_at_the_operating_point():
         there = np.interp(1e3 * state.volume_flow, *line.T)
         assert there == pytest.approx(np.interp(1e3 * state.volume_flow, *valve.T), rel=2e-3)
         assert line[0, 1] == pytest.approx(state.pressure / (1000 * GRAVITY), rel=1e-9)
+    # what a pump leaves, as far as its table goes, and a static pressure without its velocity head
+    state, numbers = found.states[0], found.states[0].hydraulics
+    own, share = 1e3 * state.volume_flow, (1e3 * state.volume_flow / 30.0) ** -2
+    pump = found.case.replace({"upstream.pump": [[0, 3.0], [0.03, 2.6], [0.06, 1.8], [0.1, 0.3]]})
+    heads = left_by_line(pump, state, np.array([0.0, 30.0, own, 101.0]))
+    assert heads[1] - heads[0] == pytest.approx(2.6 - 3.0 - share * numbers.line_loss, rel=1e-9)
+    assert heads[2] == pytest.approx(numbers.total_head, rel=1e-9) and np.isnan(heads[3])
+    faster = SimpleNamespace(**vars(state) | {"hydraulics": replace(numbers, supply_head=numbers.supply_head + 0.5)})
+    heads = left_by_line(found.case.replace({"drive.at": "line"}), faster, np.array([0.0, own]))
+    assert heads == pytest.approx([numbers.supply_head, numbers.total_head + 0.5], rel=1e-9)
 
 
 @pytest.fixture(scope="module")

@@ -13,6 +13,7 @@ from dbvfiv.materials import IsotropicElastic, MooneyRivlin
 from dbvfiv.materials.fatigue import SHAPE, UNIT, CrackGrowth, shipped_growth
 from dbvfiv.shell import Layer, Section, Shell, ShellMesh
 from dbvfiv.shell.recovery import interlaminar_shear
+from dbvfiv.shell.section import Zones
 from dbvfiv.studies.case import load_case
 from dbvfiv.studies.life import Life, Motion, _run, motion_of
 from tests.shell.structures import rectangle
@@ -38,9 +39,16 @@ def rolled(shell, curvature):
     return shell.dofs.restrict(nodal)
 
 
+RUBBER = Layer(MooneyRivlin.neo_hookean(MODULUS, 1300.0), THICKNESS, name="NR")
+
+
 def life_of(curvatures, *keys):
     """Life, hours, of a strip of rubber that is rolled to some curvatures once an hour."""
-    shell = strip(Layer(MooneyRivlin.neo_hookean(MODULUS, 1300.0), THICKNESS, name="NR"))
+    shell = strip(RUBBER)
+    return life_of_states(shell, [rolled(shell, k) for k in curvatures], *keys)
+
+
+def life_of_states(shell, states, *keys):
     case = load_case(
         None,
         (
@@ -52,8 +60,8 @@ def life_of(curvatures, *keys):
             *keys,
         ),
     )
-    result = SimpleNamespace(case=case, mesh=SimpleNamespace(layer_titles=lambda: ("NR",)))
-    return Life(result, Motion(shell, [rolled(shell, k) for k in curvatures], 1.0, "a test"))
+    result = SimpleNamespace(case=case, mesh=SimpleNamespace(layer_titles=lambda: ("NR", "ply", "cloth")))
+    return Life(result, Motion(shell, states, 1.0, "a test"))
 
 
 def test_bent_strip_in_closed_form():
@@ -111,6 +119,24 @@ def test_interlaminar_shear_of_a_sheared_strip():
     assert np.allclose(interlaminar_shear(shell, shell.dofs.restrict(nodal)), 1.5 * 5 / 6 * 1e6 * 1e-4, rtol=1e-3)
 
 
+def test_bonds_are_where_the_layers_meet():
+    """A ply that ends half way, with a cloth outside it: each bond of the rubber lasts where it is not."""
+    ply, patch = (
+        Layer(IsotropicElastic(3e6, 0.5 - 1e-9, 1.0), 0.005, shear_correction=5 / 6),
+        rectangle(16, 1, 0.5, 0.1),
+    )
+    mesh = ShellMesh.build(patch.nodes, patch.quads, 0.02, material_axis=(1.0, 0, 0))
+    present = np.ones((16, 3), bool)
+    present[8:, 1] = False
+    shell = Shell(mesh, Section((RUBBER, ply, ply)), zones=Zones.of(present))
+    nodal = np.zeros((shell.mesh.node_count, 5))
+    nodal[:, 3] = 0.1
+    found = life_of_states(shell, [np.zeros(shell.size), shell.dofs.restrict(nodal)], *EXACT, "life.threshold=1e-3")
+    bonds = {part.name: np.isfinite(part.all_hours) for part in found.parts if len(part.layers) == 2}
+    assert set(bonds) == {"NR to ply", "NR to cloth"}
+    assert np.array_equal(bonds["NR to ply"], present[:, 1]) and np.array_equal(bonds["NR to cloth"], ~present[:, 1])
+
+
 @pytest.fixture(scope="module")
 def opened(tmp_path_factory):
     """Steady states of the small valve, in a file."""
@@ -148,8 +174,13 @@ def test_run_in_time(command_line, one_sentence, tmp_path):
     daily = json.loads(command_line("life", path, *cut, "--per-day", 86400 / 0.04).out)
     assert np.isclose(lasting["hours"], daily["hours"], rtol=1e-6) and "without pause" in lasting["motion"]
     assert 0 < lasting["ratio"] < 1 and lasting["interval"][0] < lasting["hours"] < lasting["interval"][1]
-    outcome = command_line("life", sparse, "--since", 0.01)
-    assert outcome.status == 2 and one_sentence(outcome.err) and "of the swings of the lip" in outcome.err
+    for options, said in (
+        (("--since", 0.01), "of the swings of the lip"),
+        (("--since=-1",), "the run begins at 0 s"),
+        (("--at", 5), "--at does not go with a result of kind 'transient', which takes --since and --per-day"),
+    ):
+        outcome = command_line("life", sparse, *options)
+        assert outcome.status == 2 and one_sentence(outcome.err) and said in outcome.err
 
 
 def test_a_cycle_of_the_flow_alone_gives_the_time():
@@ -177,6 +208,7 @@ def test_results_without_a_motion_are_refused(opened, command_line, one_sentence
         ([path, "--per-day", 5], "transient.save_every"),
         ([opened, "--per-day", 5, "--set=mesh.around=8"], "keys of [life]"),
         ([opened, "--per-day", 5, "--set=life.crack=1 um"], "life.crack"),
+        ([opened, "--per-day", 5, "--since", 0], "which takes --per-day"),
     ):
         outcome = command_line("life", *arguments)
         assert outcome.status == 2 and one_sentence(outcome.err) and words in outcome.err

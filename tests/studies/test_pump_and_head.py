@@ -2,15 +2,20 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from scipy.interpolate import PchipInterpolator
 from scipy.optimize import brentq
 
 from dbvfiv.case import CaseError
+from dbvfiv.case.parameters import Mu
 from dbvfiv.case.quantity import GRAVITY
 from dbvfiv.errors import SolveError
 from dbvfiv.studies.case import thesis_case
+from dbvfiv.studies.orbits import Follower
+from dbvfiv.studies.stability.walk import StabilityWalk
 from tests.small_valves import SMALL, load_small, settings
 
 LINE = {"upstream.length": 20.0, "upstream.diameter": 0.3, "upstream.friction": 0.02}
@@ -83,6 +88,17 @@ def test_a_run_stays_at_the_operating_point_and_comes_back_to_it(operating):
         assert pressure == pytest.approx(1000.0 * GRAVITY * curve, rel=1e-9), name
         assert np.ptp(pressure) > 10.0
     assert away[-1] / away[50] == pytest.approx(np.exp(0.2 * slowest.growth_rate), rel=0.02)
+
+
+def test_cycles_begin_at_the_state_that_spectra_are_of(operating):
+    """A static lift makes up the difference to a pressure off the pump's curve."""
+    pressure = 1.2 * operating.pressure
+    case = load(PUMP, {"drive.pressure": pressure}).case
+    walk, place = StabilityWalk(case), Mu.of(case)
+    follower = Follower(case, walk, place, "pressure", SimpleNamespace(eigenvalues=()))
+    rest = follower.at_rest(SimpleNamespace(place=place, eigenvalue=10j))
+    left, scale = follower.system.residual(rest.motion, rest.mu), walk.built(place).model.force_scale
+    assert np.linalg.norm(left[0]) < 1e-6 * scale(walk.equilibrium(place), pressure)
 
 
 def test_a_flow_beyond_the_table_is_told():

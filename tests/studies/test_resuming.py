@@ -172,6 +172,24 @@ def test_failed_values_are_not_tried_again(coarse_case, tmp_path, monkeypatch):
     assert 12e3 not in result.values and len(result.points) == 1
 
 
+def test_steady_pressures_that_come_back_are_found_again_and_missed_ones_are_not(coarse_case, tmp_path, monkeypatch):
+    honest, tried = LoadPath.go_to, []
+
+    def go_to(self, target):
+        tried.append(target)
+        if target == 4e3:
+            raise SolveError("No equilibrium was found at 4000 Pa.")
+        return honest(self, target)
+
+    monkeypatch.setattr(LoadPath, "go_to", go_to)
+    path = tmp_path / "steady.h5"
+    case = coarse_case.replace({"steady.pressures": [2e3, 4e3, 6e3, 2e3], "drive.kind": "uniform"})
+    assert not Session(case).perform("steady", path, Stop(2)).complete
+    result = resume(path)
+    assert result.complete and [state.pressure for state in result.states] == [2e3, 6e3, 2e3]
+    assert tried == [2e3, 4e3, 6e3, 2e3] and result.failures == ("No equilibrium was found at 4000 Pa.",)
+
+
 @pytest.fixture
 def attempts(monkeypatch):
     """Cases of steady runs, of which the first misses a pressure and is interrupted, and none finds a state."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -164,6 +165,19 @@ def test_refusals(model, state, refused):
         sweep(shut, DENSITY, state)
     with pytest.raises(SolveError):
         sweep(model, DENSITY, replace(state, converged=False))
+
+
+def test_modes_that_are_not_found_name_their_pressure():
+    def lost(*_):
+        raise ArithmeticError("no convergence")
+
+    tracking, pencil = object.__new__(tracked.Tracking), object()
+    place, search = SimpleNamespace(pressure=30e3), SimpleNamespace(options=SearchOptions(100.0))
+    vars(tracking).update(spectra={}, values={pencil: 30e3}, options=SimpleNamespace(count=2), tolerance=1e-9)
+    tracking.line, tracking.walk = SimpleNamespace(place=lambda _: place), SimpleNamespace(search=lambda _: search)
+    tracking._leading = lost
+    with pytest.raises(SolveError, match="The modes at 30000 Pa were not found: no convergence"):
+        tracking._solve(pencil)
 
 
 def test_what_is_done_is_kept_on_the_way(model, state, over_density, monkeypatch):

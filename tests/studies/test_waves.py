@@ -5,8 +5,10 @@ from __future__ import annotations
 import pytest
 
 import dbvfiv
+from dbvfiv.case.quantity import GRAVITY
+from dbvfiv.model.state import describe_state
 from dbvfiv.studies.case import load_case, thesis_case
-from tests.small_valves import load_small
+from tests.small_valves import load_small, make_valve
 from tests.studies.along import check_map, check_neutral, check_sensitivity, check_sweep
 
 MESH = {"mesh.around": 8, "mesh.along": 12}
@@ -63,6 +65,19 @@ def test_maps_keep_the_wave_speed_over_the_density():
     densities = {1: 2.0 * 25 ** (1 / 3), 3: 50.0}
     cells = {(i, 1): {"fluid.density": density, "drive.pressure": 6e3} for i, density in densities.items()}
     check_map((BASE,), axes, cells)
+
+
+def test_the_head_lost_in_an_elastic_line_is_what_a_gas_loses_on_its_way():
+    """From the enthalpy at the far end to that of the flange, by an isentropic gas, and its kinetic energy."""
+    air = {"fluid.density": 1.2, "fluid.continuity": "storage", "fluid.sound_speed": 343.0, "drive.pressure": 20e3}
+    line = {"upstream.length": 6.0, "upstream.wave_speed": 300.0, "upstream.elements": 2, "upstream.loss": 3.0}
+    model = make_valve(air | line)
+    found = {"converged": True, "iterations": 0, "load_steps": 0, "residual": 0.0, "rounding": 0.0, "reason": ""}
+    state = describe_state(model, model.rest(), 20e3, **found)
+    flange, whole = (1.0 + 1.4 * p / (1.2 * 343.0**2) for p in (state.flange_pressure, 20e3))
+    enthalpy = 343.0**2 / 0.4 * (whole ** (2 / 7) - flange ** (2 / 7))
+    lost = (enthalpy - 0.5 * state.station_velocity[-1] ** 2) / GRAVITY
+    assert lost > 1e-3 and state.line_loss == pytest.approx(lost, rel=1e-3)
 
 
 @pytest.mark.slow

@@ -1,9 +1,11 @@
 """A pump at the far end of the line: what its head falls by as the flow rises, in place of a fixed pressure.
 
-    P = P_0 + rho g [ H(Q) - H_0 ],      H_0 = P_0 / (rho g)
+    P = P_0 + rho g [ H(Q) - H_0 ]
 
-P_0 is the pressure that the steady state was found at. At the operating point it is rho g H(Q) already; at another
-pressure the difference stands for a static lift that comes on top. H is the monotone cubic of Fritsch and Carlson
+P_0 is the pressure of the case or of a parameter, which at the operating point is rho g H(Q) already. Runs in time have
+H_0 = P_0 / (rho g), the pump by itself, and so move to the operating point from another pressure. Spectra and cycles
+are those of the steady state at P_0, whose flow Q_0 gives H_0 = H(Q_0): the difference is a static lift that comes on
+top, see `with_static_lift`. H is the monotone cubic of Fritsch and Carlson
 (1980) through the rows of the pump's table, and goes on along its tangent beyond their ends, where no result is taken
 from.
 
@@ -12,7 +14,7 @@ Equation (T.14) of docs/theory.md.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import jax.numpy as jnp
 import numpy as np
@@ -20,6 +22,7 @@ from scipy.interpolate import PchipInterpolator
 
 from ...case.part import QUARTER
 from ...case.quantity import GRAVITY
+from ..law import FlowLaw, Traceable
 from ..term import FlowTerm
 
 
@@ -78,11 +81,36 @@ class Pump(FlowTerm):
         Flow and head of a fluid of another density are those of the same pressures.
         """
         size = self.density / parameters["density"]
-        flow = self.copies * inlet_area * velocity / jnp.sqrt(size)
-        return size * GRAVITY * (self.curve(flow) - self.reference)
+        return size * GRAVITY * (self._head_at(velocity, inlet_area, parameters) - self.reference)
+
+    def _head_at(self, velocity, inlet_area, parameters):
+        flow = self.copies * inlet_area * velocity / jnp.sqrt(self.density / parameters["density"])
+        return self.curve(flow)
+
+    def lifted(self, velocity: float, inlet_area: float, parameters) -> Pump:
+        """The pump with a static lift by which it has P_0 at a velocity at the far end, which is referred to the
+        inlet's section.
+        """
+        return self.changed(reference=float(self._head_at(velocity, inlet_area, parameters)))
 
     def head(self, stream, parameters):
         return -self.gain(stream.inner[0], stream.area[-1], parameters)
+
+
+def with_static_lift(law: FlowLaw, area: np.ndarray, inner: np.ndarray, parameters: Mapping[str, float]) -> FlowLaw:
+    """A flow law whose pumps have P_0 in a steady flow of given unknowns: a static lift makes up the difference."""
+    velocity = law.far_velocity(inner)
+
+    def lifted(part):
+        if isinstance(part, Pump):
+            return part.lifted(velocity, float(area[-1]), parameters)
+        if isinstance(part, tuple):
+            return tuple(map(lifted, part))
+        if isinstance(part, Traceable):
+            return part.changed(**{name: lifted(getattr(part, name)) for name in part.DATA})
+        return part
+
+    return lifted(law)
 
 
 def from_case(case) -> Pump | None:

@@ -96,12 +96,12 @@ def _with_stability(axes, result: StudyResult, x: np.ndarray, y: np.ndarray, fir
 
 
 def _mark_special(result: StudyResult, axes) -> None:
-    scale = PARAMETERS[result.parameter].scale
+    row = PARAMETERS[result.parameter]
     for special in result.special_points:
-        x, y = special["value"] / scale, 1e3 * special["amplitude"]
+        x, y = special["value"] / row.scale, 1e3 * special["amplitude"]
         axes.plot(x, y, "D", color=ACCENT, ms=6, zorder=5)
         look = {"textcoords": "offset points", "fontsize": 8.5, "color": ACCENT, "path_effects": HALO}
-        axes.annotate(f"{special['kind']}\n{x:.4g}", (x, y), xytext=(8, -7), va="top", **look)
+        axes.annotate(f"{special['kind']}\n{row.amount(special['value'], 4)}", (x, y), xytext=(8, -7), va="top", **look)
 
 
 def envelope(result: StudyResult) -> Figure:

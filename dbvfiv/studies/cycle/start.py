@@ -11,6 +11,7 @@ from continuation.periodic import PeriodicMotion
 from ...case.parameters import PARAMETERS, Mu
 from ...errors import CaseError, SolveError
 from ...model.valve import ValveModel
+from ...motion.control import Drive
 from ...motion.equations import ValveMotion
 from ...motion.scheme import scheme
 from ...motion.stepper import StepFailure, Stepper, consistent_state
@@ -117,6 +118,8 @@ def given_motion(case: Case, walk: StabilityWalk) -> Given:
             key="cycle.start_file",
         )
     value = Mu.of(result.case)[axis.parameter]
+    if result.kind == "transient" and axis.parameter == "pressure":
+        value = Drive.of(result.case)(float(result.history["time"][-1]))
     point = _cycle_of(case, result) if result.kind == "cycle" else None
     if point is not None and result.parameter == axis.parameter:
         value = float(point.value)
@@ -151,7 +154,10 @@ def _cycle_of(case: Case, result):
 def _last_period(model: ValveModel, case: Case, place: Mu, result) -> PeriodicMotion:
     """One period, in steps, from the last state of a run."""
     verdict = result.verdict
-    if verdict["verdict"] != "limit cycle" or not verdict["frequency"]:
+    # the lip may be in a limit cycle beside a steady flow, and the other way round
+    signals = [verdict.get(name, {}) for name in ("lip_displacement", "mass_flow")]
+    frequency = next((one["frequency"] for one in signals if one.get("verdict") == "limit cycle"), None)
+    if verdict["verdict"] != "limit cycle" or not frequency:
         raise CaseError(
             f"The run in {str(case.cycle.start_file)!r} has not settled on a cycle; its verdict is "
             f"{verdict['verdict']}.",
@@ -163,7 +169,7 @@ def _last_period(model: ValveModel, case: Case, place: Mu, result) -> PeriodicMo
             "states do not hold the waves; start it from an onset, or from a cycle.",
             key="cycle.start_file",
         )
-    state, inlet, period = result.states[-1], place.pressure, 1.0 / verdict["frequency"]
+    state, inlet, period = result.states[-1], place.pressure, 1.0 / frequency
     motion = ValveMotion(model, place)
     dofs = model.shell.dofs
     speed = float(state.station_velocity[-1])

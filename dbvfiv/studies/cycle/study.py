@@ -284,16 +284,18 @@ def _from_onset(case: Case, walk: StabilityWalk, record: GrowingRecord) -> None:
     follower = Follower(case, walk, onset.place, axis.parameter, onset.spectrum)
     keeper = _Keeper(record, follower)
     known = read_points(record, onset.place.for_system(), follower.name)
-    if len(known) < 2:
+    if record.notes(STEP):
+        first = next((point for point in known if not point.asked), known[0])
+        tracer = follower.tracer(axis.values, first.motion)
+        tracer.restore(known, follower.at_rest(onset))
+    else:
         record.progress(f"first cycles, beside {axis.parameter} = {onset.value:.6g}")
         keeper.known = len(known)
-        tracer, missed = follower.begin(onset, axis.values, keeper.keep)
+        tracer, missed = follower.begin(onset, axis.values, keeper.keep, keeper.special())
         for sentence in missed:
-            record.note(MISSED, text=sentence)
+            if sentence not in [note["text"] for note in record.notes(MISSED)]:
+                record.note(MISSED, text=sentence)
             record.warn(sentence)
-    else:
-        tracer = follower.tracer(axis.values, known[0].motion)
-        tracer.restore(known)
     keeper.follow(tracer)
 
 
@@ -324,7 +326,8 @@ def _from_file(case: Case, walk: StabilityWalk, record: GrowingRecord) -> None:
             except SolveError as error:
                 keeper.end(tracer, Reason.NO_CYCLE(why=error))
                 continue
-            tracer.extend(second, False, keeper.keep)
+            tracer.known = keeper.special()
+            tracer.extend(second, second.mu[follower.name] in axis.values, keeper.keep)
         keeper.follow(tracer)
 
 
@@ -347,8 +350,11 @@ class _Keeper:
         """Follow a leg to its end."""
         self._tracer, now = tracer, {"leg": self.leg, "cycles": self.record.rows(CYCLES)}
         steps = [note["step"] for note in self.record.notes(STEP) if now.items() <= note.items()]
-        known = [(note["kind"], note["value"]) for note in self.record.notes(SPECIAL)]
-        self.end(tracer, tracer.run(self.keep, steps[-1] if steps else None, known))
+        self.end(tracer, tracer.run(self.keep, steps[-1] if steps else None, self.special()))
+
+    def special(self) -> list[tuple[str, float]]:
+        """Kinds and values of the special points that the record holds."""
+        return [(note["kind"], note["value"]) for note in self.record.notes(SPECIAL)]
 
     def end(self, tracer: CycleTracer, reason: Said) -> None:
         """Note why a leg ended."""

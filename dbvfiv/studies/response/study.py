@@ -291,28 +291,52 @@ def rows_to_keep(known: Record, _case: Case) -> dict[str, int]:
 
 
 def check(case: Case) -> None:
-    """Refuse a range of what the case does not have, and a fluid without inertia."""
+    """Refuse a range of what the case does not have, a fluid without inertia, and noise that has no power within the
+    frequencies.
+    """
     check_scan(case, case.response.parameter)
     require_inertia(case)
+    left_out(case)
 
 
-def left_out(case: Case) -> str:
-    """Sentence on the power of response.spectrum above response.max_frequency; empty without any.
+def frequencies(case: Case) -> np.ndarray:
+    """Frequencies, Hz, that the response is made for: those of the curves, and some below them."""
+    # down to a little above zero: a long line lets slow pulsation through that it keeps from faster one
+    step = case.response.max_frequency / case.response.count
+    return np.append(step * SLOW, step * np.arange(1, case.response.count + 1))
+
+
+def left_out(case: Case) -> list[str]:
+    """Sentences on the power of response.spectrum beyond the frequencies that the response is made for.
 
     Raises
     ------
     CaseError
+        Without any power within them.
     """
     frequency, power = np.transpose(case.response.density())
-    most, whole = case.response.max_frequency, trapezoid(power, frequency)
-    within = np.append(frequency[frequency < most], min(most, frequency[-1]))
-    share = 1.0 - trapezoid(np.interp(within, frequency, power), within) / whole if whole else 0.0
-    if share < 1e-6:
-        return ""
-    return (
-        f"response.spectrum has {100 * share:.3g} % of its power above response.max_frequency = {most:g} Hz, which "
-        "root mean squares are without."
+    (low, most), whole = frequencies(case)[[0, -1]], trapezoid(power, frequency)
+
+    def up_to(limit: float) -> float:
+        within = np.append(frequency[frequency < limit], min(limit, frequency[-1]))
+        return trapezoid(np.interp(within, frequency, power), within)
+
+    below, above = up_to(low), whole - up_to(most)
+    if not whole - below - above > 1e-12 * whole:
+        raise CaseError(
+            f"response.spectrum has no power between {low:.4g} and {most:g} Hz, so nothing moves; give a spectrum that "
+            "has, or response.max_frequency and response.count.",
+            key="response.spectrum",
+        )
+    parts = (
+        (below, 1e-3, f"below {low:.4g} Hz, a hundredth of the step that response.count gives"),
+        (above, 1e-6, f"above response.max_frequency = {most:g} Hz"),
     )
+    return [
+        f"response.spectrum has {100 * part / whole:.3g} % of its power {where}, which root mean squares are without."
+        for part, least, where in parts
+        if part >= least * whole
+    ]
 
 
 def run(session: Session, record: GrowingRecord) -> None:
@@ -331,7 +355,7 @@ def run(session: Session, record: GrowingRecord) -> None:
     walk = StabilityWalk(case, record, session.model)
     done = set(record.column(POINTS, "value"))
     record.begin("response", len(values))
-    if sentence := left_out(case):
+    for sentence in left_out(case):
         record.warn(sentence)
     for value in values:
         if value in done:
@@ -345,15 +369,12 @@ def run(session: Session, record: GrowingRecord) -> None:
 
 def _respond(walk: StabilityWalk, place: Mu, value: float, rows, record: GrowingRecord) -> None:
     """Keep the response at one parameter point."""
-    asked = walk.case.response
     verdict = walk.verdict(place)
     if not verdict.stable:
         state = "is not stable" if verdict.stable is False else "is not known to be stable"
         raise SolveError(f"the state {state}, so that motions about it do not stay small. {verdict.reason}")
-    # down to a little above zero: a long line lets slow pulsation through that it keeps from faster one
-    step = asked.max_frequency / asked.count
-    even = step * np.arange(1, asked.count + 1)
-    transfer = Transfer(walk.family(place).linear, place, np.append(step * SLOW, even))
+    transfer = Transfer(walk.family(place).linear, place, frequencies(walk.case))
+    even = transfer.frequencies[len(SLOW) :]
     curve = transfer.at(even)
     columns: dict[str, Any] = {"value": np.full(len(curve), value), "frequency": even}
     for name, row in zip(OUTPUTS, curve.T):

@@ -24,6 +24,7 @@ from ...drawing.style import (
     some_of,
 )
 from ...drawing.views import closed_section, draw_deformed, draw_layers, faces, mark_pieces
+from ...flow.terms.pump import from_case as pump_of
 from ..case import Case
 from ..comparing import MEASURED, draw_curve, draw_runs, draw_shapes, labels
 from ..result import StudyResult
@@ -90,7 +91,8 @@ def operating_point(result: StudyResult) -> Figure:
     """Total head that the valve takes and that the line leaves it, over the flow; they cross where the valve works.
 
     The head of the line is that of its far end less losses that go with the square of the flow, for some of the
-    pressures.
+    pressures: at the far end that of a reservoir, a static one with the velocity head of the flow, or what a pump
+    gives, with the static lift of the state, as far as its table goes.
     """
     states = [state for state in ordered(result) if state.hydraulics is not None]
     figure, axes = _over(result, "Flow, L/s", "Total head at the flange, m", {})
@@ -102,10 +104,21 @@ def operating_point(result: StudyResult) -> Figure:
     reach = np.linspace(0.0, 1.15 * flow.max(), 60)
     for state, colour in zip(chosen, pressure_colours([s.pressure for s in chosen])):
         found, label = state.hydraulics, f"line, {kilopascals(state.pressure)}"
-        lost = found.line_loss * (reach / (1e3 * state.volume_flow)) ** 2
-        axes.plot(reach, found.supply_head - lost, "--", color=colour, lw=1.2, label=label)
+        axes.plot(reach, left_by_line(result.case, state, reach), "--", color=colour, lw=1.2, label=label)
         axes.plot(1e3 * state.volume_flow, found.total_head, "o", color=colour)
     return _finish(figure, axes, "Operating points")
+
+
+def left_by_line(case: Case, state: Any, flow: np.ndarray) -> np.ndarray:
+    """Total head, m, that the line of a state leaves at flows, L/s; none where the pump's table has none."""
+    found, own = state.hydraulics, 1e3 * state.volume_flow
+    square, head = (flow / own) ** 2, np.full_like(flow, found.supply_head)
+    if case.drive.at == "line":
+        head += (found.supply_head - head_of(state.pressure - case.level_pressure, case.fluid.density)) * (square - 1.0)
+    if (pump := pump_of(case)) is not None:
+        given = np.array([float(pump.curve(q)) if pump.holds(q) else np.nan for q in 1e-3 * flow])
+        head += given - float(pump.curve(1e-3 * own))
+    return head - found.line_loss * square
 
 
 def area_discharge(result: StudyResult) -> Figure:

@@ -147,7 +147,8 @@ class Tracking:
         if pencil not in self.spectra:
             place, count = self.line.place(self.values[pencil]), self.options.count + MARGIN
             options = replace(self.walk.search(place).options, tolerance=self.tolerance)
-            self.spectra[pencil] = self._leading(pencil, count, options)
+            with name_state_in_failures(place.pressure):
+                self.spectra[pencil] = self._leading(pencil, count, options)
         return self.spectra[pencil]
 
     def _leading(self, pencil: CoupledPencil, count: int, options: SearchOptions) -> Spectrum:

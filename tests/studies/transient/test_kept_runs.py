@@ -20,7 +20,7 @@ from dbvfiv.record.files import Header
 from dbvfiv.record.mesh import MeshData
 from dbvfiv.record.record import GrowingRecord, Journal, StoredRecord
 from dbvfiv.studies.case import Case
-from dbvfiv.studies.session import load_result
+from dbvfiv.studies.session import Session, load_result
 from dbvfiv.studies.transient import history
 from dbvfiv.studies.transient.history import (
     FACES,
@@ -73,6 +73,9 @@ def test_a_file_holds_the_run(tmp_path, valve):
     ).start()
     assert again.history["lip_displacement"][0] == result.history["lip_displacement"][10]
     assert again.history["mass_flow"][0] == pytest.approx(result.history["mass_flow"][10], rel=1e-6)
+    with pytest.raises(CaseError, match="a file that the case reads"):
+        Session(again.case).perform("transient", tmp_path / "run.h5")
+    assert len(load_result(tmp_path / "run.h5").states) == 5
 
 
 #: Light fluid: the lips are slamming when the run is interrupted.
