@@ -190,15 +190,29 @@ def test_the_critical_damping_is_sought_among_factors_that_the_materials_reach()
         (lambda beta: -1.0, "stable", 0.0, (np.nan, np.nan)),  # nothing to take away
         (lambda beta: -1.0, "flutters", 1e-3, (np.nan, np.nan)),  # another verdict than that of the full matrices
         (lambda beta: np.nan if beta < 0.2e-3 else -1.0, "stable", 1e-3, (np.nan, 0.22361)),
-        (None, "stable", 1e-3, (np.nan, np.nan)),
     ],
 )
 def test_damping_that_was_looked_at_is_told_from_damping_that_was_not(monkeypatch, rates, outcome, beta, found):
+    assert sought_of(monkeypatch, rates, outcome, beta, True) == pytest.approx(found, rel=1e-4, nan_ok=True)
+
+
+@pytest.mark.parametrize("forces, rate, sought", [(0, -1.0, 0.05), (0, 1.0, np.nan), (3, -1.0, np.nan)])
+def test_a_wall_that_no_fluid_couples_is_looked_at_with_the_least_damping(monkeypatch, forces, rate, sought):
+    found = sought_of(monkeypatch, lambda beta: rate, "stable", 1e-3, False, forces)
+    assert found == pytest.approx((np.nan, sought), nan_ok=True)
+
+
+def sought_of(monkeypatch, rates, outcome, beta, reduced, forces=3):
+    """Multiples of the damping of a wall whose mode grows by a function of beta."""
+
     class Line(ParameterLine):
-        is_reduced, column = rates is not None, SimpleNamespace(model=SimpleNamespace())
+        is_reduced, column = reduced, SimpleNamespace(model=SimpleNamespace())
 
         def locate(self, crossing, accuracy, scan):
             return SimpleNamespace(value=0.3e-3, residual=0.0)
+
+        def spectrum(self, value):
+            return np.array(eigenvalues(self.place(value)))
 
     def eigenvalues(place):
         rate = rates(place.beta)
@@ -206,8 +220,9 @@ def test_damping_that_was_looked_at_is_told_from_damping_that_was_not(monkeypatc
 
     Line.column.model.eigenvalues = eigenvalues
     monkeypatch.setattr(modes_search, "ParameterLine", Line)
-    walk, place = SimpleNamespace(case=None), Mu(beta=beta, alpha=5.0)
-    assert critical_damping_factor(walk, place, Verdict(outcome, "")) == pytest.approx(found, rel=1e-4, nan_ok=True)
+    family = SimpleNamespace(forces=np.zeros((9, forces)))
+    walk, place = SimpleNamespace(case=None, family=lambda _: family), Mu(beta=beta, alpha=5.0)
+    return critical_damping_factor(walk, place, Verdict(outcome, ""))
 
 
 def test_the_critical_damping_of_a_mode_beyond_the_list():

@@ -575,8 +575,10 @@ def critical_damping_factor(walk: StabilityWalk, place: Mu, verdict: Verdict) ->
         highest = walk.built(place).model.relaxation.highest(own, min(highest, own * factors.max()))
     factors = factors[own * factors <= highest]
     line = ParameterLine(walk, place, name, own * factors)
-    if not line.is_reduced:
-        return np.nan, np.nan
+    if not line.is_reduced:  # a wall that nothing couples, which with the least damping is nearest to growth
+        alone = verdict.outcome == STABLE and not walk.family(place).forces.shape[1]
+        calm = alone and (line.spectrum(line.values[-1]).real < 0).all()
+        return np.nan, float(factors[-1]) if calm else np.nan
 
     def flutter(value: float) -> np.ndarray:
         values = np.asarray(line.column.model.eigenvalues(line.place(value)))
