@@ -296,7 +296,8 @@ class Valve:
         asked = {"identify.records": given, "identify.over": write_axis(over)}
         own = {name: changes.pop(name) for name in [*changes] if name in ("samples", "round", "rounds", "seed")}
         asked |= {f"identify.{name}": value for name, value in own.items()}
-        return self._ask("identify", asked, changes, output, observer, workers=workers)
+        shared = None if workers is None else read_workers(workers)
+        return self._ask("identify", asked, changes, output, observer, workers=shared)
 
     def closure(
         self,
@@ -396,10 +397,9 @@ class Valve:
         ------
         CaseError, SolveError
         """
-        if workers is not None:
-            self.case.replace({"map.workers": workers})  # refuses what is no number of processes
         asked = {"map.x": write_axis(x), "map.y": write_axis(y)}
-        return self._ask("map", asked, changes, output, observer, workers=workers)
+        shared = None if workers is None else read_workers(workers)
+        return self._ask("map", asked, changes, output, observer, workers=shared)
 
     def uncertainty(
         self,

@@ -248,11 +248,10 @@ HEAD = """# The case file, key by key
 
 A case file is TOML. Quantities are SI numbers or strings with units ("36 kPa", "12 mm", "54 deg", "10 %"); plain
 numbers may also be fractions ("3/28"). Pressures are static ones, over that of the surroundings; they may be given as
-heads: "2 m" of the fluid of fluid.density, turned into Pa when the case is read, or "2 mH2O" of water (in ranges only
-so). Every key has a default except those marked *required*; together the defaults are the 12-inch inline valve. Any
-key can be changed for one run with `--set KEY=VALUE`, list elements by their index from 0
-(`--set layers.2.angle="45 deg"`). A key that is set so stands in the place of one of the file that says the same, a
-`drive.head` in that of a `drive.pressure`.
+heads: "2 m" of the fluid of fluid.density, turned into Pa when the case is read, or "2 mH2O" of water. Every key has a
+default except those marked *required*; together the defaults are the 12-inch inline valve. Any key can be changed for
+one run with `--set KEY=VALUE`, list elements by their index from 0 (`--set layers.2.angle="45 deg"`). A key that is set
+so stands in the place of one of the file that says the same, a `drive.head` in that of a `drive.pressure`.
 
 Materials of one's own are tables `[materials.NAME]` of one of the kinds below; the names CR, SBR, EPDM and fibre are
 built in and may be replaced the same way.

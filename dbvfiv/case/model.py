@@ -413,11 +413,13 @@ def change_case(case: Case, changes: Changes) -> Case:
         try:
             return case.replace(wanted)
         except CaseError as error:
-            given = wanted.get(error.key)
+            # of a list its first bad element is blamed
+            name = next((name for name in wanted if f"{error.key}.".startswith(f"{name}.")), error.key)
+            given = wanted.get(name)
             other = toml_value(given) if isinstance(given, str) else given
             if other is given:
                 raise
-            wanted[error.key] = other
+            wanted[name] = other
 
 
 def _as_mapping(changes: Changes) -> dict[str, Any]:

@@ -4,6 +4,7 @@ and the rubber by which the life of a valve is told.
 
 from __future__ import annotations
 
+from datetime import date
 from typing import Annotated, Any, Literal
 
 from pydantic import AfterValidator, BeforeValidator, StrictStr, ValidationInfo, field_validator, model_validator
@@ -14,7 +15,13 @@ from .quantity import Length, Quantity
 from .section import BrokenRule, Described, Section, key
 from .units import read_units
 
-Text = Annotated[StrictStr, Described("text", "a text")]
+
+def _as_text(given: Any) -> Any:
+    """Text of a number or a date, as TOML reads revision = 2 and date = 2026-05-01."""
+    return str(given) if isinstance(given, (int, float, date)) and not isinstance(given, bool) else given
+
+
+Text = Annotated[StrictStr, BeforeValidator(_as_text), Described("text", "a text")]
 
 
 def _known_units(text: str) -> str:

@@ -549,6 +549,7 @@ def _signals_of_run(file: Path, columns: list[str] | None) -> list[Signal]:
         raise CaseError(f"{str(file)!r} holds a result of kind {result.kind!r} and no time series.")
     known = [name for name, values in result.history.items() if values.ndim == 1]
     names = columns or ["mass_flow", "lip_opening"]
+    names = [known[int(name) - 1] if name.isdigit() and 0 < int(name) <= len(known) else name for name in names]
     for name in names:
         if name not in known:
             raise CaseError(f"The run has no column {name!r}; it has {', '.join(known)}.")

@@ -140,6 +140,8 @@ def test_replace_leaves_the_original_alone_and_checks_again():
     "given",
     [
         ["downstream.length=2", "downstream.pipe_diameter=0.4"],
+        ["report.heads=5000", "life.precursor=2e-5"],
+        ["project.tag=12", "project.date=2026-11-29"],
         ["downstream.length=2"],
         ["downstream.length=-2", "downstream.pipe_diameter=400 mm"],
     ],
@@ -152,6 +154,12 @@ def test_changes_from_python_are_those_of_set(given):
         except CaseError as error:
             found.append(str(error).removeprefix("In an override, "))
     assert found[0] == found[1]
+
+
+def test_texts_may_be_numbers_and_dates():
+    project = load_case(None, ["project.tag=12", "project.date=2026-11-29", "project.revision=1.2"]).project
+    assert (project.tag, project.date, project.revision) == ("12", "2026-11-29", "1.2")
+    assert change_case(Case(), "report.heads=5000").report.heads == (5000.0,)
 
 
 def test_a_rubber_takes_another_hardness():

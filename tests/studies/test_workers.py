@@ -15,6 +15,7 @@ from dbvfiv.errors import CaseError
 from dbvfiv.runtime import mpi_size
 from dbvfiv.studies import KINDS
 from dbvfiv.studies import workers as module
+from dbvfiv.studies.case import Case
 from dbvfiv.studies.session import find_study
 from dbvfiv.studies.workers import Lost, Work, Workers, read_workers, require_answer
 from tests.studies.work import TASKS, dies, expected, root_of, run_under_mpi, start
@@ -38,6 +39,13 @@ def test_new_workers_are_for_the_studies_that_share_their_work(kind, monkeypatch
     else:
         with refused(CaseError, match=f"Workers belong to .*'r.h5' is of kind '{kind}'"):
             api.resume("r.h5", workers="2")
+
+
+@pytest.mark.parametrize("kind", ["map", "identify"])
+def test_a_number_of_workers_may_be_a_text(kind, monkeypatch):
+    monkeypatch.setattr(api.Valve, "_ask", lambda *_, **choices: choices["workers"])
+    ask = getattr(api.Valve(Case(), "valve"), kind)
+    assert (ask(workers="2"), ask(workers=None), ask(workers="tcp://host:1")) == (2, None, "tcp://host:1")
 
 
 def test_processes_give_what_one_gives():

@@ -1,10 +1,15 @@
 """The commands transient, resume, verdict and compare."""
 
 import json
+from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
+from dbvfiv.cli.results import _signals_of_run
+from dbvfiv.errors import CaseError
+from dbvfiv.studies import session
 from tests.small_valves import SMALL, settings
 
 SHORT = settings(SMALL | {"transient.duration": 0.02, "transient.save_every": 0.005})
@@ -79,6 +84,18 @@ def test_signals_with_names_that_look_alike_in_files_have_their_own(command_line
     )
     assert command_line("verdict", file, "--plots", tmp_path / "figures").status == 0
     assert {p.name for p in (tmp_path / "figures").iterdir()} == {"p-in.png", "p-in-2.png", "Druck-\u03c1.png"}
+
+
+def test_columns_of_a_run_have_numbers_too(monkeypatch):
+    history = {name: np.zeros(3) for name in ("time", "mass_flow", "lip_opening")}
+    run = SimpleNamespace(kind="transient", history=history)
+    monkeypatch.setattr(session, "load_result", lambda _: run)
+    assert [signal.name for signal in _signals_of_run(Path("r.h5"), ["2", "lip_opening"])] == [
+        "mass_flow",
+        "lip_opening",
+    ]
+    with pytest.raises(CaseError, match="no column '4'"):
+        _signals_of_run(Path("r.h5"), ["4"])
 
 
 def test_verdict_without_times(command_line, tmp_path):
