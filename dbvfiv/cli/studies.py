@@ -178,8 +178,12 @@ def _report(
         return [result.case.units.say(line) for line in lines]
 
     document = result.summary() | {"output": str(output) if output else None} if as_json else {}
-    print_answer(document, lines, as_json, (draw() if as_json else (), plots), output)
-    if not as_json:  # what was found is told before a film may fail
+    drawn: list[Path] = []
+    try:
+        drawn = draw() if as_json else []
+    finally:  # what was found is told where a figure or a film fails
+        print_answer(document, lines, as_json, (drawn, plots), output)
+    if not as_json:
         print_figures(draw(), plots)
     results = [result, *others]
     if any(each.interrupted for each in results):

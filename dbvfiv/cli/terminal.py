@@ -35,9 +35,17 @@ def _writable(path: Path | None) -> Path | None:
 
 
 def _folder(path: Path | None) -> Path | None:
-    """Refuse a name for figures that is taken by a file before anything is computed."""
-    if path is not None and path.exists() and not path.is_dir():
+    """Refuse a name for figures that is taken by a file, or cannot be written, before anything is computed."""
+    if path is None:
+        return None
+    from ..record.files import check_folder
+
+    if path.exists() and not path.is_dir():
         raise CaseError(f"--plots {str(path)!r} is a file and not a folder.")
+    try:
+        check_folder(path.absolute())
+    except OSError as error:
+        raise CaseError(f"--plots {str(path)!r} cannot be written ({error.strerror}).") from None
     return path
 
 
@@ -105,9 +113,9 @@ def print_answer(
 
 
 def print_figures(figures: Sequence[Path], folder: Path | None) -> None:
-    """Print how many figures are in a folder; nothing without any."""
+    """Print how many figures are in a folder, or in that of the first where none was asked for; nothing without any."""
     if figures:
-        print(f"{len(figures)} figure{'s' * (len(figures) > 1)} in {folder}.")
+        print(f"{len(figures)} figure{'s' * (len(figures) > 1)} in {folder or figures[0].parent}.")
 
 
 def print_written(written: Path | Sequence[Path], as_json: bool) -> None:

@@ -136,7 +136,7 @@ class WriterLock:
             self._descriptor = -1
 
 
-def _check_folder(folder: Path) -> None:
+def check_folder(folder: Path) -> None:
     """Try a file without a name in a folder, or in the nearest that there is: nothing can stay behind of it."""
     while not folder.exists():
         folder = folder.parent
@@ -320,7 +320,7 @@ def check_writable(path: str | Path) -> None:
                     _lock(descriptor, path)
                 finally:
                     os.close(descriptor)
-            _check_folder(path.absolute().parent)
+            check_folder(path.absolute().parent)
     except OSError as error:
         raise unwritable(path, error) from None
     refuse_foreign(path)

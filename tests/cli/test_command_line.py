@@ -10,6 +10,7 @@ import pytest
 import typer
 
 from dbvfiv.cli import main, run
+from dbvfiv.cli.studies import _report
 from dbvfiv.cli.terminal import print_json
 from dbvfiv.errors import CaseError, SolveError
 from dbvfiv.studies.case import Case, load_case
@@ -200,6 +201,30 @@ def test_json_of_arrays_and_of_what_is_not_finite(capsys):
         "c": [1, None],
         "d": {"re": 1.0, "im": 2.0},
     }
+
+
+def test_a_folder_that_cannot_be_written_is_refused_before_the_work(command_line, one_sentence, tmp_path):
+    (tmp_path / "a.txt").write_text("words")
+    outcome = command_line("modes", "--json", "--plots", tmp_path / "a.txt" / "figures")
+    assert outcome.status == 2 and one_sentence(outcome.err) and "figures' cannot be written" in outcome.err
+
+
+def test_an_answer_is_told_where_its_figure_fails(capsys, tmp_path):
+    """In JSON too; and where a film alone was asked for, its folder is named."""
+
+    class Drawn(types.SimpleNamespace):
+        drawable, interrupted, record = True, False, types.SimpleNamespace(settled=None)
+        case = types.SimpleNamespace(units=types.SimpleNamespace(say=str))
+        summary, lines, shortfall = (lambda self: {"a": 1}), (lambda self: ["a 1"]), (lambda self: None)
+
+        def plot(self, folder):
+            raise SolveError("No figure.")
+
+    with pytest.raises(SolveError, match="No figure"):
+        _report(Drawn(), None, tmp_path, True)
+    assert json.loads(capsys.readouterr().out) == {"a": 1, "output": None, "figures": []}
+    _report(Drawn(), None, None, False, further=lambda result: [tmp_path / "run.gif"])
+    assert capsys.readouterr().out == f"a 1\n1 figure in {tmp_path}.\n"
 
 
 def test_a_result_that_cannot_be_written_is_refused_before_the_work(tmp_path, capsys):
