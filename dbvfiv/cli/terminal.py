@@ -113,9 +113,9 @@ def print_answer(
 
 
 def print_figures(figures: Sequence[Path], folder: Path | None) -> None:
-    """Print how many figures are in a folder; nothing without any."""
+    """Print how many figures are in a folder, or in that of the first where none was asked for; nothing without any."""
     if figures:
-        print(f"{len(figures)} figure{'s' * (len(figures) > 1)} in {folder}.")
+        print(f"{len(figures)} figure{'s' * (len(figures) > 1)} in {folder or figures[0].parent}.")
 
 
 def print_written(written: Path | Sequence[Path], as_json: bool) -> None:

@@ -217,6 +217,24 @@ def test_json_of_arrays_and_of_what_is_not_finite(capsys):
     }
 
 
+def test_an_answer_is_told_where_its_figure_fails(capsys, tmp_path):
+    """In JSON too; and where a film alone was asked for, its folder is named."""
+
+    class Drawn(types.SimpleNamespace):
+        drawable, interrupted, record = True, False, types.SimpleNamespace(settled=None)
+        case = types.SimpleNamespace(units=types.SimpleNamespace(say=str))
+        summary, lines, shortfall = (lambda self: {"a": 1}), (lambda self: ["a 1"]), (lambda self: None)
+
+        def plot(self, folder):
+            raise SolveError("No figure.")
+
+    with pytest.raises(SolveError, match="No figure"):
+        _report(Drawn(), None, tmp_path, True)
+    assert json.loads(capsys.readouterr().out) == {"a": 1, "output": None, "figures": []}
+    _report(Drawn(), None, None, False, further=lambda result: [tmp_path / "run.gif"])
+    assert capsys.readouterr().out == f"a 1\n1 figure in {tmp_path}.\n"
+
+
 def test_a_result_that_cannot_be_written_is_refused_before_the_work(tmp_path, capsys):
     notes = tmp_path / "notes.md"
     notes.write_text("not a result")
@@ -250,14 +268,3 @@ def test_a_folder_for_figures_that_cannot_be_made_is_refused_first(command_line,
     (tmp_path / "file").write_text("")
     done = command_line("steady", "-p", "6 kPa", "--plots", tmp_path / "file" / "figures")
     assert done.status == 2 and "--plots" in done.err and one_sentence(done.err)
-
-
-def test_a_document_is_printed_where_a_figure_fails(capsys):
-    def plot(folder):
-        raise CaseError("No figure.")
-
-    record = types.SimpleNamespace(settled=None)
-    result = types.SimpleNamespace(plot=plot, drawable=True, summary=lambda: {"a": 1}, record=record)
-    with pytest.raises(CaseError, match="No figure"):
-        _report(result, None, Path("figures"), as_json=True)
-    assert json.loads(capsys.readouterr().out) == {"a": 1, "output": None, "figures": []}
