@@ -67,6 +67,7 @@ def test_orbits_of_the_reactor_have_the_mean_divergence_for_exponent(seed):
     B, b, limit = draw.uniform(5, 25), draw.uniform(0.5, 4), 10 ** draw.uniform(-2.5, 0.5)
     limits, mu = {"D": (0.0, limit)}, {"D": FIRST, "B": B, "b": b}
     branch = continue_branch(REACTOR, [0.0, 0.0], mu, "D", ContinuationOptions(eigenvalues=2, limits=limits))
+    assert branch.of_kind("hopf")
     for hopf in branch.of_kind("hopf"):
         orbits = orbits_from_hopf(
             REACTOR, hopf, "D", ContinuationOptions(limits=limits), OrbitOptions(max_harmonics=40)

@@ -92,7 +92,7 @@ def test_a_defective_pair_is_reported():
     modes = leading_modes(pencil, 2, SearchOptions(left=True))
     assert np.abs(modes.eigenvalues + 1).max() < 1e-6
     assert modes.residual.max() < 1e-8
-    assert any("defective" in note for note in modes.notes) or np.abs(modes.left_q).max() > 1e6
+    assert any("defective" in note for note in modes.notes)
 
 
 def test_shift_on_an_eigenvalue_is_moved_and_said():

@@ -112,4 +112,8 @@ def test_a_steep_pump_changes_the_onset_as_the_closed_form_says(steep):
             assert onset == pytest.approx(k + c * r - m * k * r / (c + m * r), rel=1e-9)
         assert certified_spectrum(plug(1.01 * onset / unit, steep)[0], 2).unstable_count == 2
         assert certified_spectrum(plug(0.99 * onset / unit, steep)[0], 2).unstable_count == 0
+    else:  # the valve diverges first, where the constant of the cubic, k r - B d, vanishes
+        static = k * r / lost
+        counts = [certified_spectrum(plug(share * static / unit, steep)[0], 2).unstable_count for share in (0.99, 1.01)]
+        assert counts == [0, 1]
     print(steep, onset, omega2)

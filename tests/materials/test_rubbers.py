@@ -38,7 +38,7 @@ TABLE_3_3 = {
 
 @pytest.mark.parametrize("name", TABLE_3_3)
 def test_shipped_constants_round_to_the_printed_table(name):
-    for level, (c10, c01, c11, two_c10, two_c01) in zip(strain_levels(), TABLE_3_3[name]):
+    for level, (c10, c01, c11, two_c10, two_c01) in zip(strain_levels(), TABLE_3_3[name], strict=True):
         three, two = published_rubber(name, level), published_rubber(name, level, terms=2)
         # half a unit of the last printed digit, and a hair for decimal fractions
         np.testing.assert_allclose(
@@ -81,7 +81,7 @@ def _curve(name, level):
 
 @pytest.mark.parametrize("name", FOUND)
 def test_stable_constants_follow_the_published_curves(name):
-    for level, (r_squared, error) in zip(strain_levels(), FOUND[name]):
+    for level, (r_squared, error) in zip(strain_levels(), FOUND[name], strict=True):
         test, law = _curve(name, level), rubber(name, level)
         stress = form_of("softening").columns("uniaxial", test.strain, [law.x_0]) @ [
             law.mu_inf,

@@ -56,7 +56,7 @@ def test_pencils_carry_what_relaxes(state):
     dry = state.pencil(Mu(density=10.0, alpha=5.0, beta=0.0, loss_factor=1.0), fluid=False)
     assert wet.branches == dry.branches == 3
     for pencil in (wet, dry):
-        for found, expected in zip(pencil.relaxing, state.relaxing):
+        for found, expected in zip(pencil.relaxing, state.relaxing, strict=True):
             assert abs(found - expected).max() == 0.0
     assert state.relaxing is state.relaxing
     assert state.pencil(Mu(density=10.0, alpha=5.0, beta=0.0)).relaxation is None
@@ -75,5 +75,5 @@ def test_a_system_has_the_same_pencil(valve, state):
         state.pencil(Mu(density=10.0, alpha=5.0, beta=0.0, loss_factor=1.0)),
     )
     assert np.array_equal(found.relaxation.strengths, expected.relaxation.strengths)
-    assert all(abs(a - b).max() == 0.0 for a, b in zip(found.relaxing, expected.relaxing))
+    assert all(abs(a - b).max() == 0.0 for a, b in zip(found.relaxing, expected.relaxing, strict=True))
     assert abs(found.K - expected.K).max() < 1e-12 * abs(expected.K).max()

@@ -35,11 +35,9 @@ def test_consistent_accelerations_meet_the_model(valve, open_state, law):
     ):  # psi = U times an integral, at the areas' rates; only the outlet's equation fixes the rate of U
         rates = [residual(r)[-1] for r in (0.0, 1.0)]
         rate = -rates[0] / (rates[1] - rates[0])
-    force, outlet = np.split(residual(rate), [model.size])
+    force = residual(rate)[: model.size]
     scale = np.abs(state.force).max()
     assert np.abs(force).max() < 1e-9 * scale
-    if motion.fluid.moves:
-        assert abs(outlet) < 1e-6
 
 
 @pytest.mark.parametrize("law", LAWS + [{"fluid.unsteady": False}])

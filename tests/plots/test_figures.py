@@ -77,9 +77,9 @@ def test_colours_are_perceptual_and_styles_one(figures):
         grey = matplotlib.colormaps[name](np.linspace(0, 1, 64))[:, :3] @ [0.2126, 0.7152, 0.0722]
         assert (np.diff(grey) > 0).all(), name
     assert COLOURS.name == style.MOTION
-    bold = [f.axes[0].title.get_fontweight() for f in figures.values() if not f.get_suptitle()]
-    titles = [f.axes[0].get_title("left") for f in figures.values() if not f.get_suptitle()]
-    assert all(titles) and bold
+    titles = [f.axes[0]._left_title for f in figures.values() if not f.get_suptitle()]
+    assert all(title.get_text() for title in titles)
+    assert {title.get_fontweight() for title in titles} == {"bold"}
     for figure in figures.values():
         if figure.get_suptitle():
             assert figure._suptitle.get_ha() == "left" and figure._suptitle.get_fontweight() == "bold"

@@ -235,7 +235,9 @@ def test_a_killed_run_leaves_a_readable_file(tmp_path, coarse_valve, coarse_run)
             assert len(left.states) == self.number and not left.complete
             assert np.array_equal(left.states[-1].layers.stress, coarse_run.states[self.number - 1].layers.stress)
 
-    coarse_valve.steady([6e3, 18e3, 36e3], output=path, observer=Look())
+    look = Look()
+    coarse_valve.steady([6e3, 18e3, 36e3], output=path, observer=look)
+    assert look.number == 3
 
 
 def test_failures_are_kept_apart_from_warnings(tmp_path, coarse_valve):

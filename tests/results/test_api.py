@@ -33,7 +33,7 @@ def test_failures_are_raised(coarse_valve, refused):
         coarse_valve.replace({"steady.max_iterations": 2, "steady.min_step": 0.3}).steady(pressure=100)
     assert "No equilibrium" in str(caught.value)
     for pressure in (-1, float("nan"), "3 mm", [], True, None.__class__):
-        with pytest.raises((CaseError, TypeError)):
+        with pytest.raises(CaseError):
             coarse_valve.steady(pressure=pressure)
     with refused(CaseError):
         dbvfiv.load(thesis_case(), {"shell.metric": "true"})

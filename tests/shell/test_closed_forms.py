@@ -188,6 +188,8 @@ def test_patch(name):
     assert np.abs(full - exact.ravel()).max() < 1e-10 * np.abs(exact).max()
     strains = shell.strains(1e-4 * exact.ravel())  # small enough to be linear
     assert np.ptp(strains[..., 3:], axis=(0, 1, 2)).max() < 1e-9
+    if name == "transverse shear":
+        assert np.linalg.norm(strains[..., 3:], axis=-1) == pytest.approx(1e-7 * np.sqrt(5), rel=1e-6)
 
 
 def test_energy_is_the_work_of_the_loads():

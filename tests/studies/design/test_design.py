@@ -4,12 +4,13 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from scipy.special import softmax
 
 import dbvfiv
 from dbvfiv.case.statement import parse_statement
 from dbvfiv.errors import CaseError
 from dbvfiv.studies.case import thesis_case
-from dbvfiv.studies.design.problem import DesignProblem, Variable, statements_of, together
+from dbvfiv.studies.design.problem import SHARPNESS, DesignProblem, Variable, statements_of, together
 from dbvfiv.studies.design.study import CASE, DesignResult, _changed, draw_heads
 from dbvfiv.studies.inputs import Plan, quasi_random
 from dbvfiv.studies.stability.place import redesigned
@@ -261,8 +262,12 @@ def test_several_heads_of_an_aim_count_together(valve):
     values = tuple(one.start for one in problem.variables)
     pair = [problem.at(values, p, True) for p in (6e3, 9e3)]
     statement = type("S", (), {"quantity": "margin"})
-    value, _ = together(statement, pair)
-    assert value <= min(one.values["margin"] for one in pair)
+    for reserves in ((), (0.0, 1e-3), (1e-3, 0.0), (1.0, 0.0), (0.0, 1.0)):
+        margins = np.array([one.values["margin"] for one in pair]) - (reserves or 0.0)
+        shares = softmax(-SHARPNESS * margins)
+        value, slopes = together(statement, pair, reserves)
+        assert margins.min() - np.log(2) / SHARPNESS <= value <= margins.min()
+        assert slopes == pytest.approx(shares @ [one.slopes["margin"] for one in pair], rel=1e-9)
 
 
 @pytest.mark.parametrize(

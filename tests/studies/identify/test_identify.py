@@ -115,8 +115,9 @@ def test_a_hidden_valve_is_found(found):
     beta, modulus = document["inputs"]
     assert holds(beta, found.hidden.values[0]) and holds(modulus, found.hidden.values[1])
     assert beta["learned"] > 0.9 and modulus["learned"] > 0.5
-    for match, record in zip(document["matches"], found.records):
+    for match, record in zip(document["matches"], found.records, strict=True):
         assert match["modes"][0]["frequency"] == pytest.approx(record["frequency"], rel=0.003)
+    assert document["check"]["check"]["modes"]
     for mode in document["check"]["check"]["modes"]:
         assert mode["emulated"] == pytest.approx(mode["full"], rel=0.02)
     onset = found.hidden.onset()
