@@ -97,8 +97,8 @@ class Fluid(Section):
     )
     area_floor: Number = key(
         0.05,
-        "Smallest flow area, as a fraction of the lip gap area at rest; keeps a shut passage finite. Of a bill that is "
-        "moulded shut it is three quarters.",
+        "Smallest flow area, as a fraction of the lip gap area at rest, without the lens of lips that stand apart; "
+        "keeps a shut passage finite. Of a bill that is moulded shut it is three quarters.",
         gt=0,
         lt=1,
     )

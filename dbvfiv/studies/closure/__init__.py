@@ -45,7 +45,11 @@ class Keys(Section):
     )
     max_step: LoadPressure = key(1e3, "Largest load step; the stiffness is watched for buckling at each.")
     shut_fraction: Number = key(
-        0.2, "A section counts as shut when less than this fraction of the lip's opening at rest is left.", ge=0, lt=1
+        0.2,
+        "A section counts as shut when less than this fraction of the lip's opening at rest is left; of lips that "
+        "stand apart there, of their gap alone.",
+        ge=0,
+        lt=1,
     )
     eigenvalues: StrictInt = key(4, "Lowest eigenvalues of the tangent stiffness to follow.", ge=1, le=100)
     symmetry: Literal["SS", "all"] = key(
