@@ -233,8 +233,8 @@ def heads_part(found: Gathered) -> Part:
     sentences = (
         f"Modes about the steady state at each head, in all symmetry classes: {classes}.",
         f"The factor is that on the {factor} at which chatter begins, or ends where the valve chatters, in the first "
-        "and the last of the classes; none to the last one that was looked at where none is found, - where that is not "
-        "known.",
+        "and the last of the classes; where none is found, 'none to' the last one that was looked at; - where that is "
+        "not known.",
         *missing,
     )
     caption = (
