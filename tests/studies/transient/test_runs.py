@@ -299,5 +299,3 @@ def test_pressures_below_vacuum_are_told():
     pressure[50:60, 2] = -2.5e6
     sentence = beyond_model(history)
     assert "from 0.5051 s" in sentence and "10 %" in sentence and "-2500 kPa" in sentence
-
-
