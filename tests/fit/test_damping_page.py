@@ -51,7 +51,5 @@ def test_matches_of_rayleigh_damping(command_line):
     for name in ("CR", "SBR"):
         row = next(row for row in table_of("damping.md", " | ratio").rows if row[0] == f"{name}, shipped")
         printed = (*row[1].split(" and "), *row[3:])
-        assert all(agrees(cell, float(number), 0.51) for cell, number in zip(printed, found[name], strict=True)), (
-            row,
-            found[name],
-        )
+        pairs = zip(printed, found[name], strict=True)
+        assert all(agrees(cell, float(number), 0.51) for cell, number in pairs), (row, found[name])

@@ -26,7 +26,7 @@ def lowest(pencil, count, band=12.0):
 @pytest.mark.parametrize("inlet", ["flux", "head"])
 def test_table_to_the_printed_digits(inlet):
     found = lowest(channel_wall(1.0, 1.0, inlet), 3)
-    for value, expected, digit in zip(found, TABLE[inlet], DIGITS[inlet]):
+    for value, expected, digit in zip(found, TABLE[inlet], DIGITS[inlet], strict=True):
         assert abs(value.real - expected.real) <= digit
         assert abs(value.imag - expected.imag) <= digit
 
@@ -50,7 +50,8 @@ def test_table_on_a_fine_grid_by_krylov_method(inlet):
     found = modes.eigenvalues[np.argsort(np.abs(modes.eigenvalues))]
     # the stiffest element is 1e14 times stiffer than the mode: there rounding sets the residual
     assert np.all((modes.residual < 1e-8) | (modes.backward_error < 2e-14))
-    for value, expected in zip(found, TABLE[inlet]):
+    assert modes.status == "complete"
+    for value, expected in zip(found[:3], TABLE[inlet], strict=True):
         assert abs(value - expected) < 1e-4  # second order: 0.33 / 320^2 times 2
 
 

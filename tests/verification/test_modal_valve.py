@@ -35,15 +35,13 @@ def frequencies_at_rest(model: ValveModel, count: int) -> np.ndarray:
     return lowest_frequencies(model.shell, stiffness, mass, count)
 
 
-@pytest.mark.parametrize("shear_correction", [5 / 6, 1.0])
-def test_frequencies_of_the_isotropic_valve(shear_correction):
-    """Within 1 % at 28 x 48, with either shear correction (they differ by 0.4 %)."""
-    coarse, reference_mesh = frequencies(14, 24, shear_correction), frequencies(28, 48, shear_correction)
-    print(
-        f"\nshear correction {shear_correction:.3f}: 14 x 24 {np.round(coarse, 3)}  28 x 48 "
-        f"{np.round(reference_mesh, 3)}  reference {REFERENCE}"
-    )
-    assert reference_mesh == pytest.approx(REFERENCE, rel=0.01)
+def test_frequencies_of_the_isotropic_valve_without_a_shear_correction():
+    """Within 1 % at 28 x 48; they differ by 0.4 % from those with one, which tests/verification/test_valve_meshes.py
+    has.
+    """
+    found = frequencies(28, 48, 1.0)
+    print(f"\n28 x 48 {np.round(found, 3)}  reference {REFERENCE}")
+    assert found == pytest.approx(REFERENCE, rel=0.01)
 
 
 @pytest.mark.slow

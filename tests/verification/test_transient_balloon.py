@@ -1,16 +1,15 @@
 """A suddenly pressurised Mooney-Rivlin balloon: largest stretch and period against quadrature of its energy equation.
 
 With P = p r0/(h0 C10), C01/C10 = 0.25 and time in r0 sqrt(rho/C10) a thin sphere at rest obeys l'^2 / 2 + w(l) = 0, w
-as in `potential`. Reference numbers: P = 1: largest stretch 1.079943, period 1.29213; P = 2: 1.205003, 1.53042.
+its strain energy less the work of the pressure. Reference numbers, held by tests/verification/test_rubber.py: P = 1:
+largest stretch 1.079943, period 1.29213; P = 2: 1.205003, 1.53042.
 """
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
-from scipy.integrate import quad
 from scipy.interpolate import CubicSpline
-from scipy.optimize import brentq
 
 from dbvfiv.motion.scheme import scheme
 from dbvfiv.motion.stepper import StepOptions, Stepper, consistent_state
@@ -20,26 +19,6 @@ from tests.verification.test_shell_balloon import RUBBER, H, octant
 
 REFERENCE = {1.0: (1.079943, 1.29213), 2.0: (1.205003, 1.53042)}
 UNIT = np.sqrt(RUBBER.density / RUBBER.c10)  # s, radius 1
-RATIO = RUBBER.c01 / RUBBER.c10
-
-
-def potential(stretch, load):
-    """Strain energy less work of the pressure, over 4 pi r0^2 h0 C10."""
-    i1, i2 = 2 * stretch**2 + stretch**-4 - 3, stretch**4 + 2 * stretch**-2 - 3
-    return i1 + RATIO * i2 - load * (stretch**3 - 1) / 3
-
-
-@pytest.mark.parametrize("load", REFERENCE)
-def test_reference_numbers(load):
-    largest = brentq(lambda s: potential(s, load), 1.01, 1.5)
-    middle, half = 0.5 * (1 + largest), 0.5 * (largest - 1)
-
-    def slowness(angle):  # l = middle - half cos(angle)
-        stretch = middle - half * np.cos(angle)
-        return half * np.sin(angle) / np.sqrt(-2 * potential(stretch, load))
-
-    period = 2 * quad(slowness, 0, np.pi, limit=200)[0]
-    assert (largest, period) == pytest.approx(REFERENCE[load], rel=2e-6)
 
 
 def blow_up(shell, load: float, steps: int):
