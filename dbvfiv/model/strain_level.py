@@ -19,8 +19,8 @@ import numpy as np
 from ..case.materials import HIGHEST_LEVEL, LOWEST_LEVEL
 from ..case.model import Case
 from ..errors import SolveError
-from ..geometry import surface_of
 from ..geometry.divisions import least_rows
+from ..geometry.surface import surface_of
 from ..observer import Observer
 from .equilibria import LoadPath, SteadyOptions, operating_pressure
 from .load_steps import LARGEST_JUMP

@@ -177,7 +177,9 @@ def _onsets(found: Gathered) -> str:
 
 
 def lacking(point: dict[str, Any]) -> str:
-    """What the second mesh lacks, "has no onset like it"; empty of an onset that was found on both, or on one alone."""
+    """Clause on what the second mesh lacks, "has no onset like it"; empty of an onset that was found on both, or on
+    one alone.
+    """
     found = re.search(f"{NO_ONSET}[^,]*", point["note"] or "")
     return found[0] if found else ""
 
@@ -228,8 +230,9 @@ def _sure(found: Gathered, verdicts: dict) -> tuple[str, ...]:
 
 
 def _over_losses(verdicts: Iterable[Verdict], low: float, high: float) -> str:
-    """Whether the verdict on all heads holds to that end of a range of multiples of the damping which multiples were
-    looked at to: the low one of a stable valve, the high one of a valve that chatters, for which one head is enough.
+    """Sentence on whether the verdict on all heads holds to one end of a range of multiples of the damping: to the low
+    end for a stable valve, to the high one for a valve that chatters, for which one head is enough; multiples were
+    looked at on that side alone.
     """
     bad = [v for v in verdicts if v.stable is False]
     if bad:

@@ -119,7 +119,7 @@ class FirstBuckling(NamedTuple):
 
 
 def buckles_first(result: StudyResult) -> FirstBuckling | None:
-    """Where a wall buckles first in any symmetry class that was watched: on its path the first state met, as the path
+    """First buckling of a wall in any symmetry class that was watched: on its path the first state met, as the path
     turns back beyond it; None where it does not.
     """
     found = [FirstBuckling(b.pressure, b.kind) for b in result.buckling[:1]]

@@ -15,8 +15,8 @@ from continuation.options import ContinuationError
 from ...case.parameters import DESIGN, PARAMETERS, Mu
 from ...errors import SolveError
 from ...fit.cards import outside_band
-from ...geometry import surface_of
 from ...geometry.divisions import least_rows
+from ...geometry.surface import surface_of
 from ...model.forms import ValveForms
 from ...model.leading import other_end
 from ...observer import Observer
