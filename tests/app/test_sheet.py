@@ -36,6 +36,12 @@ def test_keys_are_set_and_taken_away(tmp_path):
     assert "pressure" not in data["drive"]
 
 
+def test_a_page_takes_so_many_elements(tmp_path):
+    found = check({"mesh": {"around": 100, "along": 41}}, tmp_path)
+    assert found.case is None and found.problems[0].endswith("make 4100 elements; a page takes 4000.")
+    assert check({"mesh": {"around": 100, "along": 40}}, tmp_path).case.mesh.along == 40
+
+
 def test_a_sheet_is_the_case_of_its_file(tmp_path):
     (tmp_path / "dbv6.toml").write_text(COARSE)
     assert check(read_sheet(COARSE), tmp_path).case == load_case(tmp_path / "dbv6.toml")
