@@ -1,8 +1,10 @@
 """The wheel, built and installed apart from the sources."""
 
 import os
+import re
 import subprocess
 import sys
+import tomllib
 from pathlib import Path
 
 import pytest
@@ -16,6 +18,15 @@ for package in (dbvfiv, continuation, eigen):
     assert TARGET in package.__file__, package.__file__
 print(dbvfiv.load(thesis_case(), {"mesh.around": 4, "mesh.along": 6}).steady(["2 kPa"]).states[0].mass_flow)
 """
+
+
+def test_extras_that_are_named_are_there():
+    """In the manual and in what the program tells to install."""
+    extras = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["optional-dependencies"]
+    texts = [ROOT / "README.md", *(ROOT / "docs").rglob("*.md"), *(ROOT / "dbvfiv").rglob("*.py")]
+    named = [name for path in texts for name in re.findall(r"dbvfiv\[(\w+)\]", path.read_text())]
+    named += re.findall(r"`\[(\w+)\]`", texts[0].read_text())
+    assert {"report", "app", "fit"} <= set(named) <= set(extras)
 
 
 @pytest.mark.slow

@@ -392,8 +392,9 @@ class Runs:
 
     async def _perform(self, run: Run) -> None:
         try:
-            run.state, run.started = "running", time.time()
-            run.keep()
+            if run.state == "waiting":  # not cancelled since it left the queue
+                run.state, run.started = "running", time.time()
+                run.keep()
             status = 0
             with open(run.folder / "output.txt", "wb") as out, open(run.folder / "errors.txt", "wb") as errors:
                 for command in run.commands():

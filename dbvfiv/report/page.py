@@ -167,23 +167,23 @@ def write_pdf(page: Path, path: Path) -> Path:
     CaseError
         If neither a browser nor WeasyPrint is there, or neither wrote the file.
     """
-    browser = next(filter(None, map(shutil.which, _BROWSERS)), None)
+    browser, weasyprint = next(filter(None, map(shutil.which, _BROWSERS)), None), find_spec("weasyprint") is not None
+    if browser is None and not weasyprint:
+        raise CaseError(
+            f"{str(path)!r} needs the browser chromium (apt-get install chromium) or the package weasyprint "
+            f"(pip install dbvfiv[report]), and neither is there; the page is in {str(page)!r} and prints from any "
+            "browser."
+        )
     draft = path.with_name(f"{path.stem}.partial.pdf")  # an earlier one is not taken for what this run has printed
     draft.unlink(missing_ok=True)
     if browser is not None:
         options = ("--headless", "--no-sandbox", "--disable-gpu", "--no-pdf-header-footer", f"--print-to-pdf={draft}")
         with contextlib.suppress(subprocess.TimeoutExpired):
             subprocess.run([browser, *options, page.absolute().as_uri()], capture_output=True, timeout=300, check=False)
-    elif find_spec("weasyprint") is not None:
+    if weasyprint and not draft.is_file():
         from weasyprint import HTML  # optional
 
         HTML(str(page)).write_pdf(str(draft))
-    else:
-        raise CaseError(
-            f"{str(path)!r} needs the browser chromium (apt-get install chromium) or the package weasyprint "
-            f"(pip install dbvfiv[report]), and neither is there; the page is in {str(page)!r} and prints from any "
-            "browser."
-        )
     if not draft.is_file():
         raise CaseError(f"{str(path)!r} was not written: {browser or 'weasyprint'} gave no file.")
     return draft.replace(path)

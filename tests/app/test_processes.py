@@ -84,6 +84,34 @@ def test_users_keep_so_many(stubborn, monkeypatch):
         runs.keep(home, "3.h5", b"")
 
 
+def test_so_many_wait(stubborn, monkeypatch):
+    """And one that is cancelled before it starts does not run."""
+    runs, home = stubborn
+    monkeypatch.setattr(processes, "WAITING", 1)
+
+    async def day() -> None:
+        run = runs.add(home, "steady", "steady", {}, [])
+        with pytest.raises(CaseError, match="1 runs are waiting already"):
+            runs.add(home, "steady", "another", {}, [])
+        runs.cancel(run)
+        await until(lambda: run.ended)
+        assert run.state == "cancelled" and not run.output() and runs.of(home) == [run]
+
+    asyncio.run(day())
+
+
+def test_a_run_ends_after_the_longest_time(stubborn, monkeypatch):
+    runs, home = stubborn
+    monkeypatch.setattr(processes, "LONGEST", 0.2)
+
+    async def day() -> None:
+        run = runs.add(home, "steady", "steady", {}, [])
+        await until(lambda: run.ended and run.process is None)
+        assert run.state == "cancelled"
+
+    asyncio.run(day())
+
+
 def test_a_result_is_listed_as_soon_as_its_kind_is_known(tmp_path):
     runs = Runs()
     run = runs.keep(tmp_path, "six.h5", b"")

@@ -99,6 +99,12 @@ def test_a_result_of_many_processes_is_a_case_of_the_page(tmp_path):
     stay_inside({"map": {"workers": "tcp://10.0.0.1:8786"}}, runs=False)
 
 
+def test_a_page_takes_so_many_elements(tmp_path):
+    found = check({"mesh": {"around": 100, "along": 41}}, tmp_path)
+    assert found.case is None and found.problems[0].endswith("make 4100 elements; a page takes 4000.")
+    assert check({"mesh": {"around": 100, "along": 40}}, tmp_path).case.mesh.along == 40
+
+
 def test_a_sheet_is_the_case_of_its_file(tmp_path):
     (tmp_path / "dbv6.toml").write_text(COARSE)
     assert check(read_sheet(COARSE), tmp_path).case == load_case(tmp_path / "dbv6.toml")

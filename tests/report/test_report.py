@@ -11,6 +11,7 @@ import re
 import signal
 import sys
 import time
+from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
@@ -27,6 +28,7 @@ from dbvfiv.report import gather, write_page, write_pdf
 from dbvfiv.report.answers import UNKNOWN, answers, closes, loss_range, opens, trade
 from dbvfiv.report.figures import vibration_figure
 from dbvfiv.report.gather import Gathered, Run, _Studies, following, heads_of, planned, second_mesh
+from dbvfiv.report.page import sheet
 from dbvfiv.report.parts import heads_part, onset_part, steady_part
 from dbvfiv.studies.case import load_case
 from dbvfiv.studies.onset.search import NO_ONSET
@@ -528,6 +530,28 @@ def test_without_a_printer_the_pdf_says_what_is_missing(made, monkeypatch, one_s
     with pytest.raises(CaseError) as refused:
         write_pdf(made[1], tmp_path / "page.pdf")
     assert "chromium" in str(refused.value) and "weasyprint" in str(refused.value)
+
+
+@pytest.mark.parametrize("browser", [None, "/bin/false"])
+def test_weasyprint_prints_where_no_browser_does(monkeypatch, tmp_path, browser):
+    class HTML:
+        def __init__(self, page):
+            self.page = page
+
+        def write_pdf(self, path):
+            Path(path).write_text(f"{self.page} printed")
+
+    monkeypatch.setattr("shutil.which", lambda name: browser)
+    monkeypatch.setattr("dbvfiv.report.page.find_spec", lambda name: name)
+    monkeypatch.setitem(sys.modules, "weasyprint", SimpleNamespace(HTML=HTML))
+    page, path = tmp_path / "page.html", tmp_path / "page.pdf"
+    assert write_pdf(page, path) == path and path.read_text() == f"{page} printed"
+    assert [left.name for left in tmp_path.iterdir()] == ["page.pdf"]
+
+
+def test_who_made_a_report_and_when():
+    case = load_case(None, ["project.author=A. N. Other", 'project.date="2026-02-28"'])
+    assert sheet(SimpleNamespace(case=case)) == (("author", "A. N. Other"), ("date", "2026-02-28"))
 
 
 @pytest.mark.parametrize(

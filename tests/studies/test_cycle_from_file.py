@@ -15,7 +15,9 @@ from continuation.periodic import PeriodicMotion
 from dbvfiv.errors import CaseError, SolveError
 from dbvfiv.observer import Observer
 from dbvfiv.record.record import GrowingRecord
+from dbvfiv.studies.case import thesis_case
 from dbvfiv.studies.cycle import start, study
+from dbvfiv.studies.cycle.start import _cycle_of
 from dbvfiv.studies.orbits import Follower, _goes_on
 from dbvfiv.studies.session import load_result, resume_result
 from tests.observers import Stop
@@ -174,6 +176,15 @@ def test_from_a_run_in_time(file, tmp_path):
     found = started(path, cycle__over="density=229:230:2").perform("cycle")
     assert found.points[0].value == 230.0 and np.isclose(found.points[0].amplitude, there.amplitude, rtol=1e-4)
     assert found.points[-1].value == 229.0
+
+
+@pytest.mark.parametrize("number, value", [(None, 250.0), (0, 230.0), (1, 240.0), (-2, 240.0)])
+def test_the_cycle_of_a_number_is_that_of_its_row(number, value):
+    """In the order of the table; the last one by default."""
+    keys = {"cycle.over": "density=226:233:2"} | ({} if number is None else {"cycle.start_cycle": number})
+    points = [SimpleNamespace(number=row, value=value) for row, value in ((2, 250.0), (0, 230.0), (1, 240.0))]
+    result = SimpleNamespace(points=points, parameter="density")
+    assert _cycle_of(thesis_case(keys), result).value == value
 
 
 def test_files_that_nothing_starts_from(file, tmp_path):

@@ -31,6 +31,12 @@ LIGHT = Mu(density=10.0, alpha=0.0, beta=0.003)
 WATER = Mu(density=1000.0, alpha=5.0, beta=0.003)
 
 
+def test_the_shift_of_a_case_has_its_frequency_in_hertz():
+    options = ModesOptions.of(thesis_case({"modes.shift": -5.0, "modes.shift_frequency": "20 Hz"}))
+    assert options.search.shifts == (complex(-5.0, 40.0 * np.pi),)
+    assert ModesOptions.of(thesis_case()).search.shifts is None
+
+
 @pytest.fixture(scope="module")
 def flutter(model, state):
     return run_modes(model, state, LIGHT)

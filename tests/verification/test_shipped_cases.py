@@ -11,6 +11,7 @@ import pytest
 
 import dbvfiv
 from dbvfiv.case.quantity import GRAVITY
+from tests.small_valves import SMALL
 
 CASES = Path(__file__).parents[2] / "cases"
 VALVES = ("dbv12", "dbv12-table-layers", "dbv12-40-percent", "dbv6", "dbv36", "dbv4-wide", "dbv4-flat")
@@ -47,6 +48,15 @@ def examine_modes(name: str, mesh: str) -> None:
     assert all(mode.residual < 1e-8 for mode in modes.modes)
     first = modes.modes[0]
     print(f"{name}: water at 2 m of head, leading mode {first.growth_rate:.4g} 1/s at {first.frequency:.4g} Hz")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", sorted(path.stem for path in CASES.glob("*.toml")))
+def test_every_case_has_a_steady_state(name):
+    """At its own drive, on 6 x 8 elements."""
+    valve = dbvfiv.load(CASES / f"{name}.toml", SMALL)
+    state = valve.steady(pressure=valve.case.drive.pressure)
+    assert state.converged and state.residual < 1e-7
 
 
 def test_the_wide_bill_from_rest_to_two_metres():
