@@ -11,7 +11,7 @@ from typing import Any
 
 from ..case.materials import HIGHEST_LEVEL
 from ..case.parameters import PARAMETERS
-from ..errors import CaseError
+from ..errors import CaseError, as_path
 from ..model.equilibria import (
     find_equilibrium,
     model_warnings,
@@ -312,7 +312,7 @@ class Session:
         for name in study.files:
             _require_new(choices.get(name), study.files[name])
         study.check(self.case)
-        if output is not None and is_read_by(self.case, Path(output)):
+        if output is not None and is_read_by(self.case, as_path(output, "A result file")):
             raise CaseError(
                 f"The result is given the name {str(output)!r}, a file that the case reads; choose another."
             )
