@@ -181,7 +181,8 @@ def map_figure(case: Case, found: dict[str, Any]) -> tuple[dict[str, Any], str]:
     names = [found[axis]["parameter"] for axis in "xy"]
     rows = [shown_as(case, name) for name in names]
     x, y = ([value / row["scale"] for value in found[axis]["values"]] for axis, row in zip("xy", rows))
-    rates, certified = picture["growth_rate"], picture["certified"]
+    leading = picture | picture.get("leading", {})
+    rates, certified = leading["growth_rate"], leading["certified"]
     grid = [[rate if sure else None for rate, sure in zip(*pair)] for pair in zip(rates, certified)]
     limit = max((abs(rate) for row in grid for rate in row if rate is not None), default=1.0)
     cells = {"type": "heatmap", "x": x, "y": y, "z": grid, "colorscale": "RdBu", "zmin": -limit, "zmax": limit}

@@ -25,7 +25,7 @@ import numpy as np
 from ..api import Valve, load
 from ..case.section import Section
 from ..case.write import case_toml
-from ..drawing.style import style
+from ..drawing.style import put_in_units, style
 from ..drawing.views import ValveSkin, valve_figure
 from ..errors import CaseError, SolveError
 from ..explore import Answer, Explorer
@@ -62,7 +62,7 @@ class Desk:
         """Drawing, sizes and warnings of a case file."""
         model = load(case).session.described
         with style():
-            valve_figure(model).savefig(drawn := io.BytesIO(), format="png", dpi=90)
+            put_in_units(valve_figure(model), model.case.units).savefig(drawn := io.BytesIO(), format="png", dpi=90)
         picture = base64.b64encode(drawn.getvalue()).decode()
         return {"picture": picture, "sizes": ValveSizes.of(model).lines(), "notes": list(model_warnings(model))}
 

@@ -444,6 +444,8 @@ def _pair(text: Any) -> tuple[str, str]:
 
 def _plain(value: Any) -> Any:
     """Numbers and lists of Python for those of numpy."""
+    if isinstance(value, Mapping):
+        return {name: _plain(each) for name, each in value.items()}
     if isinstance(value, (list, tuple)):
         return [_plain(each) for each in value]
     return value.tolist() if hasattr(value, "tolist") else value

@@ -17,8 +17,8 @@ from .units import read_units
 
 
 def _as_text(given: Any) -> Any:
-    """Text of a number or a date, as TOML reads revision = 2 and date = 2026-05-01."""
-    return str(given) if isinstance(given, (int, float, date)) and not isinstance(given, bool) else given
+    """Text of a whole number or a date, as TOML reads revision = 2 and date = 2026-05-01; 1.10 has lost its 0."""
+    return str(given) if isinstance(given, (int, date)) and not isinstance(given, bool) else given
 
 
 Text = Annotated[StrictStr, BeforeValidator(_as_text), Described("text", "a text")]

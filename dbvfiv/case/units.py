@@ -129,7 +129,7 @@ class Units:
             usual = next(iter(names))
             if self.name(quantity) != usual:
                 changed[usual] = (self.name(quantity), factor_of(quantity, usual) / self.factor(quantity))
-        if "kPa" in changed:
+        if "kPa" in changed and self.name("pressure") != "Pa":
             changed.setdefault("Pa", (self.name("pressure"), 1.0 / self.factor("pressure")))
         return changed
 

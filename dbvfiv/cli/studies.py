@@ -75,6 +75,7 @@ def _in_units_asked(case, pressures):
 
 def perform(kind: str, case, request, name: str, output: Path | None, plots: Path | None, as_json: bool) -> None:
     """Run a study on a case with what its command asks for (a `Request`), and report it."""
+    from ..record.files import refuse_read
     from ..studies.session import Session, find_study
 
     if is_sheet(output) and request.sheet is None:
@@ -85,6 +86,7 @@ def perform(kind: str, case, request, name: str, output: Path | None, plots: Pat
     case = case.replace({"project.units": changes.pop("project.units", case.project.units)})
     choices = {key: value for key, value in request.choices.items() if value is not None}
     session = Session(case, name).replace(changes)
+    refuse_read(session.case, output, "The sheet" if request.sheet is not None else "The result")
     with in_units(case.units):
         session.mesh  # a case that gives no model fails before a table begins
         live = None if as_json else find_study(kind).live

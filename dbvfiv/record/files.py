@@ -417,9 +417,16 @@ def renamed(data: Any, names: Mapping[str, str]) -> Any:
     return data if there is None else there if samples is None else f"samples({there})"
 
 
-def is_read_by(case: Case, path: Path) -> bool:
-    """True for a file that a case names, under whatever name."""
-    return path.exists() and any(named.exists() and path.samefile(named) for named in _paths(case))
+def refuse_read(case: Case, path: str | Path | None, what: str = "The result") -> None:
+    """Refuse the name of a file that a case reads, under whatever name.
+
+    Raises
+    ------
+    CaseError
+    """
+    path = None if path is None else as_path(path, "A result file")
+    if path is not None and path.exists() and any(named.exists() and path.samefile(named) for named in _paths(case)):
+        raise CaseError(f"{what} is given the name {str(path)!r}, a file that the case reads; choose another.")
 
 
 def _paths(value: Any) -> Iterator[Path]:

@@ -200,7 +200,8 @@ def _factor(found: Gathered) -> str:
         return ""
     factors = [v.critical_damping_factor for v in verdicts if np.isfinite(v.critical_damping_factor)]
     if factors:
-        return f"chatter begins at {digits(max(factors), 2)} times the damping"
+        known = all(v.is_examined_down_to(max(factors)) for v in verdicts)
+        return f"chatter begins at {digits(max(factors), 2)} times the damping" if known else ""
     least = np.max([v.damping_sought for v in verdicts])
     return f"stable down to {digits(least, 2)} times the damping" if np.isfinite(least) else ""
 
@@ -299,7 +300,7 @@ def closes(found: Gathered) -> Answer:
     collapse = _collapse(result, rated)
     text += f"{'' if shut else ' up to ' + units.pressure(states[-1].pressure, 3)}; {collapse}" if collapse else ""
     answer = YES if shut and states[-1].closed else NO
-    if not collapse and states[-1].pressure < rated * (1 - 1e-9):
+    if not collapse and max(s.pressure for s in states) < rated * (1 - 1e-9):
         answer, text = UNKNOWN, f"{text}; no state was found at the rated {units.pressure(rated, 3)}"
     return Answer(question, answer, text + ".", _margin(result), _closure_mesh(found))
 

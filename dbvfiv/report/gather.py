@@ -20,10 +20,11 @@ import numpy as np
 from ..case.parameters import Mu
 from ..effects import with_effect, without_numbers
 from ..errors import CaseError, SolveError
+from ..geometry.divisions import least_rows
+from ..geometry.surface import surface_of
 from ..model.sizes import ValveSizes
 from ..observer import Observer, is_watched
 from ..studies.case import Case
-from ..studies.inputs import Plan
 from ..studies.session import Session, kept_run, load_result
 from ..studies.stability.place import why_it_moves
 from ..studies.stability.verdict import DIVERGES
@@ -164,8 +165,10 @@ def heads_of(case: Case) -> tuple[float, ...]:
 
 
 def second_mesh(case: Case) -> dict[str, Any]:
-    """Keys of a mesh with half the elements each way."""
-    return {"mesh.around": max(4, round(case.mesh.around / 2)), "mesh.along": max(6, round(case.mesh.along / 2))}
+    """Keys of a mesh with half the elements each way, and a row at least for every piece of the surface."""
+    mesh, rows = case.mesh, least_rows(surface_of(case.valve, case.part))
+    ways = {"mesh.around": (mesh.around, 4), "mesh.along": (mesh.along, max(6, rows))}
+    return {key: min(number, max(least, round(number / 2))) for key, (number, least) in ways.items()}
 
 
 def planned(case: Case) -> Iterator[Run]:
@@ -234,31 +237,16 @@ def following(found: Gathered) -> Iterator[Run]:
             keys = quick | {"drive.pressure": pressure, "sweep.over": span}
             yield Run(f"pipe-{i}", "sweep", f"length of the pipe at {case.units.pressure(pressure)}", keys, 5)
     if case.uncertainty.model_fields_set:
-        over = {} if case.uncertainty.over else {"drive.pressure": _drawn_about(case, worst)}
+        over = {} if case.uncertainty.over else {"drive.pressure": worst}
         yield Run("chance", "uncertainty", "probability of chatter", over, 1.0 * case.uncertainty.samples)
-    changed = [
-        pair
-        for pair in zip(found.modes.items(), list(found.modes.items())[1:])
-        if pair[0][1].stable != pair[1][1].stable and None not in (pair[0][1].stable, pair[1][1].stable)
-    ]
+    decided = [(pressure, result) for pressure, result in found.modes.items() if result.stable is not None]
+    changed = [(one, other) for one, other in zip(decided, decided[1:]) if one[1].stable != other[1].stable]
     if changed:
         low, high = changed[0][0][0], changed[-1][1][0]
         between = [p for p in found.modes if low < p < high] or [0.5 * (low + high)]  # what is known of them stays so
         over = ",".join(f"{p:.9g}" for p in (low, *between, high))
         keys = {"onset.over": f"pressure={over}", "onset.continuity": "case"}
         yield Run("onset", "onset", "head at which chatter begins", keys | {"onset.symmetry": "all"}, 40)
-
-
-def _drawn_about(case: Case, pressure: float) -> float:
-    """Pressure, Pa, that samples of a case are told at: one that is asked for, or the median of the pressures that the
-    case says it has whatever it is driven by.
-    """
-    medians = set()
-    with suppress(CaseError):  # of inputs that cannot be used, which the study refuses
-        for own in (pressure, 1.01 * pressure):
-            inputs = Plan(case.replace({"drive.pressure": own})).inputs
-            medians |= {one.distribution.median for one in inputs if one.name == "pressure"}
-    return medians.pop() if len(medians) == 1 else pressure
 
 
 def cycle_run(found: Gathered) -> Iterator[Run]:

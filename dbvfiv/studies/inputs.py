@@ -222,9 +222,12 @@ class Plan:
 
     @property
     def values(self) -> tuple[float, ...]:
-        """Values of the range, SI."""
+        """Values of the range, SI; without one the pressure of the case, or the median of those that are an input."""
         axis = self.case.uncertainty.axis
-        return (self.case.drive.pressure,) if axis is None else axis.values
+        if axis is not None:
+            return axis.values
+        medians = (one.distribution.median for one in self.inputs if one.name == "pressure")
+        return (float(next(medians, self.case.drive.pressure)),)
 
     @property
     def law(self) -> float:

@@ -11,7 +11,7 @@ from typing import Any
 
 from ..case.materials import HIGHEST_LEVEL
 from ..case.parameters import PARAMETERS
-from ..errors import CaseError, as_path
+from ..errors import CaseError
 from ..model.equilibria import (
     find_equilibrium,
     model_warnings,
@@ -26,7 +26,7 @@ from ..model.state import SteadyState
 from ..model.strain_level import SettledLevels, settle_levels
 from ..model.valve import ValveModel
 from ..observer import Observer
-from ..record.files import Header, check_writable, is_read_by, kind_of
+from ..record.files import Header, check_folder, check_writable, kind_of, refuse_read
 from ..record.mesh import MeshData
 from ..record.record import GrowingRecord, Record, StoredRecord
 from ..record.table import Column, TableSpec, printed_head, printed_row
@@ -312,10 +312,7 @@ class Session:
         for name in study.files:
             _require_new(choices.get(name), study.files[name])
         study.check(self.case)
-        if output is not None and is_read_by(self.case, as_path(output, "A result file")):
-            raise CaseError(
-                f"The result is given the name {str(output)!r}, a file that the case reads; choose another."
-            )
+        refuse_read(self.case, output)
         session = self.asked(kind, observer)
         if session is not self:
             return session.perform(kind, output, observer, **choices)
@@ -400,8 +397,23 @@ def _with_files(study: Study, record: GrowingRecord, choices: Mapping[str, Any])
     given = {name: str(choices[name].absolute()) for name in study.files if choices.get(name) is not None}
     if given:
         record.note(_FILES, given=given)
+        return dict(choices)
     kept = {name: Path(path) for note in record.notes(_FILES)[-1:] for name, path in note["given"].items()}
-    return kept | dict(choices)
+    return {name: path for name, path in kept.items() if _is_free(record, path)} | dict(choices)
+
+
+def _is_free(record: GrowingRecord, path: Path) -> bool:
+    """True for a name that a run which goes on may still write to; a warning where it may not, and the run ends without
+    it.
+    """
+    why = "is there by now" if path.is_file() else ""
+    try:
+        check_folder(path.parent)
+    except OSError as error:
+        why = f"cannot be written any more ({error.strerror})"
+    if why:
+        record.warn(f"The case file that was asked for is left out: {str(path)!r} {why}; `info --case` writes it.")
+    return not why
 
 
 def _attempt(work: Callable[[], Any]) -> Any:

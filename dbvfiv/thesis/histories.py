@@ -43,7 +43,7 @@ def _series(
 
 @entry("5-3", "independence of the mesh")
 def _mesh(workshop: Workshop):
-    yield "The flow at the end hardly depends on the mesh, as in the thesis. Onsets do: see the guide on stability."
+    yield "In the thesis the flow at the end hardly depends on the mesh. Onsets do: see the guide on stability."
     sizes = ((8, 14), (10, 18)) if workshop.quick else ((10, 24), (14, 24), (28, 48))
     yield from _series(workshop, "5-3", _AT_36, {f"{a} x {b}": {"mesh.around": a, "mesh.along": b} for a, b in sizes})
 
@@ -51,7 +51,7 @@ def _mesh(workshop: Workshop):
 @entry("5-4", "independence of the step")
 def _step(workshop: Workshop):
     yield (
-        "All steps end in the same state, as in the thesis. Its flow turns back in the first 20 ms, which it puts down "
+        "In the thesis all steps end in the same state. Its flow turns back in the first 20 ms, which it puts down "
         "to its gap and link elements; ours does not."
     )
     sizes = ("2", "1") if workshop.quick else ("1", "0.5", "0.2")
@@ -61,21 +61,21 @@ def _step(workshop: Workshop):
 
 @entry("5-5", "stiffness damping")
 def _beta(workshop: Workshop):
-    yield "The way differs, the end does not, as in the thesis."
+    yield "In the thesis the way differs and the end does not."
     members = {f"beta {value:g} s": {"damping.beta": value} for value in (0.003, 0.01, 0.02)}
     yield from _series(workshop, "5-5", _AT_36, members)
 
 
 @entry("5-6", "mass damping")
 def _alpha(workshop: Workshop):
-    yield "No difference is to be seen, as in the thesis."
+    yield "The thesis sees no difference."
     members = {f"alpha {value:g} 1/s": {"damping.alpha": value} for value in (1, 3, 5)}
     yield from _series(workshop, "5-6", _AT_36, members)
 
 
 @entry("5-7", "numerical damping")
 def _numerical_damping(workshop: Workshop):
-    yield "No influence on the end, as in the thesis."
+    yield "The thesis sees no influence on the end."
     members = {f"{value:g}": {"transient.numerical_damping": value} for value in (0.0, 0.1, 0.3, 0.5)}
     yield from _series(workshop, "5-7", _AT_36, members)
 

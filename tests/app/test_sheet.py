@@ -184,6 +184,12 @@ def test_the_star_of_a_map_stands_where_the_case_has_both_values(name, changes, 
     assert stars == ([] if own is None else [([pytest.approx(1.0)], [pytest.approx(own)])])
 
 
+def test_a_map_of_all_classes_is_drawn_by_the_motion_that_grows_fastest():
+    leading = {"growth_rate": [[3.0, 1.0]], "certified": [[True, False]]}
+    figure, _ = map_figure(Case(), found_map("density", leading=leading))
+    assert figure["data"][0]["z"] == [[3.0, None]]
+
+
 def test_a_map_of_both_flow_models_is_drawn_for_that_of_the_case():
     """With its name; cells without a certificate are blank, and words below name the margins that are drawn."""
     contours = [{"level": "4 %", "points": [[1e3, 1.0]]}]

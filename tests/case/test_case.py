@@ -132,6 +132,7 @@ def test_replace_leaves_the_original_alone_and_checks_again():
         {"drive.pressure": np.int64(6000), "levels.pressures": [np.float32(2e3)], "modes.count": np.int64(2)}
     )
     assert (counted.drive.pressure, counted.levels.pressures, counted.modes.count) == (6e3, (2e3,), 2)
+    assert case.replace({"drive": {"pressure": np.int64(6000)}}).drive.pressure == 6e3
     with pytest.raises(CaseError, match="fluid.density"):
         case.replace({"fluid.density": -1})
 
@@ -157,8 +158,10 @@ def test_changes_from_python_are_those_of_set(given):
 
 
 def test_texts_may_be_numbers_and_dates():
-    project = load_case(None, ["project.tag=12", "project.date=2026-11-29", "project.revision=1.2"]).project
-    assert (project.tag, project.date, project.revision) == ("12", "2026-11-29", "1.2")
+    project = load_case(None, ["project.tag=12", "project.date=2026-11-29", "project.revision=2"]).project
+    assert (project.tag, project.date, project.revision) == ("12", "2026-11-29", "2")
+    with pytest.raises(CaseError, match="revision"):
+        load_case(None, ["project.revision=1.10"])  # 1.1 as a number
     assert change_case(Case(), "report.heads=5000").report.heads == (5000.0,)
 
 

@@ -12,6 +12,7 @@ from dbvfiv.case import CaseError
 from dbvfiv.case.key_points import read_key_points
 from dbvfiv.geometry import key_point_table, surface_of, valve_mesh
 from dbvfiv.model import strain_level
+from dbvfiv.report.gather import second_mesh
 from dbvfiv.studies.case import Case, thesis_case
 from dbvfiv.studies.onset.search import coarse_case
 from dbvfiv.studies.stability.place import rebuilder
@@ -122,6 +123,7 @@ def test_coarser_meshes_have_a_row_for_every_piece(tmp_path, monkeypatch, refuse
     strain_level.settle_levels(case, 6e3)
     found = [asked[0], *(coarse_case(case.replace({"mesh.along": n}), 0.5)[0] for n in (30, 80))]
     assert [valve_mesh(each.valve, each.mesh).shape for each in found] == [(14, 29), (6, 29), (6, 40)]
+    assert second_mesh(case.replace({"mesh.along": 48}))["mesh.along"] == 29
     with refused(CaseError, match="mesh.along is 28, but the surface has 29 pieces"):
         rebuilder(case.replace({"mesh.along": 28}))({})
 

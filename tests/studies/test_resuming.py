@@ -241,6 +241,30 @@ def test_a_run_that_goes_on_writes_the_files_that_were_asked_for(coarse_case, tm
     assert resume(tmp_path / "run.h5").complete and asked[1] == {name: tmp_path / "written"}
 
 
+@pytest.mark.parametrize("lost", ["is there by now", "cannot be written any more"])
+def test_a_run_that_goes_on_ends_without_a_file_that_it_may_not_write(coarse_case, tmp_path, monkeypatch, lost):
+    asked = []
+
+    def run(_session, record, **choices):
+        asked.append(choices)
+        record.begin("identify", 1)
+        if len(asked) == 1:
+            raise KeyboardInterrupt
+
+    other = replace(find_study("identify"), run=run, check=lambda _case: None, rows_to_keep=None)
+    monkeypatch.setattr(sessions, "find_study", lambda _kind: other)
+    folder = tmp_path / "folder"
+    folder.mkdir()
+    Session(coarse_case).perform("identify", tmp_path / "run.h5", posterior=folder / "known.toml")
+    if lost == "is there by now":
+        (folder / "known.toml").write_text("# of another run")
+    else:
+        folder.rmdir()
+        folder.write_text("no folder")
+    result = resume(tmp_path / "run.h5")
+    assert result.complete and asked[1] == {} and lost in result.warnings[-1]
+
+
 def test_kept_runs_are_those_of_the_pressures_that_were_found(coarse_case, tmp_path, attempts, monkeypatch):
     """At an operating point, and with the sealing pressure of a cracking head."""
     attempts.append(None)

@@ -77,6 +77,14 @@ def test_a_later_size_of_a_sheet_that_falls_short_is_told(command_line, tmp_path
     assert outcome.status == 1 and len(told) == 2 and len(rows_of(path)) == 2, outcome.err
 
 
+def test_a_sheet_does_not_take_the_name_of_measured_data(command_line, one_sentence, tmp_path):
+    path = tmp_path / "tap.csv"
+    path.write_text(text := "pressure [kPa], flow [L/s]\n2, 3\n3, 9\n")
+    done = command_line("steady", *OPTIONS, "--set", f'steady.measured=["{path}"]', "-o", path)
+    assert done.status == 2 and one_sentence(done.err) and "a file that the case reads" in done.err
+    assert path.read_text() == text
+
+
 @pytest.mark.parametrize(
     "arguments, part",
     [

@@ -167,7 +167,7 @@ def test_refusals(model, state, refused):
         sweep(model, DENSITY, replace(state, converged=False))
 
 
-def test_modes_that_are_not_found_name_their_pressure():
+def test_modes_on_the_reduced_model_are_searched_as_others_and_name_their_pressure(monkeypatch):
     def lost(*_):
         raise ArithmeticError("no convergence")
 
@@ -175,6 +175,11 @@ def test_modes_that_are_not_found_name_their_pressure():
     place, search = SimpleNamespace(pressure=30e3), SimpleNamespace(options=SearchOptions(100.0))
     vars(tracking).update(spectra={}, values={pencil: 30e3}, options=SimpleNamespace(count=2), tolerance=1e-9)
     tracking.line, tracking.walk = SimpleNamespace(place=lambda _: place), SimpleNamespace(search=lambda _: search)
+    asked = []
+    monkeypatch.setattr(tracked, "leading_modes", lambda _pencil, _count, options: asked.append(options))
+    tracking.is_reduced, options = True, SearchOptions(2e3, limit_point=-300.0, lowest=4.6)
+    tracking._leading(SimpleNamespace(relaxation=object(), n=40), 2, options)
+    assert (asked[0].lowest, asked[0].max_frequency, asked[0].limit_point, asked[0].left) == (4.6, 2e3, None, True)
     tracking._leading = lost
     with pytest.raises(SolveError, match="The modes at 30000 Pa were not found: no convergence"):
         tracking._solve(pencil)

@@ -168,7 +168,7 @@ def _write(case: Case, path: Path) -> None:
 
 
 #: Names of the case files of designs.
-_MADE = "design-*.toml"
+_MADE = "design-[0-9]*.toml"
 #: Share of a range or a bound within which it is what holds a design back; of an aim, within which optima are one.
 ACTIVE = 1e-3
 #: Difference of an opening between the meshes above which it is said.

@@ -26,7 +26,7 @@ from ...drawing.style import (
 from ...texts import digits
 from ..result import StudyResult
 from ..stability.place import describe_fixed
-from ..stability.verdict import DIVERGES, FLUTTERS, NOT_VALID, OUTCOMES, STABLE
+from ..stability.verdict import DIVERGES, FLUTTERS, NOT_VALID, OUTCOMES, STABLE, UNDECIDED
 from .chances import BANDS
 
 #: Places across a picture at which its regions are looked at.
@@ -98,12 +98,14 @@ def cycle_amplitude(result: StudyResult) -> Figure:
     dotted.
     """
     amplitude = 1e3 * result.cycle_grid("amplitude")
-    unstable, growing = result.grid("unstable"), result.cycle_grid("growing")
+    growing = result.cycle_grid("growing")
+    outcomes = [OUTCOMES.index(outcome) for outcome in (FLUTTERS, DIVERGES)]
+    unstable = (result.grid("unstable") != 0) | np.isin(result.over_classes("outcome"), outcomes)
     norm = matplotlib.colors.Normalize(0.0, float(np.nanmax(amplitude)))
     figure, panels = _panels(result)
     x, y = (np.asarray(_shown(axis, np.asarray(axis.values))) for axis in (result.plan.x, result.plan.y))
     for law, axes in enumerate(panels):
-        lacking = np.isnan(amplitude[law]) & (unstable[law] != 0)
+        lacking = np.isnan(amplitude[law]) & unstable[law]
         shown = np.where(lacking, np.nan, np.nan_to_num(amplitude[law]))
         mesh = _cells(axes, result, shown, matplotlib.colormaps[MAGNITUDE].with_extremes(under="white"), norm)
         still = np.where(np.isnan(amplitude[law]) & ~lacking, 1.0, np.nan)
@@ -122,8 +124,9 @@ def cycle_amplitude(result: StudyResult) -> Figure:
 
 
 def certified_cells(result: StudyResult) -> np.ndarray:
-    """(laws, rows, columns) whether two counts agree on a cell."""
-    return result.over_classes("certified").astype(bool) & (result.grid("unstable") >= 0)
+    """(laws, rows, columns) whether two counts agree on a cell, and decide it."""
+    decided = result.over_classes("outcome") != OUTCOMES.index(UNDECIDED)
+    return result.over_classes("certified").astype(bool) & decided & (result.grid("unstable") >= 0)
 
 
 def invalid_cells(result: StudyResult) -> np.ndarray:
@@ -169,12 +172,12 @@ def _headline(figure: Figure, result: StudyResult) -> None:
 
 
 def _vouched(result: StudyResult) -> str:
-    certified, found = result.over_classes("certified"), result.grid("unstable") >= 0
+    certified, found = certified_cells(result), result.grid("unstable") >= 0
     text = f"{int(certified.sum())} of {int(found.sum())} cells certified by two counts"
     if len(result.plan.classes) > 1:
         names = ", ".join(motion.name for motion in result.plan.classes)
         text += f" in classes {names} (curves: {result.plan.classes[0].name})"
-    if not certified_cells(result).all():
+    if not certified.all():
         text += ", the others hatched"
     if invalid_cells(result).any():
         text += " (not valid: the constants of the rubber do not hold there)"

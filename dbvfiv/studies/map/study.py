@@ -476,7 +476,8 @@ class MapResult(StudyResult):
             np.stack([self.grid(name)[law], *(np.array(note[name], float) for note in self.classes)])
             for name in ("growth_rate", "frequency")
         )
-        return leading_class(names, rates, frequencies)
+        certified = self.over_classes("certified")[law].astype(bool)
+        return leading_class(names, rates, frequencies) | {"certified": certified.tolist()}
 
     def _missed(self, lost: int) -> str:
         return f"{lost} of {len(self.columns)} columns were not reached"

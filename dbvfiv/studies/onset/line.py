@@ -228,8 +228,9 @@ class FoundOnsets:
         motion, own = self.variant.motion, {"continuity": self.variant.continuity}
         named = {} if motion.of_equilibria else {"symmetry": motion.name}
         if named:
-            own = named | {"motion": motion.words, "uncertain": [list(part) for part in self.uncertain_intervals]}
+            own = named | {"motion": motion.words}
         return own | {
+            "uncertain": [list(part) for part in self.uncertain_intervals],
             "points": [point.summary() | named for point in self.points],
             "scan": self.scan(),
             "stable": [list(stretch) for stretch in self.stable_intervals],

@@ -146,7 +146,7 @@ class OnsetSearch:
         """
         name, said = self.options.parameter, []
         for low, high in joined_stretches([self.scan.uncertain]):
-            within = [s.left_open or s.failure for s in self._scanned if low <= s.value <= high]
+            within = [s.left_open or s.failure or s.refusal for s in self._scanned if low <= s.value <= high]
             why = next(filter(None, within), "Spectrum and independent count do not agree everywhere.")
             said.append(f"Between {name} = {low:.6g} and {high:.6g} nothing is claimed. {why}")
         bands = [s.verdict.band for s in self.line.samples.values() if np.isfinite(s.verdict.band)]

@@ -261,11 +261,11 @@ class OnsetResult(StudyResult):
         if other["points"]:
             return self._table(fixed, other["points"])
         outcomes = {verdict["outcome"] for verdict in other["scan"].get("verdict", ())}
-        sure = outcomes and (outcomes == {STABLE} or outcomes <= {FLUTTERS, DIVERGES})
+        sure = outcomes and (outcomes == {STABLE} or outcomes <= {FLUTTERS, DIVERGES}) and not other["uncertain"]
         said = f"No onset: the valve is {'stable' if outcomes == {STABLE} else 'unstable'} over the range."
         return [
             fixed,
-            said if sure else "No onset was found, and none is ruled out: at some values the two counts do not agree.",
+            said if sure else "No onset was found, and none is ruled out: at some values nothing is known.",
         ]
 
     @property

@@ -161,8 +161,8 @@ class Verdict:
         frequency that all were looked at.
 
         Flutter begins where that of the first class does, and ends where that of the last one does; nothing is known of
-        that where a class is undecided or diverges. None begins down to a factor if every class was looked at, and none
-        ends up to one if it ends in no class that flutters.
+        that where a class is undecided or diverges, or was not looked at as far. None begins down to a factor if every
+        class was looked at, and none ends up to one if it ends in no class that flutters.
         """
         if len(parts) == 1:
             return next(iter(parts.values()))
@@ -171,17 +171,26 @@ class Verdict:
         unstable = [part.critical_damping_factor for part in parts.values() if not part.stable]
         factors = unstable or [part.critical_damping_factor for part in parts.values()]
         known = [factor for factor in factors if np.isfinite(factor)]
+        factor = max(known, default=np.nan)
+        if len(known) < len(unstable) or not (unstable or all(p.is_examined_down_to(factor) for p in parts.values())):
+            factor = np.nan
         sought = [part.damping_sought for part in parts.values() if not (unstable and part.stable)]
         sought = [x for x in sought if np.isfinite(x)] if unstable else [] if known else sought
         return replace(
             parts[worst],
             reason=" ".join(f"In {name}: {lowered(part.reason)}" for name, part in parts.items()),
             damping_ratio=min(ratios, default=np.nan),
-            critical_damping_factor=np.nan if len(known) < len(unstable) else max(known, default=np.nan),
+            critical_damping_factor=factor,
             damping_sought=float(np.max(sought)) if sought else np.nan,
             certain=all(part.certain for part in parts.values()),
             band=min((part.band for part in parts.values() if not np.isnan(part.band)), default=np.nan),
         )
+
+    def is_examined_down_to(self, factor: float) -> bool:
+        """True for a stable state whose flutter begins at a factor on the damping or below it, or is known not to begin
+        above it.
+        """
+        return self.critical_damping_factor <= factor or self.damping_sought <= factor
 
     @property
     def stable(self) -> bool | None:

@@ -156,8 +156,7 @@ class Tracking:
             return leading_modes(pencil, count, replace(options, left=True), workspace=self._workspace)
         # the linear form of a viscoelastic wall is several times as large
         method = "auto" if pencil.relaxation is not None and count < pencil.n else "dense"
-        asked = SearchOptions(options.max_frequency, tolerance=options.tolerance, left=True, method=method)
-        return leading_modes(pencil, count, asked)
+        return leading_modes(pencil, count, replace(options, limit_point=None, left=True, method=method))
 
     def _done(self, value: float, _solves: int) -> None:
         self._keep(self.line.sample(value, self._solve(self._pencil(value))))

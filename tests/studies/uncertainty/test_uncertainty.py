@@ -17,7 +17,8 @@ from dbvfiv.record.record import GrowingRecord
 from dbvfiv.report.gather import Gathered
 from dbvfiv.report.parts import chance_part
 from dbvfiv.studies import workers
-from dbvfiv.studies.inputs import inputs_of, quasi_random
+from dbvfiv.studies.case import load_case
+from dbvfiv.studies.inputs import Plan, inputs_of, quasi_random
 from dbvfiv.studies.session import load_result
 from dbvfiv.studies.stability.verdict import OUTCOMES
 from dbvfiv.studies.uncertainty.figures import tornado
@@ -381,3 +382,13 @@ def test_a_report_and_a_tornado_say_what_the_samples_say(found):
     bars = figure.axes[0].containers[0]
     row = [label.get_text() for label in figure.axes[0].get_yticklabels()].index("Stiffness damping")
     assert bars[row].get_x() + bars[row].get_width() == pytest.approx(low)
+
+
+@pytest.mark.parametrize(
+    "pressure, told",
+    [("normal(20 kPa, 1 kPa)", 20e3), ("normal(5 %)", 2e3), ("uniform(0 %, 10 %)", 2.1e3), (None, 2e3)],
+)
+def test_samples_are_told_at_the_median_of_their_pressures(pressure, told):
+    inputs = {"thickness": "lognormal(1.1)"} | ({"pressure": pressure} if pressure else {})
+    keys = [f"uncertainty.inputs.{name}={text}" for name, text in inputs.items()]
+    assert Plan(load_case(None, ["drive.pressure=2 kPa", *keys])).values == (pytest.approx(told),)
