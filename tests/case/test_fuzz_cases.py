@@ -102,14 +102,14 @@ def damaged(r: random.Random) -> str:
     return "\n".join(lines)
 
 
-def judged(text: str, overrides: list[str], path, one_sentence) -> None:
-    """Read a file; nothing but a case or a sentence may come of it."""
+def judged(text: str, overrides: list[str], path, one_sentence) -> bool:
+    """Read a file; nothing but a case or a sentence may come of it. Whether it was a case."""
     path.write_text(text, encoding="utf-8")
     try:
         case = load_case(path, overrides)
     except CaseError as error:
         assert one_sentence(str(error)), str(error)
-        return
+        return False
     assert case.steady_pressures()
     path.write_text(case_toml(case), encoding="utf-8")
     assert load_case(path) == case
@@ -121,18 +121,21 @@ def judged(text: str, overrides: list[str], path, one_sentence) -> None:
         assert one_sentence(str(error)), str(error)
     else:
         assert np.isfinite(mesh.nodes).all() and np.isfinite(mesh.wall_deduction).all()
+    return True
 
 
 def fuzz(seeds: range, path, one_sentence) -> None:
+    read = 0
     for seed in seeds:
         r = random.Random(seed)
         text = damaged(r)
         keys = [r.choice(KEYS).replace("[]", ".0").split("(")[0] for _ in range(r.choice([0, 0, 1, 2]))]
         overrides = [f"{key}={value(r)}" for key in keys]
         try:
-            judged(text, overrides, path, one_sentence)
+            read += judged(text, overrides, path, one_sentence)
         except Exception as error:
             raise AssertionError(f"seed {seed} with overrides {overrides}:\n{text}") from error
+    assert read > len(seeds) / 100, f"{read} of {len(seeds)} were read"
 
 
 def test_three_hundred_damaged_files(tmp_path, one_sentence):
