@@ -91,7 +91,7 @@ class Fluid(Section):
     )
     ambient_pressure: Annotated[float, Quantity("Pa", "kPa")] = key(
         101325.0,
-        "Absolute pressure of the surroundings, which vapour_pressure is compared with.",
+        "Absolute pressure of the surroundings, which vapour_pressure is compared with, and the suction of runs.",
         gt=0,
         le=PARAMETERS["pressure"].high,
     )

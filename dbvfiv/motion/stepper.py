@@ -365,9 +365,7 @@ class Stepper:
         self.forget()
 
     def forget(self, all: bool = True) -> None:
-        """Drop factors and the memory of the predictor; with `all` the factorisation's analysis too, so that the next
-        step depends on the state alone.
-        """
+        """Drop factors and predictor, with `all` the factorisation's analysis too: steps depend on the state alone."""
         if all:
             self.motion.drop_factors()
         self._factored: tuple[float, bool, float] | None = None

@@ -219,9 +219,11 @@ def reach_states(
             left[pressure] -= 1
             continue
         record.progress(f"steady state at {pressure:.6g} Pa")
+        before = path.pressure, path.q, path.slope, path.step
         try:
             state = path.go_to(pressure)
         except SolveError as error:
+            path.pressure, path.q, path.slope, path.step = before  # as in a run that goes on without this pressure
             failures.append(str(error))
             record.note(UNREACHED, pressure=pressure, text=str(error))
             record.fail(str(error))

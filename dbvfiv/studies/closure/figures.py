@@ -241,7 +241,7 @@ def passage(result: StudyResult) -> Figure:
             ms=3,
             label=kilopascals(state.pressure),
         )
-    axes.axhline(result.reference_opening * 1e6, color=REST, lw=1.0, ls="--", label="lip at rest")
+    axes.axhline(result.reference_opening * 1e6, color=REST, lw=1.0, ls="--", label="gap of the lips")
     limit = result.case.closure.shut_fraction * result.reference_opening
     axes.axhline(limit * 1e6, color=ACCENT, lw=1.0, ls=":", label="counts as shut below")
     axes.axvline(result.case.valve.duckbill_length * 1e3, color=REST, lw=0.8, ls=":")

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ...model.supports import HELD_LIPS
-from ...model.symmetry import EQUILIBRIA, symmetry_named
+from ...model.symmetry import equilibria_of, symmetry_named
 from ...record.record import Record
 from ...texts import digits
 from ..result import StudyResult
@@ -110,23 +110,24 @@ def find_safety(result: StudyResult) -> SafetyFactor | None:
 
 
 class FirstBuckling(NamedTuple):
-    """Back pressure, Pa, at which a wall buckles first, and the kind of that state: "limit point", "bifurcation", or
-    "unstable" of a class that was not followed to where it buckles.
+    """Back pressure, Pa, at which a wall buckles first, the kind of that state, "limit point", "bifurcation", or
+    "unstable" of a class that was not followed to where it buckles, and the class.
     """
 
     pressure: float
     kind: str
+    symmetry: str
 
 
 def buckles_first(result: StudyResult) -> FirstBuckling | None:
     """First buckling of a wall in any symmetry class that was watched: on its path the first state met, as the path
     turns back beyond it; None where it does not.
     """
-    found = [FirstBuckling(b.pressure, b.kind) for b in result.buckling[:1]]
+    found = [FirstBuckling(b.pressure, b.kind, equilibria_of(result.case.part).name) for b in result.buckling[:1]]
     for part in result.classes:
-        found += [FirstBuckling(b["pressure"], b["kind"]) for b in part.buckling]
+        found += [FirstBuckling(b["pressure"], b["kind"], part.symmetry) for b in part.buckling]
         if not part.buckling and part.unstable_from is not None:
-            found.append(FirstBuckling(part.unstable_from, "unstable"))
+            found.append(FirstBuckling(part.unstable_from, "unstable", part.symmetry))
     return min(found, default=None)
 
 
@@ -167,11 +168,11 @@ def rated_sentence(result: StudyResult) -> str | None:
         return None
     begin = f"Rated back pressure {told['pressure'] / 1e3:.6g} kPa:"
     at = told["buckles_at"]
-    if not told["examined"] and at is not None and at < told["pressure"]:
+    if not told["examined"] and result.buckling and at is not None and at < told["pressure"]:
         return (
             f"{begin} not reached, as the wall buckles at {at / 1e3:.6g} kPa, {at / told['pressure']:.2g} times that."
         )
-    if not told["examined"]:
+    if not told["examined"]:  # another class that buckles ends no path
         return f"{begin} not examined; {result.walk_failure or 'it is not among closure.pressures.'}"
     seal = "sealing not examined, as the supports hold the lips shut"
     if told["sealed"] is not None:
@@ -285,18 +286,6 @@ def read_classes(record: Record) -> tuple[ClassBuckling, ...]:
         own = sorted((b for (symmetry, _), b in buckled.items() if symmetry == name), key=lambda b: b["pressure"])
         found.append(ClassBuckling(name, tuple(pressures), lowest, tuple(own)))
     return tuple(found)
-
-
-def first_buckling(
-    critical: float | None, classes: tuple[ClassBuckling, ...], own: str = EQUILIBRIA
-) -> dict[str, Any] | None:
-    """Lowest pressure at which the wall buckles in any class, Pa, and the class; `critical` is that of the path, whose
-    class is `own`.
-    """
-    found = [(c.critical_pressure, c.symmetry) for c in classes if c.critical_pressure is not None]
-    found += [] if critical is None else [(critical, own)]
-    pressure, name = min(found, default=(None, None))
-    return None if pressure is None else {"pressure": pressure, "symmetry": name}
 
 
 def sentences(result: StudyResult) -> list[str]:

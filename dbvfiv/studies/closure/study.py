@@ -42,8 +42,8 @@ from . import figures
 from .safety import (
     ClassBuckling,
     SafetyFactor,
+    buckles_first,
     find_safety,
-    first_buckling,
     rated_verdict,
     read_classes,
     sentences,
@@ -255,7 +255,7 @@ class ClosureResult(StudyResult):
 
     @property
     def reference_opening(self) -> float:
-        """Passage between the inner faces of the lip at rest, whole valve, m2."""
+        """Passage between the inner faces of the lip at rest, of lips that stand apart in touch, whole valve, m2."""
         return float(next(iter(self.record.notes(STATES)), {}).get("reference_opening", np.nan))
 
     @cached_property
@@ -341,7 +341,7 @@ class ClosureResult(StudyResult):
 
     def summary(self) -> dict[str, Any]:
         own = equilibria_of(self.case.part).name
-        softest = self.softest
+        softest, first = self.softest, buckles_first(self)
         return {
             "supports": self.supports,
             "points": [state.summary() for state in self.states],
@@ -352,7 +352,7 @@ class ClosureResult(StudyResult):
                 for b in self.buckling
             ],
             "critical_pressure": self.critical_pressure,
-            "first_buckling": first_buckling(self.critical_pressure, self.classes, own),
+            "first_buckling": first and {"pressure": first.pressure, "symmetry": first.symmetry},
             "classes": [part.summary() for part in self.classes],
             "safety": self.safety and self.safety.summary(),
             "rated": rated_verdict(self),

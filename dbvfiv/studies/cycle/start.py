@@ -10,6 +10,7 @@ from continuation.periodic import PeriodicMotion
 
 from ...case.parameters import PARAMETERS, Mu
 from ...errors import CaseError, SolveError
+from ...model.equilibria import operating_pressure
 from ...model.valve import ValveModel
 from ...motion.control import Drive
 from ...motion.equations import ValveMotion
@@ -120,6 +121,8 @@ def given_motion(case: Case, walk: StabilityWalk) -> Given:
     value = Mu.of(result.case)[axis.parameter]
     if result.kind == "transient" and axis.parameter == "pressure":
         value = Drive.of(result.case)(float(result.history["time"][-1]))
+        if model.pump is not None:  # whatever pressure it began at, a run moves about the operating point
+            value = operating_pressure(model)
     point = _cycle_of(case, result) if result.kind == "cycle" else None
     if point is not None and result.parameter == axis.parameter:
         value = float(point.value)

@@ -43,7 +43,7 @@ class Keys(Section):
         "",
         "What is made better, 'up' or 'down', at heads but for the mass. The margin is the least damping ratio, that "
         "of 95 % of valves with uncertainty.inputs; the gap left is the narrowest section under a back pressure over "
-        "that of the lips at rest.",
+        "the gap of the lips at rest, of lips that stand apart that of lips in touch.",
     )
     constraints: tuple[Annotated[StrictStr, _readable(aim=False), Described("list", CONSTRAINT)], ...] = key(
         (), "What must hold; one may have bounds FIRST:LAST:COUNT, for a front of designs."

@@ -328,7 +328,7 @@ class DesignResult(StudyResult):
         """Verdicts on a design on the finer mesh, as a sentence."""
         rows = self.verified(number)
         shut = {note["pressure"]: note["left"] for note in self.record.notes(_SHUT) if note["design"] == number}
-        gaps = "".join(f", gap left at {digits(p, 4)} Pa {left:.3g} of that at rest" for p, left in shut.items())
+        gaps = "".join(f", gap left at {digits(p, 4)} Pa {left:.3g} of the gap of the lips" for p, left in shut.items())
         if not len(rows["pressure"]):
             return gaps.removeprefix(", ") or "not verified"
         unstable = [
