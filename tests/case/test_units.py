@@ -4,7 +4,7 @@ import json
 
 import pytest
 
-from dbvfiv.case.units import read_units
+from dbvfiv.case.units import Units
 from dbvfiv.cli.terminal import in_units
 from dbvfiv.errors import CaseError, SolveError
 from dbvfiv.observer import Progress
@@ -26,7 +26,7 @@ def test_pressures_are_read_in_the_unit_they_were_given_in():
 
 
 def test_texts_that_are_said_twice_keep_their_digits():
-    assert read_units("Pa").say("It opens at 6125 Pa.") == "It opens at 6125 Pa."
+    assert Units("Pa", 1000.0).say("It opens at 6125 Pa.") == "It opens at 6125 Pa."
 
 
 def test_units_of_choice_stand_before_that_of_the_pressure():

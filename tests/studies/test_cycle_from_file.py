@@ -136,7 +136,7 @@ def test_the_last_period_of_a_run_is_at_the_pressure_of_its_drive(tmp_path, monk
         verdict={"verdict": "limit cycle", "frequency": None, "mass_flow": steady, "lip_displacement": lasting},
     )
     monkeypatch.setattr(start, "load_result", lambda _: run)
-    model = SimpleNamespace(mesh=run.mesh, flow=SimpleNamespace(inner=2))
+    model = SimpleNamespace(mesh=run.mesh, flow=SimpleNamespace(inner=2), pump=None)
     walk = SimpleNamespace(built=lambda _: SimpleNamespace(model=model))
     asked = started(table, cycle__over="pressure=4 kPa:8 kPa:3").case
     with pytest.raises(CaseError, match="an elastic line, or a compressed fluid, does not start"):
@@ -144,6 +144,9 @@ def test_the_last_period_of_a_run_is_at_the_pressure_of_its_drive(tmp_path, monk
     monkeypatch.setattr(start, "_last_period", lambda _model, _case, place, _run: place.pressure)
     given = start.given_motion(asked, walk)
     assert given.value == given.motion == 6e3
+    model.pump = object()
+    monkeypatch.setattr(start, "operating_pressure", lambda _: 7e3)
+    assert start.given_motion(asked, walk).value == 7e3  # where a run behind a pump ends
 
 
 def test_a_series_without_its_cycle_is_cut(file):

@@ -177,7 +177,8 @@ def test_modes_on_the_reduced_model_are_searched_as_others_and_name_their_pressu
     tracking.line, tracking.walk = SimpleNamespace(place=lambda _: place), SimpleNamespace(search=lambda _: search)
     asked = []
     monkeypatch.setattr(tracked, "leading_modes", lambda _pencil, _count, options: asked.append(options))
-    tracking.is_reduced, options = True, SearchOptions(2e3, limit_point=-300.0, lowest=4.6)
+    monkeypatch.setattr(tracked.Tracking, "is_reduced", True)
+    options = SearchOptions(2e3, limit_point=-300.0, lowest=4.6)
     tracking._leading(SimpleNamespace(relaxation=object(), n=40), 2, options)
     assert (asked[0].lowest, asked[0].max_frequency, asked[0].limit_point, asked[0].left) == (4.6, 2e3, None, True)
     tracking._leading = lost

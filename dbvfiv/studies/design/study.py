@@ -116,7 +116,7 @@ def run(session: Session, record: GrowingRecord, cases: Path | None = None) -> N
                 f"No design holds all constraints{_for(bound, bounds)}: the nearest misses one {_missed(best)}."
             )
         if cases is not None:
-            _write(problem.case_at(best.values), cases / _MADE.replace("*", str(number + 1)))
+            _write(problem.case_at(best.values), cases / f"design-{number + 1}.toml")
     for number, design in [(CASE, None), *result.best.items()]:
         _verify(problem, case, number, design, result.pressures, record)
 
@@ -168,7 +168,7 @@ def _write(case: Case, path: Path) -> None:
 
 
 #: Names of the case files of designs.
-_MADE = "design-[0-9]*.toml"
+_MADE = "design-[1-9]*.toml"
 #: Share of a range or a bound within which it is what holds a design back; of an aim, within which optima are one.
 ACTIVE = 1e-3
 #: Difference of an opening between the meshes above which it is said.
