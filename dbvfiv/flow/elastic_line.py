@@ -362,6 +362,13 @@ class LineChannel(AroundChannel):
         waves[: self.line.size // 2] = velocity
         return np.append(self.channel.with_velocity(own, velocity), waves)
 
+    def still(self, area, given):
+        """At the pressure behind the valve, up to which nothing flows."""
+        values, found = self.values(given), super().still(area, given)
+        back = self.channel.supply(values)[1]
+        found[-(self.line.size // 2) :] = self.line.steady_pressure(0.0, back, area[-1], values)
+        return found
+
     def is_soft(self, density):
         return self.channel.is_soft(density)
 

@@ -358,6 +358,10 @@ class FlowLaw(Traceable, ABC):
         """Inner unknowns (l,) of the steady flow under given parameters."""
         return np.asarray(_steady(self, area, self.values(given))[1])
 
+    def still(self, area: np.ndarray, given: Mapping[str, float]) -> np.ndarray:
+        """Inner unknowns of the fluid at rest, (l,), or one velocity where there are none."""
+        return np.zeros(max(1, self.inner))
+
     def inlet_velocity(self, area: np.ndarray, inlet: float, density: float) -> float:
         """Steady inlet velocity, m/s: the first inner unknown of every law with a fluid."""
         return float(self.steady_inner(area, {"inlet": inlet, "density": density})[0]) if self.has_fluid else 0.0

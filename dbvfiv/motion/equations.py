@@ -355,8 +355,11 @@ class ValveMotion:
         return self._factor
 
     def still_fluid(self) -> np.ndarray:
-        """Unknowns (l,) of the fluid at rest without pressure; the inlet velocity alone where the law has none."""
-        return np.zeros(max(1, self.model.flow.inner))
+        """Unknowns (l,) of the fluid at rest, at the pressure behind the valve; the inlet velocity alone where the law
+        has none.
+        """
+        model = self.model
+        return model.flow.still(model.rows.areas(model.nodal(model.rest())), self.fluid.parameters(0.0))
 
     def accelerations(
         self, q, v, inlet: float, inner: np.ndarray | None = None, memory: Memory | None = None

@@ -14,7 +14,7 @@ import numpy as np
 from eigen.operator import CoupledPencil
 
 from ..case.parameters import Mu
-from ..errors import SolveError
+from ..errors import CaseError, SolveError
 from ..model.dynamics import linearise
 from ..model.equilibria import LoadPath, SteadyOptions
 from ..model.state import SteadyState
@@ -87,6 +87,8 @@ class State(SteadyState):
         --------
         >>> state.pencil(density=1.2, alpha=0).K     # doctest: +SKIP
         """
+        if given := {"symmetry", "in_vacuo", "max_frequency"} & set(changes):
+            raise CaseError(f"{min(given)!r} is given, which the operator of a state does not take; see `modes`.")
         point = Mu.of(self._session(changes, {}).case)
         return linearise(self.model, self.q, self.pressure).pencil(point)
 

@@ -208,7 +208,7 @@ def beyond_model(history: Columns, ambient: float) -> str | None:
     ----------
     history : mapping of str to array
     ambient : float, Pa
-        Absolute pressure of the surroundings; no fluid's pressure falls further below it.
+        Absolute pressure around the jet; no fluid's pressure falls further below it.
     """
     fastest = np.asarray(history["mach"]) if "mach" in history else np.zeros(1)
     if fastest.max() > 1.0:
@@ -419,7 +419,8 @@ class Runner:
         if not self.interrupted and not self.failures:
             self._checkpoint(needed=True)
         self.verdict = self._judge() if self.history.rows > 1 else None
-        if sentence := beyond_model(self.history, self.case.fluid.ambient_pressure):
+        around = self.case.fluid.ambient_pressure + self.case.downstream.pressure
+        if sentence := beyond_model(self.history, around):
             self.record.warn(sentence)
         return self
 

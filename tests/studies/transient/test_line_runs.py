@@ -16,6 +16,13 @@ WAVES = {
 }
 
 
+def test_a_line_at_rest_has_the_pressure_behind_the_valve(valve):
+    """Nothing is drawn in before the wave of the far end arrives, after 10 ms."""
+    keys = {"transient.duration": 5e-3, "transient.step": 1e-4, "fluid.density": 100.0, "downstream.pressure": 2e4}
+    run = transient(valve(SHORT | WAVES | keys | {"drive.pressure": 2.6e4, "upstream.elements": 8}))
+    assert np.abs(run.history["station_pressure"]).max() < 0.05 * 6e3
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("law", ["quasi-steady", "storage"])
 def test_from_rest_a_wave_has_to_arrive_first(valve, law):
