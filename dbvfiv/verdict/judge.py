@@ -85,7 +85,8 @@ class Verdict:
     mean : float
         Over whole cycles where there are cycles, over the end of the series otherwise.
     amplitude : float
-        Half the distance between the extremes of the last cycles, or of the end of the series.
+        Half the distance between the extremes of the last cycles, or of the end of the series; of a record with
+        lines that of the first, at the end where it grows and at the start where it rings down.
     period : float
         s; not a number without cycles.
     cycles : int

@@ -259,6 +259,12 @@ def judge_record(
     line = found.lines[0]
     if line.frequency * series.step > _FASTEST or line.amplitude > 2.0 * np.ptp(series.values):
         return judged()  # a level that moves without noise is met by the fastest or the largest of oscillations
+    return replace(_verdict(found, series), **facts)
+
+
+def _verdict(found: Motion, series: Series) -> Verdict:
+    """Verdict on a record that holds lines."""
+    line = found.lines[0]
     cycles = int(series.duration * line.frequency)
     count = round(cycles / (line.frequency * series.step))  # samples of whole cycles
     swung = series.values[-count:] if cycles else series.values
@@ -274,7 +280,7 @@ def judge_record(
         True,
         found.reason,
         mean=float(swung.mean()),
-        amplitude=line.amplitude,
+        amplitude=line.amplitude * float(np.exp(min(max(line.rate, 0.0) * (series.end - line.start), 700.0))),
         period=1.0 / line.frequency,
         cycles=cycles,
         amplitude_trend=float(np.expm1(line.rate / line.frequency)),
@@ -283,7 +289,6 @@ def judge_record(
         noise=found.noise,
         lines=told,
         modulation=spacing,
-        **facts,
     )
 
 

@@ -96,6 +96,22 @@ def test_a_line_under_noise_on_a_drifting_level_is_a_line(drift):
     assert found.lines[0]["amplitude"] == pytest.approx(1.0, abs=0.05) and found.noise == pytest.approx(1.0, rel=0.05)
 
 
+@pytest.mark.parametrize("growth", [2.0, 6.0])
+def test_growth_has_its_amplitude_at_the_end_and_the_interval_of_that_at_the_start(growth):
+    time = np.arange(0.0, 8.0, 2e-3)
+    u, noise = time / time[-1] - 1, 0.02
+    values = np.exp(growth * u) * np.sin(2 * np.pi * 12 * time)
+    found = judge_record(time, values + noise * np.random.default_rng(4).standard_normal(len(time)))
+    (line,) = found.lines
+    assert found.name == "growing" and found.amplitude == pytest.approx(1.0, rel=0.05)
+    assert abs(line["amplitude"] - np.exp(-growth)) < 1.5 * line["amplitude_interval"]
+    # by Fisher's information of the logarithm of the amplitude at the end and of the growth
+    moments = [np.mean(np.exp(2 * growth * u) * u**k) for k in range(3)]
+    spread = np.linalg.inv([moments[:2], moments[1:]])
+    half = 1.96 * noise * np.sqrt(2 / len(time) * (spread[0, 0] - 2 * spread[0, 1] + spread[1, 1]))
+    assert line["amplitude_interval"] / line["amplitude"] == pytest.approx(half, rel=0.4)
+
+
 def test_a_level_without_noise_is_no_oscillation():
     time = np.arange(0.0, 10.0, 2e-3)
     assert judge_record(time, 5 - 3 * np.exp(-time / 2)).name == "decaying"
