@@ -388,7 +388,7 @@ def _oscillation(series: Series, options: JudgeOptions, size: float) -> Verdict 
         "cycles": len(recent),
         "periodicity_error": float(np.sqrt(np.mean(kept.error**2))),
         "periodicity_trend": _factor(kept.error),
-        "amplitude_trend": trend_of(kept.spread).slope,
+        "amplitude_trend": trend_of(kept.spread).step,
         "harmonics": harmonics(series, period, min(len(cycles), options.cycles)),
         "rms": float(kept.spread.mean() / np.sqrt(2.0)),
     }
@@ -412,7 +412,8 @@ def _name(
     def undecided(words: str) -> Verdict:
         return Verdict("undecided", False, words, **facts)
 
-    error, count, rate = facts["periodicity_error"], len(cycles), abs(facts["amplitude_trend"])
+    error, count = facts["periodicity_error"], len(cycles)
+    rate = abs(trend_of(cycles.last(options.cycles).spread).slope)
     noisy = error > options.periodic
     moves = direction in ("growing", "decaying")
     # amplitudes may wander because nothing repeats, and slow growth does not make cycles so different

@@ -68,6 +68,11 @@ class Line:
         size = float(np.hypot(self.rate, 2 * np.pi * self.frequency))
         return float(np.hypot(self.errors[1], self.damping_ratio * 2 * np.pi * self.errors[0])) / size
 
+    @property
+    def change(self) -> float:
+        """Relative change of the amplitude from one cycle to the next."""
+        return float(np.expm1(min(self.rate / self.frequency, 300.0)))
+
     def within(self, other: float, more: float = 0.0) -> bool:
         """True where a frequency is this one within the intervals and some more, Hz."""
         return abs(self.frequency - other) <= 2.0 * self.errors[0] + more

@@ -283,7 +283,7 @@ def _verdict(found: Motion, series: Series) -> Verdict:
         amplitude=line.amplitude * float(np.exp(min(max(line.rate, 0.0) * (series.end - line.start), 700.0))),
         period=1.0 / line.frequency,
         cycles=cycles,
-        amplitude_trend=float(np.expm1(line.rate / line.frequency)),
+        amplitude_trend=line.change,
         harmonics=shape,
         rms=float(swung.std()),
         noise=found.noise,
@@ -414,11 +414,11 @@ def _rung(line: Line, part: Series, found: Fit) -> Motion:
     noise = float(np.sqrt(floor.sum() / part.duration))
     change = line.rate * part.duration
     if change > 0:
-        words = f"The amplitude grows by {digits(100 * line.rate / line.frequency, 2)} % a cycle."
+        words = f"The amplitude grows by {digits(100 * line.change, 2)} % a cycle."
         return Motion("growing", words, (line,), start=part.start, noise=noise)
     end = float(np.exp(change))
     died = ", to its end" if end < _DIED or (end * line.amplitude < noise and end < 0.3) else ""
-    words = f"It rings down by {digits(-100 * line.rate / line.frequency, 2)} % a cycle{died}."
+    words = f"It rings down by {digits(-100 * line.change, 2)} % a cycle{died}."
     return Motion("decayed", words, (line,), start=part.start, noise=noise)
 
 

@@ -205,7 +205,7 @@ class Trend:
     Attributes
     ----------
     slope : float
-        Relative change from one to the next.
+        From one to the next, of the logarithm.
     error : float
         Standard error of the slope, widened for residuals that hang together.
     change : float
@@ -225,6 +225,11 @@ class Trend:
     @property
     def significant(self) -> bool:
         return abs(self.slope) > 4.0 * self.error
+
+    @property
+    def step(self) -> float:
+        """Relative change from one to the next."""
+        return float(np.expm1(min(self.slope, 300.0)))
 
 
 def trend_of(values: np.ndarray) -> Trend:

@@ -172,7 +172,9 @@ def test_slow_ways_to_a_cycle_are_not_certain_growth_or_decay(rate, start, name)
 
 def test_rates_of_growth_a_cycle():
     assert judge(T, GROWING["0.1 % a cycle"]).amplitude_trend == pytest.approx(1e-3, rel=0.01)
-    assert judge(T, GROWING["growing"]).amplitude_trend == pytest.approx(0.5 / 3, rel=0.01)
+    assert judge(T, GROWING["growing"]).amplitude_trend == pytest.approx(np.expm1(0.5 / 3), rel=0.01)
+    doubling = judge(T, 2.0 ** (3 * T) * np.sin(W * T))
+    assert doubling.amplitude_trend == pytest.approx(1.0, rel=0.01) and "changes by +100 %" in doubling.reason
 
 
 def test_coarse_samples_of_a_noisy_cycle():

@@ -87,6 +87,14 @@ def test_a_ring_down_is_the_same_in_records_of_any_length(duration):
     assert abs(line["damping_ratio"] - ratio) < 1.5 * line["damping_ratio_interval"] < 0.3 * ratio
 
 
+def test_a_ring_down_loses_a_share_of_its_amplitude_a_cycle_and_no_more_than_all_of_it():
+    time = np.arange(0.0, 4.0, 2e-3)
+    values = np.exp(-1.283 * 4 * time) * np.sin(2 * np.pi * 4 * time)
+    found = judge_record(time, values + 0.01 * np.random.default_rng(4).standard_normal(len(time)))
+    assert found.name == "decayed" and found.amplitude_trend == pytest.approx(np.expm1(-1.283), abs=0.02)
+    assert re.search(r"rings down by 7[123] % a cycle", found.reason), found.reason
+
+
 @pytest.mark.parametrize("drift", [0.0, 0.5])
 def test_a_line_under_noise_on_a_drifting_level_is_a_line(drift):
     time = np.arange(0.0, 8.0, 2e-3)
