@@ -240,10 +240,13 @@ def judge_record(
     time, values, facts = longest_samples(time, values)
     if len(time) < _FEWEST or not np.ptp(values):
         return judged()
-    if closed_below is not None and (level := judged()).name == "closed":
-        return level
+    shut = judged() if closed_below is not None else None
+    if shut is not None and shut.name == "closed":
+        return shut
     series = Series.of(time, values)
     found = find_motion(series, detrend, MAINS)
+    if shut is not None and shut.name == "chatters" and found.name != "limit cycle":
+        return shut
     if found.name not in _LINES:
         level = judged()
         peaks = () if found.returns or level.name == "decaying" else resonances(series)

@@ -5,7 +5,7 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.signal import butter, lfilter
 
-from dbvfiv.verdict import judge
+from dbvfiv.verdict import judge, judge_record
 from tests.verdict.library import lorenz, rossler
 
 T = np.linspace(0.0, 10.0, 10001)
@@ -233,6 +233,9 @@ def test_a_signal_that_shuts_again_and_again_chatters_until_it_stays_shut(scatte
     assert judge(time, values * (time < 4.0), closed_below=0.05).name == "closed"
     few = judge(time[:1200], values[:1200], closed_below=0.05)
     assert few.name == "chatters" and not few.decided
+    if scatter:
+        measured = judge_record(time, values + 2e-3 * noise(2, time.size), closed_below=0.05)
+        assert measured.name == "chatters" and measured.frequency == pytest.approx(5.0, rel=0.05)
 
 
 def test_harmonics():
