@@ -262,10 +262,10 @@ def judge_record(
     line = found.lines[0]
     if line.frequency * series.step > _FASTEST or line.amplitude > 2.0 * np.ptp(series.values):
         return judged()  # a level that moves without noise is met by the fastest or the largest of oscillations
-    return replace(_verdict(found, series), **facts)
+    return replace(_verdict(found, series, options), **facts)
 
 
-def _verdict(found: Motion, series: Series) -> Verdict:
+def _verdict(found: Motion, series: Series, options: JudgeOptions) -> Verdict:
     """Verdict on a record that holds lines."""
     line = found.lines[0]
     cycles = int(series.duration * line.frequency)
@@ -275,13 +275,14 @@ def _verdict(found: Motion, series: Series) -> Verdict:
     shape = np.zeros((0, 2))
     if found.name == "limit cycle" and cycles >= 3:
         shape = harmonics(series, 1.0 / line.frequency, min(cycles, 200))
+    few = found.name == "limit cycle" and cycles < options.cycles
     spacing = {}
     if np.isfinite(found.modulation[0]):
         spacing = dict(zip(("frequency", "frequency_interval"), map(float, found.modulation)))
     return Verdict(
         found.name,
-        True,
-        found.reason,
+        not few,
+        f"Only {cycles} cycles have been seen and {options.cycles} are needed." if few else found.reason,
         mean=float(swung.mean()),
         amplitude=line.amplitude * float(np.exp(min(max(line.rate, 0.0) * (series.end - line.start), 700.0))),
         period=1.0 / line.frequency,
@@ -479,7 +480,7 @@ def _fundamental(lines: Sequence[Line], resolution: float) -> float:
     strong = lines[0]
     for fraction in (1, 2, 3, 4):
         base = strong.frequency / fraction
-        if base < 3.0 * resolution:
+        if fraction > 1 and base < 3.0 * resolution:
             break
         numbers = [max(1, round(line.frequency / base)) for line in lines]
         if all(

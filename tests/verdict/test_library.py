@@ -120,6 +120,17 @@ def test_growth_has_its_amplitude_at_the_end_and_the_interval_of_that_at_the_sta
     assert line["amplitude_interval"] / line["amplitude"] == pytest.approx(half, rel=0.4)
 
 
+@pytest.mark.parametrize("detrend", [True, False])
+@pytest.mark.parametrize(("cycles", "decided"), [(2.5, False), (6.3, False), (14.2, True)])
+def test_few_cycles_of_a_line_are_one_line_and_not_decided(cycles, decided, detrend):
+    time = np.linspace(0.0, 1.0, 1000)
+    values = np.sin(2 * np.pi * cycles * time) + 0.02 * np.random.default_rng(4).standard_normal(len(time))
+    found = judge_record(time, values, detrend=detrend)
+    assert (found.name, found.decided, found.cycles) == ("limit cycle", decided, int(cycles)), found.reason
+    assert found.frequency == pytest.approx(cycles, rel=0.02) and len(found.lines) == 1
+    assert decided or f"Only {int(cycles)} cycles have been seen" in found.reason
+
+
 def test_a_level_without_noise_is_no_oscillation():
     time = np.arange(0.0, 10.0, 2e-3)
     assert judge_record(time, 5 - 3 * np.exp(-time / 2)).name == "decaying"
