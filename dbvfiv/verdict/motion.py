@@ -195,6 +195,8 @@ class Motion:
         Share of the power that neither lines nor level hold.
     returns : bool
         True where oscillations die and come back.
+    base : float, Hz
+        Frequency of a limit cycle, of which its lines are multiples.
     """
 
     name: str
@@ -205,6 +207,7 @@ class Motion:
     noise: float = np.nan
     left: float = np.nan
     returns: bool = False
+    base: float = np.nan
 
 
 #: Cycles a sample beyond which an oscillation is none.
@@ -268,13 +271,14 @@ def judge_record(
 def _verdict(found: Motion, series: Series, options: JudgeOptions) -> Verdict:
     """Verdict on a record that holds lines."""
     line = found.lines[0]
-    cycles = int(series.duration * line.frequency)
-    count = round(cycles / (line.frequency * series.step))  # samples of whole cycles
+    frequency = found.base if found.base > 0 else line.frequency
+    cycles = int(series.duration * frequency)
+    count = round(cycles / (frequency * series.step))  # samples of whole cycles
     swung = series.values[-count:] if cycles else series.values
     told = tuple(_summary(one) for one in found.lines)
     shape = np.zeros((0, 2))
     if found.name == "limit cycle" and cycles >= 3:
-        shape = harmonics(series, 1.0 / line.frequency, min(cycles, 200))
+        shape = harmonics(series, 1.0 / frequency, min(cycles, 200))
     few = found.name == "limit cycle" and cycles < options.cycles
     spacing = {}
     if np.isfinite(found.modulation[0]):
@@ -285,7 +289,7 @@ def _verdict(found: Motion, series: Series, options: JudgeOptions) -> Verdict:
         f"Only {cycles} cycles have been seen and {options.cycles} are needed." if few else found.reason,
         mean=float(swung.mean()),
         amplitude=line.amplitude * float(np.exp(min(max(line.rate, 0.0) * (series.end - line.start), 700.0))),
-        period=1.0 / line.frequency,
+        period=1.0 / frequency,
         cycles=cycles,
         amplitude_trend=line.change,
         harmonics=shape,
@@ -443,11 +447,13 @@ def _named(fitted: Fit, whole: bool, series: Series) -> Motion:
     base = _fundamental(own, resolution)
     if base:
         lead = min(own, key=lambda line: abs(line.frequency - base))
+        base = lead.frequency / max(1, round(lead.frequency / base))
+        first = "the first" if base == lead.frequency else f"{base:.4g} Hz"
         lines = tuple(
-            replace(line, called="" if line is lead else f"{line.frequency / base:.0f} times the first")
+            replace(line, called="" if line is lead else f"{line.frequency / base:.0f} times {first}")
             for line in sorted(own, key=lambda line: line is not lead)
         )
-        return Motion("limit cycle", "A line of constant amplitude and phase.", lines + mains, **facts)
+        return Motion("limit cycle", "A line of constant amplitude and phase.", lines + mains, **facts, base=base)
     modulated = _modulation(own, resolution)
     if modulated is not None:
         carrier, spacing = modulated

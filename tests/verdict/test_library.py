@@ -131,6 +131,15 @@ def test_few_cycles_of_a_line_are_one_line_and_not_decided(cycles, decided, detr
     assert decided or f"Only {int(cycles)} cycles have been seen" in found.reason
 
 
+def test_lines_of_two_and_three_times_a_frequency_are_a_cycle_of_that_frequency():
+    time = np.arange(0.0, 4.0, 1e-3)
+    values = np.sin(2 * np.pi * 42 * time) + 0.6 * np.sin(2 * np.pi * 63 * time)
+    found = judge_record(time, values + 0.05 * np.random.default_rng(4).standard_normal(len(time)))
+    assert found.name == "limit cycle" and found.frequency == pytest.approx(21, abs=0.01) and found.cycles == 83
+    assert [line["called"] for line in found.lines] == ["", "3 times 21 Hz"]
+    assert found.harmonics[:3, 0] == pytest.approx([0, 1, 0.6], abs=0.02)
+
+
 def test_a_level_without_noise_is_no_oscillation():
     time = np.arange(0.0, 10.0, 2e-3)
     assert judge_record(time, 5 - 3 * np.exp(-time / 2)).name == "decaying"
