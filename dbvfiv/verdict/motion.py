@@ -197,6 +197,8 @@ class Motion:
         True where oscillations die and come back.
     base : float, Hz
         Frequency of a limit cycle, of which its lines are multiples.
+    level : float or (k,) array
+        What the lines of a limit cycle lie on, at all samples.
     """
 
     name: str
@@ -208,6 +210,7 @@ class Motion:
     left: float = np.nan
     returns: bool = False
     base: float = np.nan
+    level: float | np.ndarray = 0.0
 
 
 #: Cycles a sample beyond which an oscillation is none.
@@ -278,7 +281,7 @@ def _verdict(found: Motion, series: Series, options: JudgeOptions) -> Verdict:
     told = tuple(_summary(one) for one in found.lines)
     shape = np.zeros((0, 2))
     if found.name == "limit cycle" and cycles >= 3:
-        shape = harmonics(series, 1.0 / frequency, min(cycles, 200))
+        shape = harmonics(replace(series, values=series.values - found.level), 1.0 / frequency, min(cycles, 200))
     few = found.name == "limit cycle" and cycles < options.cycles
     spacing = {}
     if np.isfinite(found.modulation[0]):
@@ -453,7 +456,8 @@ def _named(fitted: Fit, whole: bool, series: Series) -> Motion:
             replace(line, called="" if line is lead else f"{line.frequency / base:.0f} times {first}")
             for line in sorted(own, key=lambda line: line is not lead)
         )
-        return Motion("limit cycle", "A line of constant amplitude and phase.", lines + mains, **facts, base=base)
+        facts |= {"base": base, "level": fitted.level}
+        return Motion("limit cycle", "A line of constant amplitude and phase.", lines + mains, **facts)
     modulated = _modulation(own, resolution)
     if modulated is not None:
         carrier, spacing = modulated

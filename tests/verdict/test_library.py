@@ -140,6 +140,14 @@ def test_lines_of_two_and_three_times_a_frequency_are_a_cycle_of_that_frequency(
     assert found.harmonics[:3, 0] == pytest.approx([0, 1, 0.6], abs=0.02)
 
 
+def test_a_drifting_level_makes_no_harmonics():
+    time = np.arange(0.0, 4.0, 1e-3)
+    values = np.sin(2 * np.pi * 10.3 * time) + 5 * time + 1e-3 * np.random.default_rng(4).standard_normal(len(time))
+    found = judge_record(time, values)
+    assert found.name == "limit cycle" and found.harmonics[0, 0] == pytest.approx(1.0, abs=0.01)
+    assert found.harmonics[1:, 0].max() < 0.01
+
+
 def test_a_level_without_noise_is_no_oscillation():
     time = np.arange(0.0, 10.0, 2e-3)
     assert judge_record(time, 5 - 3 * np.exp(-time / 2)).name == "decaying"
