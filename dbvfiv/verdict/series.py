@@ -95,7 +95,8 @@ class Series:
         step = float(np.median(gaps))
         if np.ptp(gaps) <= 1e-6 * step or time.size < 4:
             return cls(float(time[0]), float((time[-1] - time[0]) / (time.size - 1)), values)
-        step = max(step, (time[-1] - time[0]) / 200_000)
+        # where most lie close together, no more than were given
+        step = max(step, (time[-1] - time[0]) / max(200_000, time.size))
         count = int(np.floor((time[-1] - time[0]) / step * (1 + 1e-12)))
         even = time[-1] - step * np.arange(count, -1, -1)
         return cls(float(even[0]), step, CubicSpline(time, values)(even))
