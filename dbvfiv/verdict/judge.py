@@ -442,7 +442,7 @@ def _name(
         return undecided("The amplitude still settles.")
     pace = trend_of(cycles.pace()) if count > 6 else None
     if pace is not None and pace.significant and abs(pace.change) > options.drift:
-        return undecided(f"The period still changes by {digits(100 * pace.slope, 2, '+')} % a cycle.")
+        return undecided(f"The period still changes by {digits(100 * np.expm1(-pace.slope), 2, '+')} % a cycle.")
     means = cycles.last(options.cycles).mean
     if np.ptp(means) > max(10 * options.drift, (1.5 if noisy else 0.5) * error) * recent.spread.mean():
         if trend_of(np.exp((means - means.mean()) / np.ptp(means))).significant:

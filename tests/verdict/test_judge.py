@@ -163,6 +163,10 @@ def test_not_decided_too_early(name):
     assert not verdict.decided and verdict.name in ("undecided", "growing"), verdict.reason
 
 
+def test_a_period_that_becomes_shorter_changes_by_less_than_nothing():
+    assert "period still changes by -0.03" in judge(T, UNDECIDED["period that creeps"]).reason
+
+
 @pytest.mark.parametrize("rate, start, name", [(0.3, 0.05, "growing"), (0.1, 2.0, "decaying")])
 def test_slow_ways_to_a_cycle_are_not_certain_growth_or_decay(rate, start, name):
     verdict = judge(T, relaxing(rate, start))
