@@ -300,10 +300,14 @@ def _of_one_temperature(
 
 
 def _steps(measured: np.ndarray) -> list[float]:
-    """Means of the groups of temperatures that lie together."""
-    ordered = np.sort(measured)
-    groups = np.split(ordered, np.flatnonzero(np.diff(ordered) > SAME_TEMPERATURE) + 1)
-    return [float(np.round(group.mean(), 2)) for group in groups]
+    """Means of the groups of temperatures that lie together, each within the same temperature about its middle."""
+    groups: list[list[float]] = []
+    for one in np.sort(measured):
+        if groups and one - groups[-1][-1] <= SAME_TEMPERATURE and one - groups[-1][0] <= 2.0 * SAME_TEMPERATURE:
+            groups[-1].append(one)
+        else:
+            groups.append([one])
+    return [float(np.round(np.mean(group), 2)) for group in groups]
 
 
 def series_of_loss_table(card: Relaxing, band: tuple[float, float], branches: int) -> tuple:

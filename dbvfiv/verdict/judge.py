@@ -85,7 +85,8 @@ class Verdict:
     mean : float
         Over whole cycles where there are cycles, over the end of the series otherwise.
     amplitude : float
-        Half the distance between the extremes of the last cycles, or of the end of the series.
+        Half the distance between the extremes of the last cycles, or of the end of the series; of a record with
+        lines that of the first, at the end where it grows and at the start where it rings down.
     period : float
         s; not a number without cycles.
     cycles : int
@@ -387,7 +388,7 @@ def _oscillation(series: Series, options: JudgeOptions, size: float) -> Verdict 
         "cycles": len(recent),
         "periodicity_error": float(np.sqrt(np.mean(kept.error**2))),
         "periodicity_trend": _factor(kept.error),
-        "amplitude_trend": trend_of(kept.spread).slope,
+        "amplitude_trend": trend_of(kept.spread).step,
         "harmonics": harmonics(series, period, min(len(cycles), options.cycles)),
         "rms": float(kept.spread.mean() / np.sqrt(2.0)),
     }
@@ -411,7 +412,8 @@ def _name(
     def undecided(words: str) -> Verdict:
         return Verdict("undecided", False, words, **facts)
 
-    error, count, rate = facts["periodicity_error"], len(cycles), abs(facts["amplitude_trend"])
+    error, count = facts["periodicity_error"], len(cycles)
+    rate = abs(trend_of(cycles.last(options.cycles).spread).slope)
     noisy = error > options.periodic
     moves = direction in ("growing", "decaying")
     # amplitudes may wander because nothing repeats, and slow growth does not make cycles so different
@@ -440,7 +442,7 @@ def _name(
         return undecided("The amplitude still settles.")
     pace = trend_of(cycles.pace()) if count > 6 else None
     if pace is not None and pace.significant and abs(pace.change) > options.drift:
-        return undecided(f"The period still changes by {digits(100 * pace.slope, 2, '+')} % a cycle.")
+        return undecided(f"The period still changes by {digits(100 * np.expm1(-pace.slope), 2, '+')} % a cycle.")
     means = cycles.last(options.cycles).mean
     if np.ptp(means) > max(10 * options.drift, (1.5 if noisy else 0.5) * error) * recent.spread.mean():
         if trend_of(np.exp((means - means.mean()) / np.ptp(means))).significant:

@@ -68,6 +68,11 @@ class Line:
         size = float(np.hypot(self.rate, 2 * np.pi * self.frequency))
         return float(np.hypot(self.errors[1], self.damping_ratio * 2 * np.pi * self.errors[0])) / size
 
+    @property
+    def change(self) -> float:
+        """Relative change of the amplitude from one cycle to the next."""
+        return float(np.expm1(min(self.rate / self.frequency, 300.0)))
+
     def within(self, other: float, more: float = 0.0) -> bool:
         """True where a frequency is this one within the intervals and some more, Hz."""
         return abs(self.frequency - other) <= 2.0 * self.errors[0] + more
@@ -343,7 +348,11 @@ def _with_errors(series, lines, place, whole, weight, found, left, free, level) 
         variance = local / (2.0 * series.step * weight.mean())
         amplitude = float(np.hypot(a, b))
         toward = np.array([a, b]) / amplitude if amplitude else np.zeros(2)
-        own = toward @ inverse[at : at + 2, at : at + 2] @ toward
+        along = np.zeros(len(inverse))  # derivatives of the amplitude at the start, over its share of that at the end
+        along[at : at + 2] = toward
+        if growth > 0 and (k, 1) in number:  # the amplitude at the end is fitted, and the rate tells that at the start
+            along[number[k, 1]] = -amplitude
+        own = along @ inverse @ along
         deviations = [inverse[number[k, j], number[k, j]] if (k, j) in number else 0.0 for j in (0, 1)]
         errors = WIDE * np.sqrt(variance * np.maximum([*deviations, own], 0.0))
         scale = float(np.exp(-growth)) if growth > 0 else 1.0

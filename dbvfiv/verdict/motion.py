@@ -195,6 +195,10 @@ class Motion:
         Share of the power that neither lines nor level hold.
     returns : bool
         True where oscillations die and come back.
+    base : float, Hz
+        Frequency of a limit cycle, of which its lines are multiples.
+    level : float or (k,) array
+        What the lines of a limit cycle lie on, at all samples.
     """
 
     name: str
@@ -205,6 +209,8 @@ class Motion:
     noise: float = np.nan
     left: float = np.nan
     returns: bool = False
+    base: float = np.nan
+    level: float | np.ndarray = 0.0
 
 
 #: Cycles a sample beyond which an oscillation is none.
@@ -240,10 +246,13 @@ def judge_record(
     time, values, facts = longest_samples(time, values)
     if len(time) < _FEWEST or not np.ptp(values):
         return judged()
-    if closed_below is not None and (level := judged()).name == "closed":
-        return level
+    shut = judged() if closed_below is not None else None
+    if shut is not None and shut.name == "closed":
+        return shut
     series = Series.of(time, values)
     found = find_motion(series, detrend, MAINS)
+    if shut is not None and shut.name == "chatters" and found.name != "limit cycle":
+        return shut
     if found.name not in _LINES:
         level = judged()
         peaks = () if found.returns or level.name == "decaying" else resonances(series)
@@ -259,31 +268,38 @@ def judge_record(
     line = found.lines[0]
     if line.frequency * series.step > _FASTEST or line.amplitude > 2.0 * np.ptp(series.values):
         return judged()  # a level that moves without noise is met by the fastest or the largest of oscillations
-    cycles = int(series.duration * line.frequency)
-    count = round(cycles / (line.frequency * series.step))  # samples of whole cycles
+    return replace(_verdict(found, series, options), **facts)
+
+
+def _verdict(found: Motion, series: Series, options: JudgeOptions) -> Verdict:
+    """Verdict on a record that holds lines."""
+    line = found.lines[0]
+    frequency = found.base if found.base > 0 else line.frequency
+    cycles = int(series.duration * frequency)
+    count = round(cycles / (frequency * series.step))  # samples of whole cycles
     swung = series.values[-count:] if cycles else series.values
     told = tuple(_summary(one) for one in found.lines)
     shape = np.zeros((0, 2))
     if found.name == "limit cycle" and cycles >= 3:
-        shape = harmonics(series, 1.0 / line.frequency, min(cycles, 200))
+        shape = harmonics(replace(series, values=series.values - found.level), 1.0 / frequency, min(cycles, 200))
+    few = found.name == "limit cycle" and cycles < options.cycles
     spacing = {}
     if np.isfinite(found.modulation[0]):
         spacing = dict(zip(("frequency", "frequency_interval"), map(float, found.modulation)))
     return Verdict(
         found.name,
-        True,
-        found.reason,
+        not few,
+        f"Only {cycles} cycles have been seen and {options.cycles} are needed." if few else found.reason,
         mean=float(swung.mean()),
-        amplitude=line.amplitude,
-        period=1.0 / line.frequency,
+        amplitude=line.amplitude * float(np.exp(min(max(line.rate, 0.0) * (series.end - line.start), 700.0))),
+        period=1.0 / frequency,
         cycles=cycles,
-        amplitude_trend=float(np.expm1(line.rate / line.frequency)),
+        amplitude_trend=line.change,
         harmonics=shape,
         rms=float(swung.std()),
         noise=found.noise,
         lines=told,
         modulation=spacing,
-        **facts,
     )
 
 
@@ -409,11 +425,11 @@ def _rung(line: Line, part: Series, found: Fit) -> Motion:
     noise = float(np.sqrt(floor.sum() / part.duration))
     change = line.rate * part.duration
     if change > 0:
-        words = f"The amplitude grows by {digits(100 * line.rate / line.frequency, 2)} % a cycle."
+        words = f"The amplitude grows by {digits(100 * line.change, 2)} % a cycle."
         return Motion("growing", words, (line,), start=part.start, noise=noise)
     end = float(np.exp(change))
     died = ", to its end" if end < _DIED or (end * line.amplitude < noise and end < 0.3) else ""
-    words = f"It rings down by {digits(-100 * line.rate / line.frequency, 2)} % a cycle{died}."
+    words = f"It rings down by {digits(-100 * line.change, 2)} % a cycle{died}."
     return Motion("decayed", words, (line,), start=part.start, noise=noise)
 
 
@@ -434,10 +450,13 @@ def _named(fitted: Fit, whole: bool, series: Series) -> Motion:
     base = _fundamental(own, resolution)
     if base:
         lead = min(own, key=lambda line: abs(line.frequency - base))
+        base = lead.frequency / max(1, round(lead.frequency / base))
+        first = "the first" if base == lead.frequency else f"{base:.4g} Hz"
         lines = tuple(
-            replace(line, called="" if line is lead else f"{line.frequency / base:.0f} times the first")
+            replace(line, called="" if line is lead else f"{line.frequency / base:.0f} times {first}")
             for line in sorted(own, key=lambda line: line is not lead)
         )
+        facts |= {"base": base, "level": fitted.level}
         return Motion("limit cycle", "A line of constant amplitude and phase.", lines + mains, **facts)
     modulated = _modulation(own, resolution)
     if modulated is not None:
@@ -471,7 +490,7 @@ def _fundamental(lines: Sequence[Line], resolution: float) -> float:
     strong = lines[0]
     for fraction in (1, 2, 3, 4):
         base = strong.frequency / fraction
-        if base < 3.0 * resolution:
+        if fraction > 1 and base < 3.0 * resolution:
             break
         numbers = [max(1, round(line.frequency / base)) for line in lines]
         if all(

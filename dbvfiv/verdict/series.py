@@ -95,7 +95,8 @@ class Series:
         step = float(np.median(gaps))
         if np.ptp(gaps) <= 1e-6 * step or time.size < 4:
             return cls(float(time[0]), float((time[-1] - time[0]) / (time.size - 1)), values)
-        step = max(step, (time[-1] - time[0]) / 200_000)
+        # where most lie close together, no more than were given
+        step = max(step, (time[-1] - time[0]) / max(200_000, time.size))
         count = int(np.floor((time[-1] - time[0]) / step * (1 + 1e-12)))
         even = time[-1] - step * np.arange(count, -1, -1)
         return cls(float(even[0]), step, CubicSpline(time, values)(even))
@@ -205,7 +206,7 @@ class Trend:
     Attributes
     ----------
     slope : float
-        Relative change from one to the next.
+        From one to the next, of the logarithm.
     error : float
         Standard error of the slope, widened for residuals that hang together.
     change : float
@@ -225,6 +226,11 @@ class Trend:
     @property
     def significant(self) -> bool:
         return abs(self.slope) > 4.0 * self.error
+
+    @property
+    def step(self) -> float:
+        """Relative change from one to the next."""
+        return float(np.expm1(min(self.slope, 300.0)))
 
 
 def trend_of(values: np.ndarray) -> Trend:

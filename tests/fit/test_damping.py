@@ -184,6 +184,16 @@ def test_one_of_several_temperatures(tmp_path):
         damping_of(case_of(loss_data=file, loss_temperature="30 degC"), "CR")
 
 
+def test_a_temperature_that_creeps_is_not_one(tmp_path):
+    creeping = 20.0 + 0.9 * np.arange(len(FREQUENCY))
+    head = "frequency [Hz], tan delta, temperature [degC]"
+    file = written(tmp_path / "t.csv", head, FREQUENCY, np.full(len(FREQUENCY), 0.1), creeping)
+    with pytest.raises(CaseError, match="several temperatures, 20.9 degC, 23.6 degC.*; loss_temperature"):
+        damping_of(case_of(loss_data=file), "CR")
+    file = written(tmp_path / "t.csv", head, FREQUENCY, np.full(len(FREQUENCY), 0.1), 20.0 + 0.9 * np.sin(FREQUENCY))
+    assert damping_of(case_of(loss_data=file), "CR").prony.loss_factor(20.0) == pytest.approx(0.1, rel=0.03)
+
+
 # -- tables that are refused
 
 F = "0.5, 0.1\n5, 0.1\n50, 0.1\n500, 0.1\n"

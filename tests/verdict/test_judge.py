@@ -5,7 +5,7 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.signal import butter, lfilter
 
-from dbvfiv.verdict import judge
+from dbvfiv.verdict import judge, judge_record
 from tests.verdict.library import lorenz, rossler
 
 T = np.linspace(0.0, 10.0, 10001)
@@ -163,6 +163,10 @@ def test_not_decided_too_early(name):
     assert not verdict.decided and verdict.name in ("undecided", "growing"), verdict.reason
 
 
+def test_a_period_that_becomes_shorter_changes_by_less_than_nothing():
+    assert "period still changes by -0.03" in judge(T, UNDECIDED["period that creeps"]).reason
+
+
 @pytest.mark.parametrize("rate, start, name", [(0.3, 0.05, "growing"), (0.1, 2.0, "decaying")])
 def test_slow_ways_to_a_cycle_are_not_certain_growth_or_decay(rate, start, name):
     verdict = judge(T, relaxing(rate, start))
@@ -172,7 +176,9 @@ def test_slow_ways_to_a_cycle_are_not_certain_growth_or_decay(rate, start, name)
 
 def test_rates_of_growth_a_cycle():
     assert judge(T, GROWING["0.1 % a cycle"]).amplitude_trend == pytest.approx(1e-3, rel=0.01)
-    assert judge(T, GROWING["growing"]).amplitude_trend == pytest.approx(0.5 / 3, rel=0.01)
+    assert judge(T, GROWING["growing"]).amplitude_trend == pytest.approx(np.expm1(0.5 / 3), rel=0.01)
+    doubling = judge(T, 2.0 ** (3 * T) * np.sin(W * T))
+    assert doubling.amplitude_trend == pytest.approx(1.0, rel=0.01) and "changes by +100 %" in doubling.reason
 
 
 def test_coarse_samples_of_a_noisy_cycle():
@@ -231,6 +237,9 @@ def test_a_signal_that_shuts_again_and_again_chatters_until_it_stays_shut(scatte
     assert judge(time, values * (time < 4.0), closed_below=0.05).name == "closed"
     few = judge(time[:1200], values[:1200], closed_below=0.05)
     assert few.name == "chatters" and not few.decided
+    if scatter:
+        measured = judge_record(time, values + 2e-3 * noise(2, time.size), closed_below=0.05)
+        assert measured.name == "chatters" and measured.frequency == pytest.approx(5.0, rel=0.05)
 
 
 def test_harmonics():

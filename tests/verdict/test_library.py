@@ -87,6 +87,14 @@ def test_a_ring_down_is_the_same_in_records_of_any_length(duration):
     assert abs(line["damping_ratio"] - ratio) < 1.5 * line["damping_ratio_interval"] < 0.3 * ratio
 
 
+def test_a_ring_down_loses_a_share_of_its_amplitude_a_cycle_and_no_more_than_all_of_it():
+    time = np.arange(0.0, 4.0, 2e-3)
+    values = np.exp(-1.283 * 4 * time) * np.sin(2 * np.pi * 4 * time)
+    found = judge_record(time, values + 0.01 * np.random.default_rng(4).standard_normal(len(time)))
+    assert found.name == "decayed" and found.amplitude_trend == pytest.approx(np.expm1(-1.283), abs=0.02)
+    assert re.search(r"rings down by 7[123] % a cycle", found.reason), found.reason
+
+
 @pytest.mark.parametrize("drift", [0.0, 0.5])
 def test_a_line_under_noise_on_a_drifting_level_is_a_line(drift):
     time = np.arange(0.0, 8.0, 2e-3)
@@ -94,6 +102,50 @@ def test_a_line_under_noise_on_a_drifting_level_is_a_line(drift):
     found = judge_record(time, values)
     assert found.name == "limit cycle" and found.frequency == pytest.approx(38.3, abs=0.01)
     assert found.lines[0]["amplitude"] == pytest.approx(1.0, abs=0.05) and found.noise == pytest.approx(1.0, rel=0.05)
+
+
+@pytest.mark.parametrize("growth", [2.0, 6.0])
+def test_growth_has_its_amplitude_at_the_end_and_the_interval_of_that_at_the_start(growth):
+    time = np.arange(0.0, 8.0, 2e-3)
+    u, noise = time / time[-1] - 1, 0.02
+    values = np.exp(growth * u) * np.sin(2 * np.pi * 12 * time)
+    found = judge_record(time, values + noise * np.random.default_rng(4).standard_normal(len(time)))
+    (line,) = found.lines
+    assert found.name == "growing" and found.amplitude == pytest.approx(1.0, rel=0.05)
+    assert abs(line["amplitude"] - np.exp(-growth)) < 1.5 * line["amplitude_interval"]
+    # by Fisher's information of the logarithm of the amplitude at the end and of the growth
+    moments = [np.mean(np.exp(2 * growth * u) * u**k) for k in range(3)]
+    spread = np.linalg.inv([moments[:2], moments[1:]])
+    half = 1.96 * noise * np.sqrt(2 / len(time) * (spread[0, 0] - 2 * spread[0, 1] + spread[1, 1]))
+    assert line["amplitude_interval"] / line["amplitude"] == pytest.approx(half, rel=0.4)
+
+
+@pytest.mark.parametrize("detrend", [True, False])
+@pytest.mark.parametrize(("cycles", "decided"), [(2.5, False), (6.3, False), (14.2, True)])
+def test_few_cycles_of_a_line_are_one_line_and_not_decided(cycles, decided, detrend):
+    time = np.linspace(0.0, 1.0, 1000)
+    values = np.sin(2 * np.pi * cycles * time) + 0.02 * np.random.default_rng(4).standard_normal(len(time))
+    found = judge_record(time, values, detrend=detrend)
+    assert (found.name, found.decided, found.cycles) == ("limit cycle", decided, int(cycles)), found.reason
+    assert found.frequency == pytest.approx(cycles, rel=0.02) and len(found.lines) == 1
+    assert decided or f"Only {int(cycles)} cycles have been seen" in found.reason
+
+
+def test_lines_of_two_and_three_times_a_frequency_are_a_cycle_of_that_frequency():
+    time = np.arange(0.0, 4.0, 1e-3)
+    values = np.sin(2 * np.pi * 42 * time) + 0.6 * np.sin(2 * np.pi * 63 * time)
+    found = judge_record(time, values + 0.05 * np.random.default_rng(4).standard_normal(len(time)))
+    assert found.name == "limit cycle" and found.frequency == pytest.approx(21, abs=0.01) and found.cycles == 83
+    assert [line["called"] for line in found.lines] == ["", "3 times 21 Hz"]
+    assert found.harmonics[:3, 0] == pytest.approx([0, 1, 0.6], abs=0.02)
+
+
+def test_a_drifting_level_makes_no_harmonics():
+    time = np.arange(0.0, 4.0, 1e-3)
+    values = np.sin(2 * np.pi * 10.3 * time) + 5 * time + 1e-3 * np.random.default_rng(4).standard_normal(len(time))
+    found = judge_record(time, values)
+    assert found.name == "limit cycle" and found.harmonics[0, 0] == pytest.approx(1.0, abs=0.01)
+    assert found.harmonics[1:, 0].max() < 0.01
 
 
 def test_a_level_without_noise_is_no_oscillation():

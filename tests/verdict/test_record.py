@@ -5,7 +5,7 @@ import json
 import numpy as np
 import pytest
 
-from dbvfiv.verdict import judge
+from dbvfiv.verdict import Series, judge, spectrum
 from dbvfiv.verdict.table import read_table
 
 T = np.linspace(0.0, 10.0, 2001)
@@ -159,6 +159,14 @@ def test_uneven_samples_are_said_to_be_interpolated():
     verdict = judge(t, 2 + np.sin(6 * np.pi * t))
     assert verdict.name == "limit cycle" and "uneven" in verdict.notes[0]
     assert judge(np.round(T, 4), SINE).notes == ()
+
+
+def test_a_long_record_with_rounded_times_keeps_its_samples_and_its_tones():
+    t = np.arange(300_000) / 51_200
+    series = Series.of(np.round(t, 6), np.sin(2 * np.pi * 20_000 * t))
+    frequency, amplitude = spectrum(series)
+    assert len(series.values) > 0.95 * len(t)
+    assert frequency[np.argmax(amplitude)] == pytest.approx(20_000, abs=1.0)
 
 
 NOISE = np.random.default_rng(7).standard_normal(len(T))
