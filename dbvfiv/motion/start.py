@@ -72,14 +72,15 @@ def first_state(motion: ValveMotion, case: Case, inlet: float, observer: Observe
 
 def steady_fluid(motion: ValveMotion, q: np.ndarray, inlet: float, velocity: float | None = None) -> np.ndarray | None:
     """The fluid's unknowns (l,) of the steady flow at positions (n,) and an inlet pressure, Pa, with another velocity
-    at the inlet, m/s, if one is given; None where nothing flows.
+    at the inlet, m/s, if one is given; None where nothing flows and no seal holds the pressure.
     """
     model = motion.model
-    if inlet <= model.flow.back if velocity is None else not velocity:
-        return None
     area = model.rows.areas(model.nodal(q))
+    sealed = model.seal(area) is not None
+    if not velocity and (inlet <= model.flow.back or not (velocity is None or sealed)):
+        return None
     inner = motion.fluid.steady_inner(area, inlet)
-    if velocity is None and model.seal(area) is not None:
+    if velocity is None and sealed:
         velocity = 0.0
     return inner if velocity is None else model.flow.with_velocity(inner, velocity)
 

@@ -110,7 +110,8 @@ def motion_of(
     if per_day is None:
         raise CaseError(f"{name} has states and no time; give how often a day it goes there and back: --per-day N.")
     shell = result.model.shell
-    states = [np.zeros(shell.size), *(shell.dofs.restrict(state.nodal) for state in result.states)]
+    there = [shell.dofs.restrict(state.nodal) for state in result.states]
+    states = [np.zeros(shell.size), *there, *there[-2::-1]]  # and back through each to the rest of the next block
     last = result.case.units.pressure(result.states[-1].pressure)
     return Motion(shell, states, 24.0 / per_day, f"{per_day:g} ways a day from rest to {last} and back")
 

@@ -1,5 +1,7 @@
 """Valves in a gas: the kick's rate of growth, the incompressible limit, slams above vacuum, restarts."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
@@ -44,6 +46,27 @@ def swung(model, inlet, step, duration, opening=1e-5):
         state = stepper.step(state, step).state
         swing.append(state.q[lip] - q[lip])
     return np.array(swing), kick.eigenvalue, motion
+
+
+@pytest.mark.parametrize(
+    ("sealed", "inlet", "velocity", "found"),
+    [
+        (True, 1e3, None, (1e3, 0.0)),
+        (True, 1e3, 0.0, (1e3, 0.0)),
+        (True, 0.0, 0.0, None),
+        (False, 1e3, None, 1e3),
+        (False, 1e3, 0.0, None),
+        (False, 1e3, 2.0, (1e3, 2.0)),
+        (False, 0.0, None, None),
+    ],
+)
+def test_fluid_behind_a_seal_has_the_inlet_pressure_at_rest(sealed, inlet, velocity, found):
+    """From a state in a file, whose velocity is known, as from the state that is found."""
+    flow = SimpleNamespace(back=0.0, with_velocity=lambda inner, velocity: (inner, velocity))
+    model = SimpleNamespace(flow=flow, rows=SimpleNamespace(areas=np.abs), nodal=np.abs)
+    model.seal = lambda area: 3 if sealed else None
+    motion = SimpleNamespace(model=model, fluid=SimpleNamespace(steady_inner=lambda area, inlet: inlet))
+    assert steady_fluid(motion, np.zeros(2), inlet, velocity) == found
 
 
 def test_compression_moves_the_spectrum_by_little(valve):

@@ -304,9 +304,12 @@ class DesignProblem:
 
         Raises
         ------
+        NotValidError
+            If the constants of a rubber with loss factors are unstable at this state.
         SolveError
             If a motion grows without oscillating.
         """
+        walk.require_valid(place)
         search = walk.search(place)
         if search.origin is not BandOrigin.NONE:
             self.band = self.band or search.band

@@ -150,8 +150,9 @@ class Places:
         if axis is not None:
             return axis.values
         known = [self._point(one)["pressure"] for one in self.of_records]
-        ends = max(min(known) / BEYOND, 1.01 * self.case.downstream.pressure), max(known) * BEYOND
-        return tuple(np.geomspace(*ends, VALUES).tolist())
+        rest, low = self.case.rest_pressure, min(known)
+        flows = min(1.01 * rest, rest + (low - rest) / BEYOND)  # above what nothing flows at, and below the records
+        return tuple(np.geomspace(max(low / BEYOND, flows), max(known) * BEYOND, VALUES).tolist())
 
     @property
     def hold_last(self) -> bool:

@@ -300,7 +300,8 @@ def subset(
     beyond ever higher performances, which assume no centres or shapes of the event.
 
     Independent runs give the interval, so that correlations within and between their levels are in it; it is no
-    narrower than that of independent samples in each level, where few runs agree by chance.
+    narrower than that of independent samples in each level, where few runs agree by chance. Where no run meets the
+    event, its upper end is that of independent samples of their last levels.
 
     Parameters
     ----------
@@ -312,15 +313,18 @@ def subset(
     """
     count = max(32, round(samples / (RUNS * (1 + (USUAL - 1) * (1 - SHARE)))))
     runs = [_subset_run(evaluate, dimension, count, np.random.default_rng([seed, run])) for run in range(RUNS)]
-    decided, doubtful, squares = np.array(runs).T
+    decided, doubtful, squares, most = np.array(runs).T
+    if not doubtful.any():
+        return Probability(0.0, 0.0, float(most.mean()))
     least = float(np.sqrt(squares.mean()))
     (value, low, _), (_, _, high) = _mean(decided, least), _mean(doubtful, least)
     return Probability(value, max(low, 0.0), min(high, 1.0))
 
 
-def _subset_run(evaluate, dimension: int, count: int, random: np.random.Generator) -> tuple[float, float, float]:
-    """Probability from one run, undecided samples of its last level not counted and counted as hits, and the square of
-    its coefficient of variation were all samples of a level independent.
+def _subset_run(evaluate, dimension: int, count: int, random: np.random.Generator) -> tuple[float, ...]:
+    """Probability from one run, undecided samples of its last level not counted and counted as hits; the square of its
+    coefficient of variation were all samples of a level independent; and what the last level may hold at most where
+    none of all runs hits.
     """
     square, scores, log_level, step = 0.0, random.standard_normal((count, dimension)), 0.0, FIRST_STEP
     values = evaluate(scores, np.zeros(count))
@@ -344,7 +348,8 @@ def _subset_run(evaluate, dimension: int, count: int, random: np.random.Generato
         scores, values = (np.concatenate(parts)[:count] for parts in zip(*chain))
     hits, level = float(np.mean(values > 0)), float(np.exp(log_level))
     square += (1 / hits - 1) / count if hits else 0.0
-    return level * hits, level * min(hits + undecided / count, 1.0), square
+    most = level * (1 - (0.5 * (1 - CONFIDENCE)) ** (1 / (RUNS * count)))
+    return level * hits, level * min(hits + undecided / count, 1.0), square, most
 
 
 def _variation(terms: np.ndarray) -> float:

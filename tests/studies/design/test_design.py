@@ -7,14 +7,16 @@ import pytest
 from scipy.special import softmax
 
 import dbvfiv
+from dbvfiv.case.parameters import Mu
 from dbvfiv.case.statement import parse_statement
-from dbvfiv.errors import CaseError
+from dbvfiv.errors import CaseError, NotValidError
 from dbvfiv.studies.case import thesis_case
 from dbvfiv.studies.design.problem import SHARPNESS, DesignProblem, Variable, statements_of, together
 from dbvfiv.studies.design.study import CASE, DesignResult, _changed, draw_heads
 from dbvfiv.studies.inputs import Plan, quasi_random
 from dbvfiv.studies.stability.place import redesigned
 from dbvfiv.studies.stability.verdict import OUTCOMES
+from dbvfiv.studies.stability.walk import StabilityWalk
 from tests.observers import Stop
 from tests.small_valves import load_small
 
@@ -79,6 +81,15 @@ def test_gradients_at_random_designs(number):
     share, way = np.random.default_rng(number).uniform(0.05, 0.95, (2, 3))
     lossy = LOSSY if number % 2 else {}
     check_gradients(lossy | {"fluid.continuity": ("quasi-steady", "storage")[number // 2 % 2]}, share, 2 * way - 1)
+
+
+def test_a_wall_whose_rubber_is_unstable_has_no_margin(monkeypatch):
+    """Which is known before its modes are looked for."""
+    problem = DesignProblem(load_small(KEYS, ASKED, LOSSY).case)
+    monkeypatch.setattr(StabilityWalk, "refusal", lambda self, place: "The constants of CR are unstable.")
+    monkeypatch.setattr(StabilityWalk, "search", lambda self, place: pytest.fail("modes are looked for"))
+    with pytest.raises(NotValidError, match="unstable"):
+        problem._modes(problem.walk(problem.case), Mu.of(problem.case))
 
 
 def test_margins_count_all_modes_up_to_one_frequency():

@@ -293,6 +293,20 @@ def test_the_range_stands_about_the_value_at_the_last_record(over, own):
     assert Places(load(**changes).case).now == pytest.approx(own)
 
 
+@pytest.mark.parametrize(
+    ("direction", "around", "pressure"),
+    [("+z", 0.0, 8e3), ("-z", 9.8e3, 6e3), ("-z", 0.0, 3e3), ("none", 0.0, 3e3), ("none", 9e3, 9.05e3)],
+)
+def test_the_range_without_one_lies_where_something_flows_and_holds_the_records(direction, around, pressure):
+    record = {"frequency": 20.0, "frequency_interval": 0.1, "at": f"pressure={pressure} Pa"}
+    keys = {name: value for name, value in KEYS.items() if name != "identify.over"} | {"identify.records": [record]}
+    changes = {"gravity.direction": direction, "downstream.pressure": around, "drive.pressure": 2e4}
+    places = Places(load_small(keys, changes).case)
+    assert places.case.rest_pressure < places.values[0] < places.now < places.values[-1] and places.values[0] > 0
+    expected = max(pressure / 2.5, 1.01 * places.case.rest_pressure)
+    assert places.values[0] == pytest.approx(expected) or expected > pressure
+
+
 def test_a_range_over_what_has_no_one_value_is_refused(one_sentence):
     valve = load(**{"identify.over": "angle=30,60", "layers.2.angle": 30.0})
     with pytest.raises(CaseError, match="identify.over moves angle, of which .* no one value") as caught:

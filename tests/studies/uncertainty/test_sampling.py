@@ -84,6 +84,17 @@ def test_intervals_of_subset_sampling_hold_the_probability():
     assert sum(used) / 100 < plain / 2
 
 
+@pytest.mark.parametrize(("least", "most", "performance"), [(0.02, 0.03, -1.0), (0.0, 1e-10, None)])
+def test_subset_sampling_without_a_hit_tells_what_its_levels_hold(least, most, performance):
+    """Four runs of 32 samples that are all alike, and runs that end in a level of 1e-12 far below the event."""
+
+    def evaluate(scores, _log_level):
+        return scores[:, 0] - 40.0 if performance is None else np.full(len(scores), performance)
+
+    found = subset(evaluate, 2, 400, 1)
+    assert (found.value, found.low) == (0.0, 0.0) and least < found.high < most
+
+
 def test_two_regions_are_both_found():
     bound, values = 3.3, []
     for seed in range(20):
