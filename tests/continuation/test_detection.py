@@ -8,7 +8,7 @@ import pytest
 
 from continuation import ContinuationOptions, Spectrum, continue_branch
 from continuation.branches import branch_tracer
-from continuation.event_location import locate_zero
+from continuation.event_location import FoldMonitor, locate_zero
 from continuation.jax_system import JaxSystem
 from continuation.normal_form import hopf_normal_form
 from continuation.spectra import count_unstable, match_modes
@@ -95,6 +95,17 @@ def test_a_located_point_outside_of_its_bracket_is_refused():
     )
     assert never is None and "left the bracket" in reason
     assert abs(guess.z[0] - fold) < 1e-3  # the best bracket is kept
+
+
+def test_two_folds_within_the_step_after_the_unit_of_the_state_grew():
+    """a = x^3 - 0.03 x with folds at -0.1 and 0.1, the first point in a tenth of the unit of the second."""
+    tracer = branch_tracer(cusp(), {"a": 0.0, "b": 0.03}, "a", ContinuationOptions(state_scale=0.1))
+    before = tracer.start(np.array([-0.3, -0.018]), np.array([0.0, 1.0]))
+    tracer.problem.rescale(1.0)
+    before.tangent = before.tangent / tracer.problem.norm(before.tangent)
+    after = tracer.start(np.array([0.12, -0.001872]), np.array([0.0, 1.0]))
+    folds = FoldMonitor().between(tracer, before, after, 0, [])
+    assert all(fold.located for fold in folds) and np.allclose([fold.z[0] for fold in folds], [-0.1, 0.1])
 
 
 def test_leaving_and_returning_within_a_few_steps():
