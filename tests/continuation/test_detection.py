@@ -6,7 +6,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from continuation import ContinuationOptions, Spectrum, continue_branch
+from continuation import ContinuationOptions, Reason, Spectrum, continue_branch
 from continuation.branches import branch_tracer
 from continuation.event_location import FoldMonitor, locate_zero
 from continuation.jax_system import JaxSystem
@@ -124,20 +124,24 @@ def test_leaving_and_returning_within_a_few_steps():
     assert branch.of_kind("hopf")[1].values["crossing_real"] < 0
 
 
-@pytest.mark.parametrize("centre", [0.0, 0.07, 0.2])
+@pytest.mark.parametrize("centre", [0.0, 0.07, 0.2, -0.92])
 def test_a_tongue_narrower_than_the_step_is_not_stepped_over(centre):
-    """Unstable only within 0.06 of the centre, steps of 0.4; points on neither side see it."""
+    """Unstable only within 0.06 of the centre, steps of 0.16; points on neither side see it, those of the first step
+    together with the next one.
+    """
 
     def residual(u, mu):
         g = 0.06**2 - (mu["mu"] - centre) ** 2
         return jnp.stack([g * u[0] - 2 * u[1] - u[0] ** 3, 2 * u[0] + g * u[1]])
 
-    branch = continue_branch(
-        JaxSystem(residual, 2), np.zeros(2), {"mu": -1.0}, "mu", wide(eigenvalues=2, max_step=0.4, step=0.4)
-    )
+    system, steps = JaxSystem(residual, 2), {"eigenvalues": 2, "max_step": 0.4, "step": 0.4}
+    branch = continue_branch(system, np.zeros(2), {"mu": -1.0}, "mu", wide(**steps))
     at = [s.mu["mu"] for s in branch.of_kind("hopf")]
     assert np.allclose(sorted(at), [centre - 0.06, centre + 0.06], rtol=0, atol=1e-9)
     assert all(branch.values()[s.index] <= s.mu["mu"] <= branch.values()[s.index + 1] for s in branch.special)
+    stopped = continue_branch(system, np.zeros(2), {"mu": -1.0}, "mu", wide(stop_at="hopf", **steps))
+    assert stopped.reason.kind is Reason.STOPPED and np.all(np.diff(stopped.values()) > 0)
+    assert [s.mu["mu"] for s in stopped.special] == [pytest.approx(centre - 0.06, abs=1e-9)]
 
 
 @pytest.mark.parametrize("dip", [-0.05, -0.03])
