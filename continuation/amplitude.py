@@ -64,9 +64,8 @@ class AmplitudeEquation:
 
     @property
     def attracts(self) -> bool:
-        """True where the cycle attracts motions of the mode."""
-        more, square = self.coefficients.real[1:], self.amplitude**2
-        return bool(sum((m + 1) * g * square**m for m, g in enumerate(more)) < 0)
+        """True where the cycle attracts motions of the mode: at the least amplitude a mode that grows ceases to."""
+        return bool(self.coefficients[0].real > 0 and self.amplitude > 0)
 
     def extremes(self, instants: int = 1000) -> tuple[float, float]:
         """Least and largest value of the observed quantity over the cycle, from its value at rest."""

@@ -150,10 +150,10 @@ def switch_branch(
         else:
             gap = point.z - special.z
             gap = gap / problem.norm(gap)
-            known = special.tangent / problem.norm(special.tangent)
+            ahead, known = (way / problem.norm(way) for way in (direction, special.tangent))
             if tracer.beyond(point.z) is not None:
                 reason = Reason.LOST_AT_LIMIT
-            elif abs(problem.dot(gap, direction)) > abs(problem.dot(gap, known)):
+            elif abs(problem.dot(gap, ahead)) > abs(problem.dot(gap, known)):
                 branch = Branch("equilibria", system.size, (parameter,), (), dict(special.mu), [point.record()])
                 return tracer.run(branch, point, step)
             else:

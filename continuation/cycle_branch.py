@@ -23,7 +23,7 @@ from continuation.cycle_points import (
     SpecialCycle,
     change_between,
     crossing_of,
-    growth_of_crossing,
+    exponent_that_crosses,
     parameter_predicts_better,
     predict_by_arclength,
     predict_by_parameter,
@@ -408,7 +408,10 @@ class CycleTracer:
 
     def _exchange(self, kind: str, a: CyclePoint, b: CyclePoint) -> SpecialCycle:
         """A change of stability between two points."""
-        return self._located(kind, a, b, growth_of_crossing(a.exponents, b.exponents))
+        exponent = exponent_that_crosses(a.exponents, b.exponents)
+        found = self._located(kind, a, b, lambda point: exponent(point).real)
+        turning = exponent(found.point).imag if kind in (TORUS, DOUBLING) else 0.0
+        return replace(found, frequency=turning / (2 * np.pi))
 
     def _left_over(self) -> list[SpecialCycle]:
         """A real exponent through zero in the last step: a fold where the parameter goes beyond its last value."""
@@ -524,7 +527,4 @@ class CycleTracer:
                 break
         met.sort(key=lambda one: abs(one[0]))
         nearest, value = met[0][1], value_at_zero(met[:3], low.value, high.value)
-        frequency = 0.0
-        if nearest.exponents is not None and len(nearest.exponents.values):
-            frequency = float(crossing_of(nearest.exponents).imag / (2 * np.pi)) if kind in (TORUS, DOUBLING) else 0.0
-        return SpecialCycle(kind, nearest, value, frequency, located)
+        return SpecialCycle(kind, nearest, value, 0.0, located)

@@ -120,31 +120,41 @@ def crossing_of(exponents: Exponents) -> complex:
     return complex(values[np.argmin(np.abs(values.real))]) if len(values) else 0j
 
 
+def kind_of(value: complex, omega: float, real: bool) -> str:
+    """Kind of the bifurcation at which an exponent becomes neutral, of a real multiplier or a pair."""
+    if not real:
+        return TORUS
+    return DOUBLING if value.imag > 0.25 * omega else FOLD
+
+
 def change_between(a: Exponents, b: Exponents) -> str | None:
-    """Kind of the bifurcation between two cycles, None if there is none."""
+    """Kind of the bifurcation between two cycles, None if there is none.
+
+    A real multiplier has passed 1, or -1, where the number of those beyond it has changed by an odd one: pairs that
+    become real, or the reverse, change it by two.
+    """
     if a.unstable == b.unstable or min(a.unstable, b.unstable) < 0:
         return None
-    few, many = sorted((a, b), key=lambda e: e.unstable)
-    crossing = crossing_of(min((few, many), key=lambda e: abs(crossing_of(e).real)))
-    half = 0.5 * many.omega
-    if abs(many.unstable - few.unstable) % 2 == 0 and not many.is_real(crossing):
-        return TORUS
-    if abs(crossing.imag - half) < 0.05 * half:
-        return DOUBLING
-    return FOLD if crossing.imag < 0.05 * half else TORUS
+    few, many = (
+        [kind_of(v, e.omega, size == 1) for v, size in zip(e.values[e.grows], e.dimensions[e.grows])]
+        for e in sorted((a, b), key=lambda e: e.unstable)
+    )
+    gained = {kind: many.count(kind) - few.count(kind) for kind in (FOLD, DOUBLING, TORUS)}
+    odd = [kind for kind in (FOLD, DOUBLING) if gained[kind] % 2]
+    return odd[0] if odd else max(gained, key=lambda kind: gained[kind])
 
 
-def growth_of_crossing(a: Exponents, b: Exponents) -> Callable[[CyclePoint], float]:
-    """Growth rate of the exponent that crosses, as a function of a point."""
-    few, many = (a, b) if a.unstable < b.unstable else (b, a)
-    rank = few.unstable if few.unstable < len(few.values) else 0
-    index = min(rank, len(many.values) - 1)
+def exponent_that_crosses(a: Exponents, b: Exponents) -> Callable[[CyclePoint], complex]:
+    """The exponent that crosses between two cycles, as a function of a point: that of the first dimension, by growth,
+    beyond those in which perturbations grow at both; zero where none is known.
+    """
+    rank = min(a.unstable, b.unstable)
 
-    def test(point: CyclePoint) -> float:
-        values = point.exponents.values
-        return float(values.real[min(index, len(values) - 1)]) if len(values) else 0.0
+    def exponent(point: CyclePoint) -> complex:
+        each = np.repeat(point.exponents.values, point.exponents.dimensions)
+        return complex(each[min(rank, len(each) - 1)]) if len(each) else 0j
 
-    return test
+    return exponent
 
 
 #: Points that predictions are made of.

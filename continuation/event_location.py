@@ -164,7 +164,7 @@ class FoldMonitor(Monitor):
         """
         i, problem = tracer.problem.n, tracer.problem
         length = problem.norm(after.z - before.z)
-        t0, t1 = before.tests["fold"], after.tests["fold"]
+        t0, t1 = before.tangent[i], after.tangent[i]  # in the units of now, unlike the tests
         sign, mean = np.sign(t0), (after.z[i] - before.z[i]) / max(length, 1e-300)
         bend = 3.0 * sign * (t0 + t1 - 2.0 * mean)
         slope = sign * (t1 - t0) - bend

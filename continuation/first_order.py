@@ -74,7 +74,8 @@ class FirstOrderSystem:
             linear = self.system.linear(u, mu)
             slope = -linear.jacobian
             if not getattr(self.system, "constant_mass", True):
-                slope = slope + np.stack([self.system.mass_d(u, mu, v, e) for e in np.eye(self.size)], axis=1)
+                moved = np.stack([self.system.mass_d(u, mu, v, e) for e in np.eye(self.size)], axis=1)
+                slope = slope + (sp.csc_matrix(moved) if sp.issparse(slope) else moved)
             pairs.append((slope, linear.mass))
         return pairs
 

@@ -89,8 +89,17 @@ class Exponents:
         """
         if self.trivial > _TRUSTED * self.omega:
             return -1
-        grows = self.values[self.values.real > max(2.0 * self.trivial, 1e-6 * self.omega)]
-        return int(sum(1 if self.is_real(value) else 2 for value in grows))
+        return int(self.dimensions[self.grows].sum())
+
+    @property
+    def grows(self) -> np.ndarray:
+        """(k,) bool: those that grow faster than the shift in time moves."""
+        return self.values.real > max(2.0 * self.trivial, 1e-6 * self.omega)
+
+    @property
+    def dimensions(self) -> np.ndarray:
+        """(k,) dimensions of the perturbations: 1 where the multiplier is real, 2 of a pair."""
+        return np.array([1 if self.is_real(value) else 2 for value in self.values], int)
 
     def is_real(self, value: complex) -> bool:
         """True where the multiplier of an exponent is real."""

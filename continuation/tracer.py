@@ -302,12 +302,14 @@ class Tracer:
                 return outcome
             after, step, ending, found = outcome
             last = [s for s in found if s.values.pop("beyond", None)]
+            stopping = [s for s in found if s.kind in options.stop_at or s.values.get("stop")]
+            if stopping and stopping[0].index < len(branch) - 1:  # seen a step late: the last point is the one after
+                found, last = found[: found.index(stopping[0]) + 1], stopping
             if last:
                 branch.special += found
                 for special in found:
                     notify(self.observers, "found", branch, special)
                 return Reason.STOPPED(kind=last[0].kind)
-            stopping = [s for s in found if s.kind in options.stop_at or s.values.get("stop")]
             if stopping:
                 after, found = self._stop_at(before, after, stopping[0], found)
                 ending = Reason.STOPPED(kind=stopping[0].kind)

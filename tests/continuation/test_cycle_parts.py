@@ -10,7 +10,16 @@ import scipy.sparse as sp
 from continuation import blocks, hill
 from continuation.blocks import BlockRows, SparseBlocks
 from continuation.cycle_linearisation import LeftProjection
-from continuation.cycle_points import parameter_predicts_better, predict_by_arclength, predict_by_parameter
+from continuation.cycle_points import (
+    DOUBLING,
+    FOLD,
+    TORUS,
+    change_between,
+    exponent_that_crosses,
+    parameter_predicts_better,
+    predict_by_arclength,
+    predict_by_parameter,
+)
 from continuation.cycles import CycleSolver
 from continuation.harmonics import Harmonics
 from continuation.periodic import PeriodicMotion, PeriodicOperator, Term
@@ -140,6 +149,32 @@ def test_predictions_beside_a_fold_go_by_arclength():
     assert not parameter_predicts_better(points, np.ones(2))
     found = predict_by_arclength(points[-3:], 0.1, SERIES)
     assert np.allclose(found.coefficients, folding(0.1).motion.coefficients)
+
+
+def exponents_of(*values: complex):
+    """At the frequency 2 rad/s."""
+    return hill.Exponents(np.array(values, complex), [], np.zeros(len(values)), 1e-9, 2.0)
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "kind", "crossing"),
+    [
+        ((-0.1, -3 + 1j), (2 + 1j, -0.1), DOUBLING, (-0.1, 2 + 1j)),
+        ((-0.1 + 0.6j, -3 + 1j), (2 + 1j, -0.1 + 0.6j), DOUBLING, (-0.1 + 0.6j, 2 + 1j)),
+        ((-0.1, -3 + 0.6j), (2 + 0.6j, -0.1), TORUS, (-0.1, 2 + 0.6j)),
+        ((3, -1 + 0.8j), (-1 + 0.8j, -4), FOLD, (3, -1 + 0.8j)),
+        ((0.4, -0.2 + 0.6j), (2 + 0.6j, 0.5), TORUS, (-0.2 + 0.6j, 2 + 0.6j)),
+        ((0.02 + 0.6j, -0.01 + 1j, -0.2), (0.03 + 0.6j, 0.01 + 1j, -0.19), DOUBLING, (-0.01 + 1j, 0.01 + 1j)),
+        ((0.03 + 0.4j, -0.1 + 0.6j), (0.02 + 0.4j, 0.01 + 0.6j), TORUS, (-0.1 + 0.6j, 0.01 + 0.6j)),
+        ((0.5 + 0.6j, -0.2), (0.3, -0.1), FOLD, (0.5 + 0.6j, -0.1)),  # a pair became real, and one of both went back
+    ],
+)
+def test_the_exponent_that_crosses_is_not_a_slow_one_beside_it(before, after, kind, crossing):
+    before, after = exponents_of(*before), exponents_of(*after)
+    points = [SimpleNamespace(exponents=e) for e in (before, after)]
+    for ends in ((before, after), (after, before)):
+        exponent = exponent_that_crosses(*ends)
+        assert change_between(*ends) == kind and [exponent(p) for p in points] == list(crossing)
 
 
 def test_eigenvalues_in_the_circle_are_all_found():

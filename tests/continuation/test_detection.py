@@ -6,9 +6,9 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from continuation import ContinuationOptions, Spectrum, continue_branch
+from continuation import ContinuationOptions, Reason, Spectrum, continue_branch
 from continuation.branches import branch_tracer
-from continuation.event_location import locate_zero
+from continuation.event_location import FoldMonitor, locate_zero
 from continuation.jax_system import JaxSystem
 from continuation.normal_form import hopf_normal_form
 from continuation.spectra import count_unstable, match_modes
@@ -97,6 +97,17 @@ def test_a_located_point_outside_of_its_bracket_is_refused():
     assert abs(guess.z[0] - fold) < 1e-3  # the best bracket is kept
 
 
+def test_two_folds_within_the_step_after_the_unit_of_the_state_grew():
+    """a = x^3 - 0.03 x with folds at -0.1 and 0.1, the first point in a tenth of the unit of the second."""
+    tracer = branch_tracer(cusp(), {"a": 0.0, "b": 0.03}, "a", ContinuationOptions(state_scale=0.1))
+    before = tracer.start(np.array([-0.3, -0.018]), np.array([0.0, 1.0]))
+    tracer.problem.rescale(1.0)
+    before.tangent = before.tangent / tracer.problem.norm(before.tangent)
+    after = tracer.start(np.array([0.12, -0.001872]), np.array([0.0, 1.0]))
+    folds = FoldMonitor().between(tracer, before, after, 0, [])
+    assert all(fold.located for fold in folds) and np.allclose([fold.z[0] for fold in folds], [-0.1, 0.1])
+
+
 def test_leaving_and_returning_within_a_few_steps():
     """A tongue: unstable only for |mu| < 0.2."""
 
@@ -113,20 +124,24 @@ def test_leaving_and_returning_within_a_few_steps():
     assert branch.of_kind("hopf")[1].values["crossing_real"] < 0
 
 
-@pytest.mark.parametrize("centre", [0.0, 0.07, 0.2])
+@pytest.mark.parametrize("centre", [0.0, 0.07, 0.2, -0.92])
 def test_a_tongue_narrower_than_the_step_is_not_stepped_over(centre):
-    """Unstable only within 0.06 of the centre, steps of 0.4; points on neither side see it."""
+    """Unstable only within 0.06 of the centre, steps of 0.16; points on neither side see it, those of the first step
+    together with the next one.
+    """
 
     def residual(u, mu):
         g = 0.06**2 - (mu["mu"] - centre) ** 2
         return jnp.stack([g * u[0] - 2 * u[1] - u[0] ** 3, 2 * u[0] + g * u[1]])
 
-    branch = continue_branch(
-        JaxSystem(residual, 2), np.zeros(2), {"mu": -1.0}, "mu", wide(eigenvalues=2, max_step=0.4, step=0.4)
-    )
+    system, steps = JaxSystem(residual, 2), {"eigenvalues": 2, "max_step": 0.4, "step": 0.4}
+    branch = continue_branch(system, np.zeros(2), {"mu": -1.0}, "mu", wide(**steps))
     at = [s.mu["mu"] for s in branch.of_kind("hopf")]
     assert np.allclose(sorted(at), [centre - 0.06, centre + 0.06], rtol=0, atol=1e-9)
     assert all(branch.values()[s.index] <= s.mu["mu"] <= branch.values()[s.index + 1] for s in branch.special)
+    stopped = continue_branch(system, np.zeros(2), {"mu": -1.0}, "mu", wide(stop_at="hopf", **steps))
+    assert stopped.reason.kind is Reason.STOPPED and np.all(np.diff(stopped.values()) > 0)
+    assert [s.mu["mu"] for s in stopped.special] == [pytest.approx(centre - 0.06, abs=1e-9)]
 
 
 @pytest.mark.parametrize("dip", [-0.05, -0.03])

@@ -174,6 +174,18 @@ def test_amplitude_equation_to_fifth_order(mu, nu, square, attracts):
     assert np.isclose(found.frequency, 1.0, rtol=1e-9)
 
 
+def test_a_cycle_whose_truncated_series_has_another_slope_attracts():
+    """0.9 = x (1 + 3 x)/(1 + 2 x) with x = r^2, that is x + x^2 - 2 x^3 + ...: its Pade sum is exact."""
+
+    def residual(u, mu):
+        r2 = u @ u
+        a = mu["mu"] - r2 * (1 + 3 * r2) / (1 + 2 * r2)
+        return jnp.stack([a * u[0] - u[1], u[0] + a * u[1]])
+
+    found = amplitude_of(JaxSystem(residual, 2), {"mu": 0.9}, 0.9 + 1j)
+    assert np.isclose(found.amplitude**2, (0.8 + np.sqrt(11.44)) / 6, rtol=1e-2) and found.attracts
+
+
 def test_amplitude_equation_sees_through_coordinates():
     """w = u + Q(u) moves on a circle of known radius; u does not, and its swing is that of the inverse."""
 

@@ -44,10 +44,10 @@ PHASE = 2 * np.pi * np.arange(60) / 60
 CIRCLE = np.stack([np.cos(PHASE), np.sin(PHASE)], axis=1)
 
 
-@pytest.mark.parametrize("make", [stuart_landau, warped_stuart_landau])
-def test_stuart_landau_is_exact(make):
-    """Radius sqrt(mu), frequency w - c mu, exponent -2 mu; with a state-dependent mass too."""
-    orbit = find_orbit(make(), 0.4 * CIRCLE, 3.0, MU)
+@pytest.mark.parametrize("system", [stuart_landau(), warped_stuart_landau(), warped_stuart_landau(np.ones((2, 2)))])
+def test_stuart_landau_is_exact(system):
+    """Radius sqrt(mu), frequency w - c mu, exponent -2 mu; with a state-dependent mass too, dense and sparse."""
+    orbit = find_orbit(system, 0.4 * CIRCLE, 3.0, MU)
     assert np.isclose(orbit.period, 2 * np.pi / (2.0 - 0.21), rtol=1e-11)
     assert np.allclose(orbit.amplitude(), np.sqrt(0.3), rtol=1e-9)
     assert np.allclose(orbit.exponents, -0.6, rtol=1e-8)

@@ -43,6 +43,17 @@ def test_transcritical():
     assert ends == [-1.0, 1e-3]
 
 
+def test_a_branch_far_from_the_unit_of_the_first():
+    """(u - 5)(r - (u - 5)/10): the state rests at 5 on the first branch, and is 5 + 10 r on the other."""
+    system = JaxSystem(lambda u, mu: (u - 5.0) * (mu["r"] - (u - 5.0) / 10), 1)
+    options = ContinuationOptions(limits={"r": (-1.0, 1.0)})
+    (point,) = continue_branch(system, [5.0], {"r": -1.0}, "r", options).special
+    for side in (1, -1):
+        branch = switch_branch(system, point, "r", options, side)
+        assert np.allclose(branch.states[:, 0], 5 + 10 * branch.values(), rtol=0, atol=1e-7)
+        assert abs(branch.values()[-1]) == 1.0
+
+
 def test_points_on_both_sides_of_the_buckled_column_tree():
     """Euler's elastica, discrete: buckling at the closed-form loads, switch to the first."""
     n = 6

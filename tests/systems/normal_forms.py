@@ -56,7 +56,7 @@ def stuart_landau(mass=None) -> JaxSystem:
     return JaxSystem(residual, 2, mass=mass)
 
 
-def warped_stuart_landau() -> JaxSystem:
+def warped_stuart_landau(sparsity=None) -> JaxSystem:
     """Stuart-Landau multiplied by a mass that depends on the state and on ``mu``.
 
     ``B(u) u' = B(u) f(u)`` has the orbits of ``u' = f(u)``, so its normal form is known,
@@ -69,7 +69,7 @@ def warped_stuart_landau() -> JaxSystem:
         matrix = jnp.array([[2 + x + y**2, 0.3 * x * y - y], [x**2 + mu["mu"] * y, 1 + x * y - x]])
         return matrix @ v
 
-    return JaxSystem(lambda u, mu: apply(u, mu, plain._residual(u, mu)), 2, mass=apply)
+    return JaxSystem(lambda u, mu: apply(u, mu, plain._residual(u, mu)), 2, apply, sparsity)
 
 
 def subcritical_double(values=np.array([1.0, 2.5])) -> JaxSystem:
