@@ -265,6 +265,11 @@ class Case(Section):
         return self.fluid.vapour_pressure - self.fluid.ambient_pressure - self.downstream.pressure
 
     @property
+    def vacuum_pressure(self) -> float:
+        """Pressure of a vacuum, Pa, over that around the jet."""
+        return -self.fluid.ambient_pressure - self.downstream.pressure
+
+    @property
     def has_tail(self) -> bool:
         """True where the jet runs into a downstream pipe."""
         return self.drive.kind == "flow" and self.downstream.pipe_diameter is not None

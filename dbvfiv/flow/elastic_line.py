@@ -378,8 +378,8 @@ class LineChannel(AroundChannel):
     def own_velocities(self, inner):
         return self.channel.own_velocities(inner[: self.channel.inner])
 
-    def inlet_ratio(self, inner):
-        return self.channel.inlet_ratio(inner)
+    def own_densities(self, inner):
+        return self.channel.own_densities(inner[: self.channel.inner])
 
     def reversed(self) -> LineChannel:
         return self.changed(channel=self.channel.reversed())

@@ -322,8 +322,9 @@ class GasChannel(AroundChannel):
     def own_velocities(self, inner):
         return np.append(inner[1 : self.count], inner[0])
 
-    def inlet_ratio(self, inner):
-        return float(np.exp(inner[2 * self.count - 2] / self.sound_speed))
+    def own_densities(self, inner):
+        _, sigma = self.split(inner, {"sound_speed": self.sound_speed, "heat_capacity_ratio": self.ratio})
+        return np.exp(np.asarray(sigma) / self.sound_speed)
 
     # -- still gas in front of a seal
     # ----

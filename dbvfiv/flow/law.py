@@ -362,30 +362,43 @@ class FlowLaw(Traceable, ABC):
         """Inner unknowns of the fluid at rest, (l,), or one velocity where there are none."""
         return np.zeros(max(1, self.inner))
 
-    def inlet_velocity(self, area: np.ndarray, inlet: float, density: float) -> float:
-        """Steady inlet velocity, m/s: the first inner unknown of every law with a fluid."""
-        return float(self.steady_inner(area, {"inlet": inlet, "density": density})[0]) if self.has_fluid else 0.0
+    def inlet_velocity(
+        self, area: np.ndarray, inlet: float, density: float, given: Mapping[str, float] | None = None
+    ) -> float:
+        """Steady inlet velocity, m/s: the first inner unknown of every law with a fluid; `given` are further
+        parameters, as those of `at_unit_density`.
+        """
+        all_given = {**(given or {}), "inlet": inlet, "density": density}
+        return float(self.steady_inner(area, all_given)[0]) if self.has_fluid else 0.0
 
-    def steady_velocities(self, area: np.ndarray, inlet: float, density: float) -> np.ndarray:
-        """Steady velocities (m,) at all stations, m/s; zero without a fluid.
+    def steady_velocities(
+        self, area: np.ndarray, inlet: float, density: float, given: Mapping[str, float] | None = None
+    ) -> np.ndarray:
+        """Steady velocities (m,) at all stations, m/s; zero without a fluid. `given` as for `inlet_velocity`.
 
         A fluid of another density than the law's own is compressed by a pressure as much as that is.
         """
         if not self.compressed:
-            return self.velocities(area, self.inlet_velocity(area, inlet, density))
+            return self.velocities(area, self.inlet_velocity(area, inlet, density, given))
         own = self.own_velocities(self.steady_inner(area, self._driven(inlet)))
         return own * np.sqrt(self.density / density)
 
     def inlet_density(self, area: np.ndarray, inlet: float, density: float) -> float:
-        """Density of the fluid at the inlet in steady flow, kg/m3; `density` is that around the jet.
+        """Density of the fluid at the inlet in steady flow, kg/m3; see `steady_densities`."""
+        return float(self.steady_densities(area, inlet, density)[-1])
+
+    def steady_densities(self, area: np.ndarray, inlet: float, density: float) -> np.ndarray:
+        """Densities (m,) of the fluid at all stations in steady flow, kg/m3; `density` is that around the jet.
 
         It is compressed by a pressure as much as the law's own fluid is.
         """
-        return density * self.inlet_ratio(self.steady_inner(area, self._driven(inlet))) if self.compressed else density
+        if not self.compressed:
+            return np.full(self.count, float(density))
+        return density * self.own_densities(self.steady_inner(area, self._driven(inlet)))
 
-    def inlet_ratio(self, inner: np.ndarray) -> float:
-        """Density at the inlet over that around the jet, by the law's own unknowns (l,)."""
-        return 1.0
+    def own_densities(self, inner: np.ndarray) -> np.ndarray:
+        """Densities (m,) at all stations over that around the jet, by the law's own unknowns (l,)."""
+        return np.ones(self.count)
 
     def own_velocities(self, inner: np.ndarray) -> np.ndarray | None:
         """Velocities (m,) at all stations, m/s, where they are among the law's own unknowns (l,); None where they

@@ -70,7 +70,7 @@ def centroid_matrix(slope: np.ndarray, rows: np.ndarray, index: np.ndarray) -> s
 
 
 def plug_parts(
-    z: np.ndarray, area: np.ndarray, speed: np.ndarray, density: float, unsteady: bool = True
+    z: np.ndarray, area: np.ndarray, speed: np.ndarray, density: np.ndarray | float, unsteady: bool = True
 ) -> dict[str, np.ndarray]:
     """Generalised forces on the wall, p = (A0 + lambda A1 + lambda^2 A2) w, of displacements w (m,) of the stations.
 
@@ -79,8 +79,9 @@ def plug_parts(
     z : (m,) array, m
         Stations from the outlet to the inlet.
     area, speed : (m,) arrays, m2, m/s
-        Of the passage, and of the steady flow towards the outlet; their product is the same at all stations.
-    density : float, kg/m3
+        Of the passage, and of the steady flow towards the outlet.
+    density : (m,) array or float, kg/m3
+        Its product with both is the same at all stations.
     unsteady : bool
         False keeps the centrifugal force alone.
 
@@ -90,18 +91,20 @@ def plug_parts(
         A0 (N/m), A1 (N s/m), A2 (kg), (m, m).
     """
     m, step = len(z), np.diff(z)
-    discharge = density * area[-1] * speed[-1]
+    density = np.broadcast_to(density, z.shape)
+    discharge = density[-1] * area[-1] * speed[-1]
     left, right = np.arange(m - 1), np.arange(1, m)
     stiffness, coriolis, mass = np.zeros((3, m, m))
     for s in _POINTS:
         shape = {0: 1.0 - s, 1: s}
         at = (1.0 - s) * area[:-1] + s * area[1:], (1.0 - s) * speed[:-1] + s * speed[1:]
+        thick = density[:-1] + s * np.diff(density)
         for i, rows in enumerate((left, right)):
             for j, columns in enumerate((left, right)):
                 by, along = (2 * i - 1) / step, (2 * j - 1) / step
                 stiffness[rows, columns] += 0.5 * step * discharge * at[1] * by * along
                 coriolis[rows, columns] += 0.5 * step * 2.0 * discharge * shape[i] * along
-                mass[rows, columns] -= 0.5 * step * density * at[0] * shape[i] * shape[j]
+                mass[rows, columns] -= 0.5 * step * thick * at[0] * shape[i] * shape[j]
     for end, sign in ((0, 1.0), (m - 1, -1.0)):
         stiffness[end] += sign * discharge * speed[end] * _end_slope(z, end)
     parts = {"A0": stiffness}

@@ -147,7 +147,8 @@ class _Piece:
         """Spline through points (k, 2) over their chord length."""
         chord = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(xy, axis=0), axis=1))])
         highest = min(degree, len(xy) - 1)
-        curve = make_interp_spline(chord, xy, k=highest - 1 + highest % 2)
+        odd = highest - 1 + highest % 2
+        curve = make_interp_spline(chord, xy, k=2 if highest == 2 else odd)  # three points have a parabola
         slope = curve.derivative()
         places = np.unique(np.concatenate([np.linspace(0.0, chord[-1], _FINE), chord]))
         steps = _arc(slope, places[:-1], places[1:])

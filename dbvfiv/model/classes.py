@@ -49,12 +49,12 @@ class LinearisedClass(LinearisedState):
 
     def fluid_parts(self, given) -> dict[str, np.ndarray]:
         """A0 to A2 of the plug; neither the continuity law nor a line matters, since no area changes."""
-        flow, density = self.model.flow, given["density"]
+        flow, density, inlet = self.model.flow, given["density"], self.inlet
         if self.symmetry.sway_axis is None or not flow.has_fluid:
             return {}
-        speeds = flow.steady_velocities(self.area, self.inlet, density)
-        passage = np.asarray(flow.open_area(self.area)), np.asarray(speeds) * float(self.seal is None)
-        return plug_parts(self.model.mesh.z, *passage, density, flow.unsteady)
+        speeds = np.asarray(flow.steady_velocities(self.area, inlet, density, given)) * float(self.seal is None)
+        passage = np.asarray(flow.open_area(self.area)), speeds, flow.steady_densities(self.area, inlet, density)
+        return plug_parts(self.model.mesh.z, *passage, flow.unsteady)
 
     def shut_parts(self, given) -> dict[str, np.ndarray]:
         return self.no_flow() | self.fluid_parts(given)

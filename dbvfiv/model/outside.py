@@ -138,7 +138,7 @@ class OutsideFluid:
     def __init__(self, case: Case, mesh: ValveMesh, shell: Shell):
         self.face, self.part = OuterFace(shell), mesh.part
         self.shell, self.equilibria = shell, equilibria_of(mesh.part).name
-        self._edge, self.flange_radius = mesh.rows[0], case.valve.flange_radius
+        self._edge, self.inlet_radius = mesh.rows[0], case.valve.inlet_radius
         self.open_lips = case.outside.lips == "open"
         diameter = case.outside.pipe_diameter
         self.radius = None if diameter is None else 0.5 * diameter
@@ -405,7 +405,7 @@ class OutsideForms:
     def _pair(self, way: np.ndarray) -> tuple[float, np.ndarray, np.ndarray]:
         """Step along a direction (n,) that moves no point far, and the mass at both of its ends."""
         far = np.abs(self.outside.shell.dofs.expand(way)[:, :3]).max()
-        step = STEP * self.outside.flange_radius / far
+        step = STEP * self.outside.inlet_radius / far
         return step, self._mass(step * way), self._mass(-step * way)
 
     def _bend(self, q: np.ndarray) -> np.ndarray:

@@ -60,7 +60,7 @@ class MovingOutside:
 
     def __init__(self, model: ValveModel, density: float, length: Callable[[np.ndarray], float]):
         self.model, self.density, self._length = model, density, length
-        self.within = KEPT_WITHIN * model.case.valve.flange_radius
+        self.within = KEPT_WITHIN * model.case.valve.inlet_radius
         self.renewed, self.renewals = 0.0, 0
         self._place: np.ndarray | None = None
         self._mass: AddedMass | None = None

@@ -17,6 +17,7 @@ from dbvfiv.studies.stability.walk import StabilityWalk
 from eigen import leading_modes
 from tests.differences import difference
 from tests.flow.test_channel import FLOOR, passage
+from tests.flow.test_plug import swaying
 from tests.verification.test_transient_modes import check_three_routes, three_routes
 
 #: Parallel faces: width, height, length, m; 21 stations.
@@ -162,6 +163,18 @@ def test_cells_of_a_column_are_those_of_the_full_pencil(law):
         found = leading_modes(linear.pencil(Mu(density=900.0, alpha=place.alpha, beta=beta)), 2).eigenvalues[0]
         assert column.leading[i].real == pytest.approx(found.real, rel=1e-6)
         assert column.leading[i].imag == pytest.approx(abs(found.imag), rel=1e-6, abs=1e-6)
+
+
+def test_a_thick_fluid_of_unit_density_sways_as_the_own_one():
+    """Parts of a column are those at density 1 times powers of the root of the density."""
+    law, area = valve_like(3.0, density=1000.0)
+    sway = swaying(law, law.z, area, 18e3)
+    own, unit = (sway.fluid_parts(given) for given in ({"density": 1000.0}, {"density": 1.0} | law.at_unit_density()))
+    plain = swaying(Channel(law.z, FLOOR), law.z, area, 18e3).fluid_parts({"density": 1000.0})
+    assert np.abs(own["A0"]).max() < 0.9 * np.abs(plain["A0"]).max()  # friction matters here
+    for power, name in enumerate(("A0", "A1", "A2")):
+        size = np.abs(own[name]).max()
+        assert np.sqrt(1000.0) ** power * unit[name] == pytest.approx(own[name], rel=1e-9, abs=1e-9 * size)
 
 
 @pytest.mark.slow

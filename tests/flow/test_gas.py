@@ -14,6 +14,7 @@ from dbvfiv.flow.terms.line import Line
 from tests.differences import difference
 from tests.flow.answers import answer, frequencies
 from tests.flow.test_channel import FLOOR, passage
+from tests.flow.test_plug import swaying
 
 jax.config.update("jax_enable_x64", True)
 DENSITY, SOUND, RATIO = 1.2, 343.0, 1.4
@@ -83,6 +84,25 @@ def test_steady_nozzle():
     assert jet < SOUND
     nothing = law.steady_inner(area, given(0.0))
     assert not np.any(nothing)
+
+
+def test_gas_that_sways_with_the_wall_has_its_own_density_and_mass_flow():
+    """Coriolis force by the mass flow, mass by the densities of the nozzle; nearly incompressible as a liquid."""
+    z, _ = passage()
+    area, law = np.linspace(2e-3, 1.2e-2, len(z)), gas_of(z, TINY)
+    pressure, flow, _ = isentropic(area, 36e3)
+    thick = DENSITY * (1 + np.append(pressure, 36e3) * RATIO / (DENSITY * SOUND**2)) ** (1 / RATIO)
+    assert thick[-1] > 1.2 * DENSITY
+    for density in (DENSITY, 1.0):  # at another one speeds follow its root
+        parts = swaying(law, z, area, 36e3).fluid_parts({"density": density})
+        assert -parts["A1"][0, 0] == pytest.approx(flow * np.sqrt(density / DENSITY), rel=1e-9)
+        a, b = area[:-1], area[1:]
+        cells = np.diff(z) / 6 * (thick[:-1] * (2 * a + b) + thick[1:] * (a + 2 * b))
+        assert -parts["A2"].sum() == pytest.approx(cells.sum() * density / DENSITY, rel=1e-9)
+    plain, stiff = Channel(z, TINY, 1.0, reversible=True, density=DENSITY), gas_of(z, TINY, 1e6)
+    one, two = (swaying(each, z, area, 36e3).fluid_parts({"density": DENSITY}) for each in (plain, stiff))
+    for name, values in one.items():
+        assert two[name] == pytest.approx(values, rel=1e-6, abs=1e-6 * np.abs(values).max())
 
 
 @pytest.mark.parametrize("inside, within", [(False, 1e-12), (True, 4e-3)])

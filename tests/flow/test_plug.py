@@ -10,12 +10,19 @@ import scipy.sparse as sp
 
 from dbvfiv.case.part import QUARTER
 from dbvfiv.flow.plug import centroid_matrix, centroid_slope, plug_parts
+from dbvfiv.model.classes import LinearisedClass
 from dbvfiv.model.symmetry import SYMMETRIES
 from dbvfiv.shell import Shell, ShellMesh
 from eigen import CoupledPencil, SearchOptions, leading_modes
 from tests.shell.structures import grid, isotropic_section, observed_order
 from tests.systems.beam import beam, fluid_conveying_pipe
 from tests.verification.critical import hopf
+
+
+def swaying(law, z, area, inlet) -> LinearisedClass:
+    """A class of sway of which only the fluid is known."""
+    model = SimpleNamespace(flow=law, mesh=SimpleNamespace(z=z), seal=lambda area: None)
+    return LinearisedClass(model, None, inlet, *[None] * 5, area, symmetry=SYMMETRIES["SA"])
 
 
 def sections(count=4, nodes=7, seed=3):

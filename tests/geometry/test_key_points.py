@@ -9,8 +9,9 @@ import pytest
 
 import dbvfiv
 from dbvfiv.case import CaseError
-from dbvfiv.case.key_points import read_key_points
+from dbvfiv.case.key_points import KeyProfile, read_key_points
 from dbvfiv.geometry import key_point_table, surface_of, valve_mesh
+from dbvfiv.geometry.sections import key_point_sections
 from dbvfiv.model import strain_level
 from dbvfiv.report.gather import second_mesh
 from dbvfiv.studies.case import Case, thesis_case
@@ -85,6 +86,22 @@ def test_few_points_give_nearly_the_same_shape(tmp_path):
     mesh, plain = (valve_mesh(c.valve, c.mesh) for c in (more, case))
     rest = np.interp(mesh.z, plain.z, plain.rest_area)
     assert mesh.rest_area == pytest.approx(rest, rel=2e-2)
+
+
+def test_three_points_of_a_flange_have_a_curve_without_a_corner():
+    """A parabola leaves 1.2 per cent of the quarter circle out, chords 10."""
+    points = [(0.1 * np.sin(t), 0.1 * np.cos(t), 0.3) for t in np.radians([0.0, 45.0, 90.0])]
+    lone = KeyProfile(tuple(points))
+    # the same curve between joints, behind a straight edge
+    joined = KeyProfile(((0.0, 0.2, 0.3), *points), (1,), smooth=True)
+    for profile, pieces in ((lone, 1.0), (joined, None)):
+        (found,) = key_point_sections([profile])
+        share = 0.0 if pieces else 0.1 / found.length
+        xy = found.points(np.linspace(share, 1.0, 2001))
+        area = 0.5 * np.abs(np.sum(xy[:-1, 0] * xy[1:, 1] - xy[1:, 0] * xy[:-1, 1]))
+        assert area == pytest.approx(0.25 * np.pi * 0.1**2, rel=0.02)
+        step = np.diff(xy[1:], axis=0)
+        assert np.abs(np.diff(np.unwrap(np.arctan2(step[:, 1], step[:, 0])))).max() < np.radians(1.0)
 
 
 def test_a_smooth_skin_goes_through_its_profiles_and_needs_no_row_on_them(tmp_path):

@@ -20,6 +20,7 @@ BOILING |= {"fluid.vapour_pressure": 2339.0, "downstream.pressure": 1e4}
 def test_a_fluid_boils_below_what_is_around_the_jet():
     case = thesis_case(BOILING | {"fluid.ambient_pressure": "0.9 bar"})
     assert case.boiling_pressure == pytest.approx(2339.0 - 0.9e5 - 1e4)
+    assert case.vacuum_pressure == pytest.approx(-0.9e5 - 1e4)
     assert ValveModel(case).flow.vapour == case.boiling_pressure
 
 

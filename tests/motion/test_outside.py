@@ -2,14 +2,22 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
 import dbvfiv
+from dbvfiv.geometry import valve_mesh
+from dbvfiv.model.outside import OutsideFluid
 from dbvfiv.motion.control import RunOptions
-from dbvfiv.motion.equations import OutsideCorrection, ValveMotion
+from dbvfiv.motion.equations import KEPT_WITHIN, MovingOutside, OutsideCorrection, ValveMotion
+from dbvfiv.shell import Shell, ShellMesh
+from dbvfiv.studies.case import Case
 from dbvfiv.studies.transient.run import Runner
+from tests.geometry.test_key_points import WIDE, by_points
 from tests.observers import Stop
+from tests.shell.structures import isotropic_section
 from tests.small_valves import make_valve
 from tests.studies.transient.runs import transient
 from tests.verification.test_transient_modes import three_routes
@@ -46,6 +54,18 @@ def test_renewals_are_in_the_books():
     assert not found.failures and np.any(h["outside_renewed"])
     assert np.abs(h["balance"]).max() < 0.01 * turned_over
     assert 1e-3 * turned_over < np.abs(h["outside_renewed"]).max() < 0.1 * turned_over
+
+
+def test_a_valve_of_key_points_is_measured_by_its_own_size(tmp_path):
+    case = Case().replace(WIDE | {"valve.scale": 0.4, "outside.fluid": "same"})
+    for each in (case, by_points(case, tmp_path, 9)):
+        mesh = valve_mesh(each.valve, each.mesh)
+        planes = [(mesh.rows[:, 0], 0), (mesh.rows[:, -1], 1)]
+        surface = ShellMesh.build(mesh.nodes, mesh.quads, mesh.thickness, planes=planes)
+        shell = Shell(surface, isotropic_section(1e6, 0.4, 4e-3, 1e3))
+        assert OutsideFluid(each, mesh, shell).inlet_radius == pytest.approx(0.04, rel=1e-9)
+        kept = MovingOutside(SimpleNamespace(case=each), 1000.0, np.max).within
+        assert kept == pytest.approx(KEPT_WITHIN * 0.04, rel=1e-9)
 
 
 def test_the_correction_solves_the_sum():

@@ -198,7 +198,7 @@ def lip_gap(model: ValveModel) -> float:
     return model.mesh.part.copies * model.mesh.lip_gap
 
 
-def beyond_model(history: Columns, ambient: float) -> str | None:
+def beyond_model(history: Columns, vacuum: float) -> str | None:
     """Sentence on speeds and pressures beyond what the equations are for, None without any.
 
     An ideal incompressible fluid pays any price for passing a gap that shuts; a real one separates, cavitates or is
@@ -207,8 +207,8 @@ def beyond_model(history: Columns, ambient: float) -> str | None:
     Parameters
     ----------
     history : mapping of str to array
-    ambient : float, Pa
-        Absolute pressure around the jet; no fluid's pressure falls further below it.
+    vacuum : float, Pa
+        Pressure of a vacuum, over that around the jet; no fluid's pressure falls below it.
     """
     fastest = np.asarray(history["mach"]) if "mach" in history else np.zeros(1)
     if fastest.max() > 1.0:
@@ -219,7 +219,7 @@ def beyond_model(history: Columns, ambient: float) -> str | None:
             "is a loss of head here, and the air that lips draw in then is a rough estimate."
         )
     lowest = np.min(history["station_pressure"], axis=1)
-    beyond = np.flatnonzero(lowest < -ambient)
+    beyond = np.flatnonzero(lowest < vacuum)
     if not len(beyond):
         return None
     time, share = history["time"][beyond[0]], len(beyond) / len(lowest)
@@ -419,8 +419,7 @@ class Runner:
         if not self.interrupted and not self.failures:
             self._checkpoint(needed=True)
         self.verdict = self._judge() if self.history.rows > 1 else None
-        around = self.case.fluid.ambient_pressure + self.case.downstream.pressure
-        if sentence := beyond_model(self.history, around):
+        if sentence := beyond_model(self.history, self.case.vacuum_pressure):
             self.record.warn(sentence)
         return self
 
