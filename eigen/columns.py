@@ -333,7 +333,8 @@ def cell_beside(reduction: FamilyReduction, mu: Hashable, error: float, safety: 
     """Cell of an operator next to another one, see `FamilyReduction.beside`.
 
     Leading eigenvalues are corrected with the full matrices; what that changes counts as their error. Listed as
-    unstable are those corrected, counted all of the reduced model.
+    unstable are those corrected, counted all of the reduced model; it is left open where the model has more of them
+    above the band.
 
     Parameters
     ----------
@@ -351,8 +352,9 @@ def cell_beside(reduction: FamilyReduction, mu: Hashable, error: float, safety: 
     doubt = np.maximum(np.abs(change), error * np.abs(leading)) / np.abs(leading.real)
     clear = bool(np.isfinite(leading).all() and doubt.max(initial=0.0) <= 1.0 / safety)
     band = _counted_band(family, mu)
-    number = number_right_of(values, 0.0, band)
-    return Cell.of(leading, leading, Certificate(number, number, True, 0.0, band), clear, REDUCED)
+    number, whole = (number_right_of(values, 0.0, end) for end in (band, family.search(mu).whole))
+    cell = Cell.of(leading, leading, Certificate(number, number, True, 0.0, band), clear, REDUCED)
+    return replace(cell, open_above=bool(cell.certificate.stable and whole > number))
 
 
 def _modes_of(family: PencilFamily, mu: Hashable, spectrum: Spectrum) -> Spectrum:

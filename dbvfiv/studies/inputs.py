@@ -11,15 +11,14 @@ import numpy as np
 
 from eigen.columns import ColumnSolver
 
-from ..case.damping import LARGEST_LOSS
-from ..case.describe import numeric_limits, quantity_of
+from ..case.describe import quantity_of
 from ..case.distribution import ALLOWED, FORMS, Distribution
 from ..case.parameters import PARAMETERS, Mu
 from ..case.quantity import Quantity
 from ..errors import CaseError
 from ..materials.shipped import shipped_loss, shipped_loss_names
 from .case import Case
-from .stability.place import design_value, is_surrounding, number_of, require_parameter
+from .stability.place import design_value, is_surrounding, limits_of, number_of, plain_number, require_parameter
 from .stability.verdict import lowered
 from .stability.walk import StabilityWalk
 
@@ -300,9 +299,7 @@ def _input(case: Case, name: str, text: str, source: str) -> Input:
     else:
         field, value = number_of(case, name, key)
         quantity = quantity_of(field)
-        own = value if isinstance(value, (int, float)) and not isinstance(value, bool) else None
-        own = _shipped_value(case, name) if own is None else own
-        limits = (0.0, LARGEST_LOSS) if name.endswith(".loss_factor") else numeric_limits(field)
+        own, limits = plain_number(case, name, value), limits_of(field, name)
     try:
         distribution = Distribution.parse(text, quantity, own)
     except ValueError as error:
@@ -316,16 +313,6 @@ def _input(case: Case, name: str, text: str, source: str) -> Input:
             key=key,
         )
     return Input(name, distribution, quantity, source, name in PARAMETERS and is_surrounding(case, name))
-
-
-def _shipped_value(case: Case, name: str) -> float | None:
-    """Loss factor that a material has where the case names none."""
-    parts = name.split(".")
-    if parts[0] != "materials" or parts[-1] != "loss_factor":
-        return None
-    data = case.materials.loss(parts[1])
-    known = data.loss_factor if data is not None else None
-    return shipped_loss(known).value if isinstance(known, str) else known
 
 
 def _shipped(case: Case) -> Iterator[tuple[str, str, str]]:

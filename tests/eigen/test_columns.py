@@ -9,7 +9,7 @@ import scipy.linalg as la
 import scipy.sparse as sp
 
 from eigen import Certificate, ColumnSolver, PencilFamily, SearchOptions, certified_spectrum
-from eigen.columns import DIRECT, REDUCED, _corrected
+from eigen.columns import DIRECT, REDUCED, _corrected, cell_beside
 from eigen.operator import FLUID_PARTS
 from eigen.reduction import FamilyReduction
 
@@ -90,6 +90,18 @@ def test_a_band_that_is_asked_for_ends_list_and_count():
     bands = [column.cells[0].certificate.band for column in (whole, part)]
     assert np.isinf(bands[0]) and bands[1] == pytest.approx(20.0, rel=2e-3)
     assert part.leading[0].imag <= 40 * np.pi and part.certified.all()
+
+
+@pytest.mark.parametrize(
+    ("density", "law", "band", "unstable", "left_open"),
+    [(30.0, 1.0, 1.3, 0, True), (30.0, 1.0, 2.0, 2, False), (30.0, 1.0, None, 6, False), (0.01, 0.0, 6.0, 0, False)],
+)
+def test_a_cell_beside_is_left_open_where_modes_grow_above_its_band(density, law, band, unstable, left_open):
+    """Three modes grow, at 1.6, 2.5 and 3.2 Hz; of a thin fluid none."""
+    condition = Point(density, 1.0 if law == 0.0 else 0.0, 2e-4, law)
+    beside = FamilyReduction(Chain(band)).beside(Chain(band), np.eye(SIZE), condition)
+    cell = cell_beside(beside, condition, 0.0, 5.0)
+    assert cell.certificate.unstable == cell.certificate.counted == unstable and cell.open_above == left_open
 
 
 def test_a_cell_and_a_mode_list_carry_one_certificate():

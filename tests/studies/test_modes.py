@@ -202,14 +202,26 @@ def test_damping_that_was_looked_at_is_told_from_damping_that_was_not(monkeypatc
     assert sought_of(monkeypatch, rates, outcome, beta, True) == pytest.approx(found, rel=1e-4, nan_ok=True)
 
 
+@pytest.mark.parametrize(
+    "holds, ends, found",
+    [(20.0, 4.0, (3e-4, np.nan)), (2.0, 1.8, (3e-4, np.nan)), (3.5, 4.0, (np.nan, 3.5)), (1.2, 4.0, (np.nan, 1.2))],
+)
+def test_the_critical_damping_is_sought_as_far_as_the_rubber_holds(monkeypatch, holds, ends, found):
+    """Flutter that ends at factors beyond is not told."""
+    told = sought_of(monkeypatch, lambda loss: ends - loss, "flutters", 1.0, True, holds=holds)
+    assert told == pytest.approx(found, rel=0.01, nan_ok=True) and not told[1] > holds
+
+
 @pytest.mark.parametrize("forces, rate, sought", [(0, -1.0, 0.05), (0, 1.0, np.nan), (3, -1.0, np.nan)])
 def test_a_wall_that_no_fluid_couples_is_looked_at_with_the_least_damping(monkeypatch, forces, rate, sought):
     found = sought_of(monkeypatch, lambda beta: rate, "stable", 1e-3, False, forces)
     assert found == pytest.approx((np.nan, sought), nan_ok=True)
 
 
-def sought_of(monkeypatch, rates, outcome, beta, reduced, forces=3):
-    """Multiples of the damping of a wall whose mode grows by a function of beta."""
+def sought_of(monkeypatch, rates, outcome, own, reduced, forces=3, holds=None):
+    """Multiples of the damping of a wall whose mode grows by a function of beta; of its loss factor where its rubber
+    holds up to one.
+    """
 
     class Line(ParameterLine):
         is_reduced, column = reduced, SimpleNamespace(model=SimpleNamespace())
@@ -221,13 +233,16 @@ def sought_of(monkeypatch, rates, outcome, beta, reduced, forces=3):
             return np.array(eigenvalues(self.place(value)))
 
     def eigenvalues(place):
-        rate = rates(place.beta)
+        rate = rates(place.beta or place.loss_factor)
         return [] if np.isnan(rate) else [rate + 30j]
 
     Line.column.model.eigenvalues = eigenvalues
     monkeypatch.setattr(modes_search, "ParameterLine", Line)
     family = SimpleNamespace(forces=np.zeros((9, forces)))
-    walk, place = SimpleNamespace(case=None, family=lambda _: family), Mu(beta=beta, alpha=5.0)
+    model = SimpleNamespace(relaxation=SimpleNamespace(highest=lambda _, most: most))
+    walk = SimpleNamespace(case=None, family=lambda _: family, built=lambda _: SimpleNamespace(model=model))
+    walk.refusal = lambda place: "unstable" if place.loss_factor > holds else ""
+    place = Mu({"beta" if holds is None else "loss_factor": own}, alpha=5.0)
     return critical_damping_factor(walk, place, Verdict(outcome, ""))
 
 

@@ -33,7 +33,7 @@ from ...model.sizes import ValveSizes
 from ...model.state import describe_state
 from ...model.valve import ValveModel
 from ..case import Case
-from .place import design_value, is_surrounding, key_of, redesigned, require_parameter
+from .place import design_value, is_surrounding, key_of, limits_of, number_of, redesigned, require_parameter
 
 #: What a steady state does beside vibrating: names, units and words.
 PERFORMANCE = {
@@ -44,6 +44,9 @@ PERFORMANCE = {
 }
 #: Keys of the shape that every valve can be changed by.
 SHAPE = ("valve.duckbill_length", "valve.saddle_length", "valve.lip_half_width")
+#: Share by which one-sided differences of one and two steps may differ, and share of a quantity, for a change of the
+#: parameter by its own size, that they may besides.
+ALIKE, ROUNDING = 0.1, 1e-4
 #: Names of the inlet pressure, which a model takes beside its case.
 _PRESSURE = "pressure", PARAMETERS["pressure"].key
 
@@ -92,6 +95,13 @@ class Sensitivity:
     def per_percent(self) -> complex:
         """Change of that eigenvalue for one percent more of the parameter, 1/s."""
         return 0.01 * self.relative
+
+    def is_like(self, far: Sensitivity, sizes: np.ndarray) -> bool:
+        """True where one-sided differences of one and of two steps differ as those of a smooth function do; `sizes`
+        (k,) are those of eigenvalues and performance over that of the parameter.
+        """
+        own, other = (np.array([*one.eigenvalues, *one.performance.values()]) for one in (self, far))
+        return not (np.abs(own - other) > ALIKE * np.abs(own) + ROUNDING * sizes).any()
 
     def towards(self, far: Sensitivity) -> Sensitivity:
         """Extrapolation of one-sided differences to step zero; `far` is that of twice the step."""
@@ -167,16 +177,20 @@ class Neighbourhood:
         CaseError
             If a parameter does not exist, or its value beside this one is refused.
         SolveError
-            If there is no flow through the valve beside this one.
+            If there is no flow through the valve beside this one, or the valve jumps at the end of a parameter.
         """
         require_number(self.model, name)
         value = _value(self.model, self.pressure, self.mu, name)
         h = self.step * (abs(value) or 1.0)
-        inward = _inward(name, value, h)
+        inward = _inward(self.model.case, name, value, h)
         if inward == 0:
             return self._between(name, value, value - h, value + h)
         reach = [sorted((value, value + inward * k * h)) for k in (1, 2)]
         near, far = (self._between(name, value, *ends) for ends in reach)
+        values = [mode.eigenvalue for mode in self.modes]
+        sizes = np.array([*(np.abs(self.sums) @ np.abs(values) if values else ()), *self.performance.values()])
+        if not near.is_like(far, np.abs(sizes) / (abs(value) or 1.0)):
+            raise SolveError(f"Nothing can be differentiated by {name} at {value:g}: next to it is another valve.")
         return near.towards(far)
 
     def _between(self, name: str, value: float, low: float, high: float) -> Sensitivity:
@@ -327,16 +341,22 @@ def unit_of(case: Case, name: str) -> str:
     return {"thickness": "m", "angle": "deg", "density": "kg/m^3"}.get(quantity, "Pa")
 
 
-def _inward(name: str, value: float, h: float) -> int:
-    """+1 at the lower end of a parameter that ends there, -1 at the upper end, 0 elsewhere."""
+def _inward(case: Case, name: str, value: float, h: float) -> int:
+    """+1 at the lower end of a parameter that ends there, -1 at the upper end, 0 elsewhere, and for keys whose lower
+    end is none of the parameter's values, such as a line of no length.
+    """
     if (
         name.split()[-1] in ("mu_inf", "mu_0", "c", "c_3") and value < h
     ):  # constants of a softening layer, none negative
         return 1
-    if name == "thickness" or name not in (*DESIGN, "loss_factor"):
+    is_key = name not in PARAMETERS and not name.startswith("layer ")
+    if is_key and all(row.low_included for row in PARAMETERS.values() if row.key == name):
+        low, high = limits_of(number_of(case, name, "sensitivity.of")[0], name)
+    elif name != "thickness" and name in (*DESIGN, "loss_factor"):
+        low, high = PARAMETERS[name].low, PARAMETERS[name].high
+    else:
         return 0
-    row = PARAMETERS[name]
-    return 1 if value - h < row.low else -1 if value + h > row.high else 0
+    return 1 if value - h < low else -1 if value + h > high else 0
 
 
 def _layer(name: str) -> tuple[int, str]:

@@ -9,13 +9,15 @@ from typing import Any
 import numpy as np
 from pydantic.fields import FieldInfo
 
-from ...case.describe import quantity_of
+from ...case.damping import LARGEST_LOSS
+from ...case.describe import numeric_limits, quantity_of
 from ...case.materials import BUILT_IN, RUBBERS, BuiltIn, Materials
 from ...case.parameters import OUTSIDE, PARAMETERS, PIPES, SYSTEM_NAMES, Mu
 from ...case.quantity import Quantity
 from ...case.section import Section
 from ...case.valve import Valve
 from ...errors import CaseError, SolveError
+from ...materials.shipped import shipped_loss
 from ...model.valve import ValveModel
 from ..case import Case
 
@@ -249,16 +251,35 @@ def _card(materials: Materials, name: str) -> Section:
 
 
 def key_of(case: Case, name: str, key: str) -> tuple[Quantity, float]:
-    """Quantity and value of a key of the case that holds one number.
+    """Quantity and value of a key of the case that holds one number; of a loss factor that the case does not number,
+    the one that the material has.
 
     Raises
     ------
     CaseError
     """
     field, value = number_of(case, name, key)
-    if isinstance(value, bool) or not isinstance(value, (int, float)):
+    if (number := plain_number(case, name, value)) is None:
         raise CaseError(f"{key} names {name!r}, which has no value in this case; give it one.", key=key)
-    return quantity_of(field), float(value)
+    return quantity_of(field), number
+
+
+def plain_number(case: Case, name: str, value: Any) -> float | None:
+    """Number of a key of the case from what it holds; that of the material of a loss factor without one."""
+    if isinstance(value, (int, float)) and not isinstance(value, bool):
+        return float(value)
+    parts = name.split(".")
+    if parts[0] != "materials" or parts[-1] != "loss_factor":
+        return None
+    data = case.materials.loss(parts[1])
+    known = data.loss_factor if data is not None else None
+    return shipped_loss(known).value if isinstance(known, str) else known
+
+
+def limits_of(field: FieldInfo, name: str) -> tuple[float, float]:
+    """Least and largest number, SI, that a key of the case may hold; infinite where it has none."""
+    is_loss = name.startswith("materials.") and name.endswith(".loss_factor")
+    return (0.0, LARGEST_LOSS) if is_loss else numeric_limits(field)
 
 
 def _shape_beside(case: Case, name: str, value: float) -> dict[str, object]:

@@ -10,11 +10,12 @@ import dbvfiv
 from dbvfiv.case.parameters import Mu
 from dbvfiv.case.statement import parse_statement
 from dbvfiv.errors import CaseError, NotValidError
+from dbvfiv.materials.shipped import shipped_loss
 from dbvfiv.studies.case import thesis_case
 from dbvfiv.studies.design.problem import SHARPNESS, DesignProblem, Variable, statements_of, together
 from dbvfiv.studies.design.study import CASE, DesignResult, _changed, draw_heads
 from dbvfiv.studies.inputs import Plan, quasi_random
-from dbvfiv.studies.stability.place import redesigned
+from dbvfiv.studies.stability.place import key_of, redesigned
 from dbvfiv.studies.stability.verdict import OUTCOMES
 from dbvfiv.studies.stability.walk import StabilityWalk
 from tests.observers import Stop
@@ -178,6 +179,24 @@ def test_what_holds_a_design_back_is_named(found):
         near = min(value - one.low, one.high - value) <= 1e-3 * (one.high - one.low)
         assert near == any(text.startswith(one.name) for text in named)
     assert named and f"held back by: {', '.join(named)}" in "\n".join(found.lines())
+
+
+def test_a_loss_factor_that_the_case_does_not_number_is_that_of_the_material(refused):
+    """About which it is differentiated, as an uncertain input or a variable."""
+    case, named = (load_small(LOSSY, keys).case for keys in ({}, {"materials.CR.loss_factor": "NR"}))
+    for one, material in ((case, "CR"), (named, "NR")):
+        assert key_of(one, "materials.CR.loss_factor", "of")[1] == shipped_loss(material).value
+    with refused(CaseError, match="'fluid.sound_speed', which has no value in this case"):
+        key_of(case, "fluid.sound_speed", "of")
+
+
+@pytest.mark.slow
+def test_the_margin_of_uncertain_loss_factors_is_that_of_the_numbers_written_out():
+    inputs, number = {"materials.CR.loss_factor": "uniform(0.1, 0.3)"}, shipped_loss("CR").value
+    cases = ({"uncertainty.inputs": inputs, **keys} for keys in ({}, {"materials.CR.loss_factor": number}))
+    problems = [DesignProblem(load_small(KEYS, ASKED, LOSSY, keys).case) for keys in cases]
+    found = [one.at(tuple(each.start for each in one.variables), 6e3, True).reserve for one in problems]
+    assert found[0] == pytest.approx(found[1], rel=1e-3) and found[0] > 0
 
 
 @pytest.mark.slow

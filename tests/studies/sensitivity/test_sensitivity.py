@@ -12,7 +12,7 @@ from tests.observers import Stop
 from tests.small_valves import settings
 
 CHANGES = {"mesh.around": 8, "mesh.along": 14, "damping.alpha": 0, "fluid.density": 10, "drive.pressure": 6e3}
-NAMES = ["pressure", "beta", "layer 3 angle", "alpha"]
+NAMES = ["pressure", "beta", "layer 3 angle", "alpha", "damping.alpha"]
 
 
 @pytest.fixture(scope="module")
@@ -34,6 +34,12 @@ def test_the_eigenvalue_is_that_of_modes_and_changes_as_said(valve, found):
     assert [s.parameter for s in found.sensitivities] == NAMES
     assert first.growth_rate == pytest.approx((near[0].growth_rate - near[1].growth_rate) / 12.0, rel=1e-4)
     assert first.frequency == pytest.approx((near[0].frequency - near[1].frequency) / 12.0, rel=1e-4)
+
+
+def test_a_key_at_its_end_has_the_derivatives_of_its_parameter(found):
+    """The mass damping is 0, and nothing below."""
+    by_name, by_key = found.sensitivities[3:]
+    assert by_key.value == 0 and by_key.derivative == pytest.approx(by_name.derivative, rel=1e-5)
 
 
 def test_a_flow_that_is_not_there_changes_by_no_per_cent():

@@ -9,7 +9,14 @@ from dbvfiv.model import ValveModel, linearise
 from dbvfiv.model.equilibria import find_equilibrium
 from dbvfiv.model.newton import EquilibriumSolver, NewtonOptions
 from dbvfiv.studies.case import thesis_case
-from dbvfiv.studies.stability.derivatives import Neighbourhood, changed, parameters_of, require_number
+from dbvfiv.studies.stability.derivatives import (
+    Neighbourhood,
+    Sensitivity,
+    _inward,
+    changed,
+    parameters_of,
+    require_number,
+)
 from eigen import SearchOptions, leading_modes
 from tests.small_valves import SMALL
 
@@ -119,6 +126,36 @@ def test_at_the_end_of_its_range_a_parameter_is_stepped_inward(valve):
     h = 1e-3
     here, near, far = (solved(valve, "strain", 0.1 + k * h, NEAR_RAYLEIGH)[0] for k in (0, 1, 2))
     assert found.value == 0.1 and found.derivative == pytest.approx((4 * near - 3 * here - far) / (2 * h), rel=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "inward"),
+    [
+        ("upstream.loss", 0.0, 1),
+        ("valve.lip_rise", 0.0, 1),
+        ("fluid.separation", 1.0, -1),
+        ("fluid.separation", 0.5, 0),
+        ("damping.alpha", 0.0, 1),
+        ("materials.CR.loss_factor", 2.0, -1),
+        ("upstream.length", 0.0, 0),  # no line, and not one of no length
+        ("alpha", 0.0, 0),
+        ("strain", 0.1, 1),
+        ("thickness", 1.0, 0),
+    ],
+)
+def test_keys_end_where_the_case_says(name, value, inward):
+    assert _inward(thesis_case(), name, value, 2e-5) == inward
+
+
+def test_one_sided_differences_of_a_jump_are_none():
+    """Of a smooth function they differ little from one step to two; of a jump by a half, of a root by 0.3."""
+
+    def steps(f, h=2e-5):
+        return (Sensitivity("loss", 0.0, (f(k * h) / (k * h),), {"flow": 1.0}) for k in (1, 2))
+
+    sizes = np.array([1.0, 1.0])
+    alike = [near.is_like(far, sizes) for near, far in map(steps, (lambda x: 3 * x + x**2, lambda x: 1e-3, np.sqrt))]
+    assert alike == [True, False, False]
 
 
 def test_sizes_before_the_scale_are_differentiated_by(valve):
