@@ -150,24 +150,29 @@ def ogden_energy(moduli, exponents, e):
     moduli, exponents : array_like, shape (n,)
         mu_p, Pa, and alpha_p; a term of mu_p = 0 may have any exponent.
     e : array_like, shape (5, ...)
+        Complex ones, near real ones, give the analytic continuation.
     """
     inv = plane_stress_invariants(e)
     i1, gap = jnp.asarray(inv.i1_minus_3)[..., None], jnp.asarray(inv.i2_minus_i1)[..., None]
     moduli, exponents = jnp.asarray(moduli), jnp.asarray(exponents)
     exponents = exponents + (exponents == 0.0)
     # the integral does not depend on its way
-    first, gap_there, largest = (jax.lax.stop_gradient(x) for x in (i1, gap, jnp.abs(exponents).max()))
+    first, gap_there, largest = (jax.lax.stop_gradient(x).real for x in (i1, gap, jnp.abs(exponents).max()))
     third, third_of_inverse = 1.0 + first / 3.0, 1.0 + (first + gap_there) / 3.0
     upper = jnp.log(third + 2.0 * jnp.sqrt(jnp.maximum(third**2 - third_of_inverse, 0.0)))
     lower = -jnp.log(third_of_inverse + 2.0 * jnp.sqrt(jnp.maximum(third_of_inverse**2 - third, 0.0)))
     half = jnp.maximum(0.5 * (upper - lower), jnp.minimum(OGDEN_FOCI, OGDEN_SPREAD / largest))
-    s = jnp.minimum(OGDEN_ELLIPSE, 0.5 * jnp.arcsinh(2.0 * np.pi / half)) + 1j * OGDEN_ANGLES
+    # of real invariants the real part stands for the lower half; an analytic continuation has both
+    continued = jnp.iscomplexobj(i1)
+    angles = np.concatenate([OGDEN_ANGLES, -OGDEN_ANGLES]) if continued else OGDEN_ANGLES
+    s = jnp.minimum(OGDEN_ELLIPSE, 0.5 * jnp.arcsinh(2.0 * np.pi / half)) + 1j * angles
     w = 0.5 * (upper + lower) + half * jnp.cosh(s)
     y = jnp.expm1(w)
     characteristic = y**3 + (1.0 + y) * (gap - i1 * y)
     slope = ((i1 * y + 2.0 * (i1 - gap)) * y - 3.0 * gap) / (characteristic * y)  # p'/p - 3/(z - 1)
     powers = jnp.sum(moduli / exponents * jnp.exp(0.5 * exponents * w[..., None]), axis=-1)
-    return jnp.sum((powers * slope * (1.0 + y) * half * jnp.sinh(s)).real, axis=-1) / len(OGDEN_ANGLES)
+    integrand = powers * slope * (1.0 + y) * half * jnp.sinh(s)
+    return jnp.sum(integrand if continued else integrand.real, axis=-1) / len(angles)
 
 
 def rubber_energy(parameters, e):

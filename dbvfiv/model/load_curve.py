@@ -233,10 +233,10 @@ class LoadCurve:
         highest = -np.inf
         for i, point in enumerate(self._branch.points if self._branch is not None else ()):
             if function(point.z[:-1]) >= 0.0:
-                at = point.z if i == 0 else self.root(lambda z: function(z[:-1]), i)
-                at = point.z if at is None else at
-                turned = [limit.pressure for limit in self._limits(slice(0, i + 1)) if limit.highest]
-                return max(highest, *turned, float(at[-1])) if turned else max(highest, float(at[-1])), at[:-1]
+                at = point if i == 0 else self._between(lambda z: function(z[:-1]), i) or point
+                passed = slice(0, i + 1 if at.tangent[-1] < 0.0 else i)  # one that it lies behind too
+                turned = [limit.pressure for limit in self._limits(passed) if limit.highest]
+                return max(highest, *turned, float(at.z[-1])), at.z[:-1]
             highest = max(highest, float(point.z[-1]))
         return None
 
@@ -244,10 +244,13 @@ class LoadCurve:
         """Point (n + 1,) of the curve between a known one and that after it at which a function of such points
         vanishes; None where the curve is lost.
         """
-        points = self._branch.points
-        tracer = self._tracer()
-        point = tracer.root(points[after - 1], points[after], lambda p: function(p.z), 1e-8)
+        point = self._between(function, after)
         return None if point is None else point.z
+
+    def _between(self, function, after: int):
+        """Point of `root` with its tangent."""
+        before, behind = self._branch.points[after - 1 : after + 1]
+        return self._tracer().root(before, behind, lambda p: function(p.z), 1e-8)
 
     def _rest(self) -> np.ndarray:
         """Unknowns (n,) of the wall at rest; where it has a weight it hangs."""

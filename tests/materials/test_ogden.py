@@ -9,7 +9,7 @@ import pytest
 
 from dbvfiv.api import Valve
 from dbvfiv.materials import MaterialError, MooneyRivlin, Ogden
-from dbvfiv.materials.energy import plane_stress_invariants
+from dbvfiv.materials.energy import plane_stress_invariants, rubber_energy
 from dbvfiv.materials.stability import hill_margin, principal_log_strains, stability_margin
 from dbvfiv.shell.kernel_rubber import rubber_stress, rubber_tangent
 from dbvfiv.studies.case import thesis_case
@@ -76,6 +76,19 @@ def test_derivatives_to_the_fourth_are_those_of_mooney_and_rivlin_where_both_are
         one, other = ((lambda f, w: lambda x: jax.jvp(f, (x,), (w,))[1])(f, way) for f in (one, other))
         found, expected = (np.asarray(jax.jit(jax.vmap(f))(points)) for f in (other, one))
         assert found == pytest.approx(expected, rel=1e-10, abs=1e-7)
+
+
+@pytest.mark.parametrize("law", [TRELOAR, STEEP], ids=["Treloar", "steep"])
+def test_energy_goes_on_analytically_to_complex_strains(law):
+    """Its holomorphic gradient at real strains is that of these, and a complex step finds it again."""
+    energy = jax.jit(lambda e: rubber_energy(law.parameters, e))
+    slope, continued = jax.jit(jax.grad(energy)), jax.jit(jax.grad(energy, holomorphic=True))
+    way, step, scale = STRAINS[-1], 1e-5, law.small_strain_shear_modulus
+    for e in (np.zeros(5), *STRAINS):
+        expected = np.asarray(slope(e))
+        size = max(np.abs(expected).max(), scale)
+        assert np.abs(np.asarray(continued(e + 0j)) - expected).max() < 1e-11 * size
+        assert complex(energy(e + 1j * step * way)).imag / step == pytest.approx(expected @ way, abs=1e-7 * size)
 
 
 def test_neo_hookean_is_one_term_with_exponent_two():

@@ -22,6 +22,7 @@ from dbvfiv.model.build import moulded_share
 from dbvfiv.model.classes import linearise_class
 from dbvfiv.model.dynamics import linearise
 from dbvfiv.model.equilibria import LoadPath, SteadyOptions, first_opening, operating_pressure, sealing_for_cracking
+from dbvfiv.model.load_curve import LoadCurve
 from dbvfiv.model.newton import EquilibriumSolver, NewtonOptions
 from dbvfiv.model.preset import stress_free_shape
 from dbvfiv.model.state import parted_width
@@ -165,6 +166,33 @@ def test_limit_points_bound_the_pressures_with_several_equilibria(model, path):
     assert high.highest and not low.highest
     assert len(path.curve.passages(0.5 * (high.pressure + low.pressure))) >= 3
     assert len(path.curve.passages(0.5 * PRESSURE)) == 1
+
+
+class Snap(LoadCurve):
+    """The curve P = 3 u - u^3, known at some u, with a limit point at u = 1."""
+
+    def __post_init__(self):
+        points = [self.point(u) for u in self.model]
+        self._branch = SimpleNamespace(points=points, values=lambda name: np.array([point.z[-1] for point in points]))
+
+    @staticmethod
+    def point(u: float):
+        along = np.array([1.0, 3.0 - 3.0 * u**2])
+        return SimpleNamespace(z=np.array([u, 3.0 * u - u**3]), tangent=along / np.linalg.norm(along))
+
+    def _tracer(self, ahead=None):
+        def root(before, after, function, _):
+            return self.point(brentq(lambda u: function(self.point(u)), before.z[0], after.z[0]))
+
+        return SimpleNamespace(root=root)
+
+
+def test_a_load_rises_over_a_limit_point_only_to_what_lies_behind_it():
+    """What is reached before the curve turns asks for its own pressure, wherever the curve is known."""
+    curve = Snap((0.0, 0.6, 0.95, 1.0001, 1.3), NewtonOptions(), None)
+    for u, pressure, within in ((0.9, 1.971, 1e-9), (0.99, 2.97 - 0.99**3, 1e-9), (1.2, 2.0, 0.02)):
+        found, q = curve.first(lambda q, u=u: q[0] - u)
+        assert q[0] == pytest.approx(u) and found == pytest.approx(pressure, rel=within)
 
 
 @pytest.mark.slow
