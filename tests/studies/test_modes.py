@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 from types import SimpleNamespace
 
 import numpy as np
@@ -242,6 +243,7 @@ def sought_of(monkeypatch, rates, outcome, own, reduced, forces=3, holds=None):
     model = SimpleNamespace(relaxation=SimpleNamespace(highest=lambda _, most: most))
     walk = SimpleNamespace(case=None, family=lambda _: family, built=lambda _: SimpleNamespace(model=model))
     walk.refusal = lambda place: "unstable" if place.loss_factor > holds else ""
+    walk.holding = partial(StabilityWalk.holding, walk)
     place = Mu({"beta" if holds is None else "loss_factor": own}, alpha=5.0)
     return critical_damping_factor(walk, place, Verdict(outcome, ""))
 

@@ -540,22 +540,6 @@ LOWER, HIGHER = np.geomspace(1.0, 0.05, 9), np.geomspace(1.0, 10.0, 7)
 ACCURACY = 1e-4
 
 
-def _holding(walk: StabilityWalk, place: Mu, factors: np.ndarray) -> np.ndarray:
-    """Factors on the loss factors from 1 on, as many of them up to where the constants of a rubber cease to hold."""
-
-    def holds(factor: float) -> bool:
-        return not walk.refusal(place.at(loss_factor=place.loss_factor * factor))
-
-    first = next((i for i, factor in enumerate(factors.tolist()) if not holds(factor)), 0)
-    if not first:
-        return factors
-    inside, beyond = factors[first - 1 : first + 1].tolist()
-    for _ in range(6):
-        middle = math.sqrt(inside * beyond)
-        inside, beyond = (middle, beyond) if holds(middle) else (inside, middle)
-    return np.geomspace(factors[0], inside, len(factors)) if inside != factors[0] else factors[:1]
-
-
 def critical_damping_factor(walk: StabilityWalk, place: Mu, verdict: Verdict) -> tuple[float, float]:
     """Factor on the loss factors, or on beta, at which flutter begins, next to 1, and what was looked at without one.
 
@@ -592,7 +576,7 @@ def critical_damping_factor(walk: StabilityWalk, place: Mu, verdict: Verdict) ->
         highest = walk.built(place).model.relaxation.highest(own, min(highest, own * factors.max()))
     factors = factors[own * factors <= highest]
     if name == "loss_factor":
-        factors = _holding(walk, place, factors)
+        factors = walk.holding(place, factors)
     line = ParameterLine(walk, place, name, own * factors)
     if not line.is_reduced:  # a wall that nothing couples, which with the least damping is nearest to growth
         alone = verdict.outcome == STABLE and not walk.family(place).forces.shape[1]

@@ -428,6 +428,21 @@ class StabilityWalk:
         """
         return self.family(place).leading(place)
 
+    def holding(self, place: Mu, factors: np.ndarray) -> np.ndarray:
+        """Factors on the loss factors from 1 on, as many of them up to where the constants of a rubber hold."""
+
+        def holds(factor: float) -> bool:
+            return not self.refusal(place.at(loss_factor=place.loss_factor * factor))
+
+        first = next((i for i, factor in enumerate(factors.tolist()) if not holds(factor)), 0)
+        if not first:
+            return factors
+        inside, beyond = factors[first - 1 : first + 1].tolist()
+        for _ in range(6):
+            middle = float(np.sqrt(inside * beyond))
+            inside, beyond = (middle, beyond) if holds(middle) else (inside, middle)
+        return np.geomspace(factors[0], inside, len(factors)) if inside != factors[0] else factors[:1]
+
     def refusal(self, place: Mu) -> str:
         """Reason why the constants of a rubber with loss factors are unstable at a place, or its branches do not reach
         such loss factors; empty where all holds.
