@@ -16,7 +16,7 @@ from .determinant import Structure
 from .factor import StructureMatrices
 from .operator import CoupledPencil, Relaxation, edge_of, real_apply
 from .pairs import all_eigenvalues
-from .spectrum import CLEAR, LOWEST, SLOPE, SearchOptions
+from .spectrum import CLEAR, SLOPE, SearchOptions
 
 #: Structures kept of a family, and parameter points whose eigenvalues are.
 KEPT = 8
@@ -30,22 +30,19 @@ class Reach(NamedTuple):
     """Region in which leading modes lie: growth rates above `floor` (1/s), angular frequencies up to `band` (rad/s).
 
     Left of `creep` (1/s), which is minus infinity for an elastic wall, strongly damped eigenvalues do not count, nor do
-    those slower than `lowest` (rad/s), a share of the band unless it is given.
+    those slower than `slowest` (rad/s).
     """
 
     floor: float
     band: float
     creep: float = -np.inf
-    lowest: float | None = None
+    slowest: float = 0.0
 
     def is_mode(self, values: np.ndarray) -> np.ndarray:
         """Mask of eigenvalues that are modes and no relaxation."""
         values = np.asarray(values)
-        lowest = self.lowest
-        if lowest is None:
-            lowest = LOWEST * self.band if np.isfinite(self.band) else 0.0
         high = np.abs(values.imag)
-        return (values.real > self.creep) | ((-values.real <= SLOPE * high) & (high >= lowest))
+        return (values.real > self.creep) | ((-values.real <= SLOPE * high) & (high >= self.slowest))
 
     def leading(self, values: np.ndarray) -> np.ndarray:
         """Eigenvalues of the upper half-plane in reach, sorted by growth rate.
@@ -129,8 +126,7 @@ class PencilFamily(ABC):
         options = self.search(mu)
         floor = -np.inf if options.limit_point is None else CLEAR * options.limit_point
         band = np.inf if options.max_frequency is None else 2 * np.pi * options.max_frequency
-        lowest = None if options.lowest is None else 2 * np.pi * options.lowest
-        return Reach(floor, band, edge_of(self.relaxation(mu)), lowest)
+        return Reach(floor, band, edge_of(self.relaxation(mu)), options.slowest)
 
 
 class Pairs(NamedTuple):

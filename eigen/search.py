@@ -123,11 +123,7 @@ def holding_shift(options, growth) -> float:
 
 def lowest_sought(pencil, count, options, workspace) -> float:
     """Angular frequency above which a search where the stiffness relaxes has to be complete, rad/s."""
-    if options.lowest is not None:
-        return 2 * np.pi * options.lowest
-    if options.max_frequency is not None:
-        return LOWEST * 2 * np.pi * options.max_frequency
-    return LOWEST * first_shift(pencil, max(count, options.least), options, workspace)
+    return options.slowest or LOWEST * first_shift(pencil, max(count, options.least), options, workspace)
 
 
 def first_shift(pencil, aim, options, workspace) -> float:

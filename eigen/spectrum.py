@@ -79,6 +79,13 @@ class SearchOptions:
         """Frequency, Hz, up to which a count says all; infinite where everything is resolved."""
         return self.inside * self.resolved
 
+    @property
+    def slowest(self) -> float:
+        """Angular frequency, rad/s, from which a search is complete where the stiffness relaxes; 0 where not known."""
+        if self.lowest is not None:
+            return 2 * np.pi * self.lowest
+        return LOWEST * 2 * np.pi * (self.max_frequency or 0.0)
+
     def __post_init__(self):
         if self.max_frequency is not None and not self.max_frequency > 0:
             raise ValueError("max_frequency must be positive, in Hz.")

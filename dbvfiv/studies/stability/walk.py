@@ -108,9 +108,8 @@ class ValveFamily(PencilFamily):
         """
         if not mu.loss_factor:
             return np.ones(len(values), bool)
-        lowest = search.options.lowest
-        lowest = None if lowest is None else 2 * np.pi * lowest
-        return Reach(-np.inf, 2 * np.pi * search.band, edge_of(self.relaxation(mu)), lowest).is_mode(values)
+        reach = Reach(-np.inf, 2 * np.pi * search.band, edge_of(self.relaxation(mu)), search.options.slowest)
+        return reach.is_mode(values)
 
     def relaxation(self, mu: Mu) -> Relaxation | None:
         """Viscoelastic part of the stiffness, with the factor on all loss factors; None for an elastic wall."""
