@@ -7,7 +7,7 @@ cycles; a change of stability or an event is a zero of a test function, by false
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -78,7 +78,8 @@ class CycleTracer:
     next_step : float
         Arclength step that the step control takes next.
     known : list
-        Kinds (or titles) and values of special points that an earlier run has reported, which are not reported again.
+        Kinds (or titles) and values of special points that an earlier run has reported, which are not reported again;
+        whoever knows some sets it.
     """
 
     def __init__(
@@ -143,13 +144,10 @@ class CycleTracer:
         self,
         report: Callable[[CyclePoint | SpecialCycle], None] = lambda item: None,
         step: float | None = None,
-        known: Iterable[tuple[str, float]] | None = None,
     ) -> Said:
         """Go on until the parameter leaves its limits, the cycles shrink to nothing, the points are used up or no cycle
-        is found; the reason of the end. `step` is the first step, that of the options by default; `known` takes the
-        place of the attribute.
+        is found; the reason of the end. `step` is the first step, that of the options by default.
         """
-        self.known = self.known if known is None else list(known)
         self.reason = self._steps(report, self.options.step if step is None else step)
         self._report(report, self._left_over())
         return self.reason

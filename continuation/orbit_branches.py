@@ -372,8 +372,9 @@ def resume(
     follower.restore(branch)
     step = float(np.clip(branch.next_step or follower.options.step, *follower.step_limits))
     # an interruption may have met a special point before the orbit behind it
-    known = [(s.kind, s.mu[follower.parameter]) for s in branch.special if s.index >= len(branch) - 2]
-    return follower.run(lambda: follower.tracer.run(follower.take, step, known), observers)
+    met = [special for special in branch.special if special.index >= len(branch) - 2]
+    follower.tracer.known = [(special.kind, special.mu[follower.parameter]) for special in met]
+    return follower.run(lambda: follower.tracer.run(follower.take, step), observers)
 
 
 def orbit_at(system, branch: Branch, index: int, discretisation: OrbitOptions | None = None) -> Orbit:

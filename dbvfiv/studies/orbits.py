@@ -344,7 +344,7 @@ class Follower:
         """Tracer of the branch of an onset through ascending values, with its first cycles found and reported.
 
         The first cycles are two small ones, and those at the values nearer to the onset. The second value returned is
-        why some of the latter were not found. `known` are special points as `CycleTracer.run` takes them.
+        why some of the latter were not found. `known` are special points as `CycleTracer` has them.
         """
         rest, first, second, rises = self.from_onset(onset)
         last, cycles, missed = second if rises else first, [first, second], []

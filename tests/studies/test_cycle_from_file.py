@@ -92,9 +92,8 @@ def test_special_points_of_the_part_before_are_told_to_the_branch(file):
     for value in (240.0, 241.0):
         keeper.keep(SpecialCycle("fold", point, value, 0.0, True))
     told = []
-    tracer = SimpleNamespace(
-        next_step=0.01, points=[], run=lambda report, step, known: told.extend(known) or Reason.POINTS()
-    )
+    tracer = SimpleNamespace(next_step=0.01, points=[], known=[])
+    tracer.run = lambda report, step: told.extend(tracer.known) or Reason.POINTS()
     keeper.follow(tracer)
     assert told == [("fold", 240.0), ("fold", 241.0)]
 
@@ -124,7 +123,7 @@ def test_a_fold_up_to_the_second_cycle_is_seen_by_its_value(side, ratio):
 
 
 def test_the_last_period_of_a_run_is_at_the_pressure_of_its_drive(tmp_path, monkeypatch):
-    """Of its hold at 6 kPa, 18 kPa of its case; only the lip is in a limit cycle, so that it gives the frequency."""
+    """Pressure of the hold, 6 kPa for the 18 kPa of the case; the lip, alone in a limit cycle, has the frequency."""
     table = tmp_path / "hold.csv"
     table.write_text("time [s], pressure [kPa]\n0, 0\n0.1, 6\n")
     steady, lasting = ({"verdict": name, "frequency": f} for name, f in (("steady", None), ("limit cycle", 40.0)))

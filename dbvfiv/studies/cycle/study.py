@@ -350,7 +350,8 @@ class _Keeper:
         """Follow a leg to its end."""
         self._tracer, now = tracer, {"leg": self.leg, "cycles": self.record.rows(CYCLES)}
         steps = [note["step"] for note in self.record.notes(STEP) if now.items() <= note.items()]
-        self.end(tracer, tracer.run(self.keep, steps[-1] if steps else None, self.special()))
+        tracer.known = self.special()
+        self.end(tracer, tracer.run(self.keep, steps[-1] if steps else None))
 
     def special(self) -> list[tuple[str, float]]:
         """Kinds and values of the special points that the record holds."""
