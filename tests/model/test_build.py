@@ -1,4 +1,4 @@
-"""What keys of a case become in the wall, the passage and the flow that are built from it."""
+"""Keys of a case in the wall, the passage and the flow that are built from it."""
 
 from __future__ import annotations
 

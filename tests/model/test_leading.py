@@ -82,7 +82,7 @@ def test_loss_factors_do_not_order_the_modes(beta):
 
 @pytest.mark.parametrize("band, share", [(20.0, None), (400.0, 0.05 * 1.05 * 41.0)])
 def test_the_lower_end_of_a_wide_band_goes_by_the_first_frequencies(band, share):
-    """Where loss factors damp, slow modes lead however high a search goes."""
+    """Slow modes lead where loss factors damp, however high a search goes."""
     asked = select_search(SearchOptions(max_frequency=band), Mu(density=10.0, loss_factor=1.0), lowest, 3)
     assert asked.band == band and asked.options.lowest == pytest.approx(share)
     many = select_search(SearchOptions(), Mu(density=10.0, loss_factor=1.0), lambda n: 4.0 * np.arange(1.0, n + 1), 50)

@@ -188,7 +188,7 @@ class Snap(LoadCurve):
 
 
 def test_a_load_rises_over_a_limit_point_only_to_what_lies_behind_it():
-    """What is reached before the curve turns asks for its own pressure, wherever the curve is known."""
+    """An opening before the curve turns asks for its own pressure, wherever the curve is known."""
     curve = Snap((0.0, 0.6, 0.95, 1.0001, 1.3), NewtonOptions(), None)
     for u, pressure, within in ((0.9, 1.971, 1e-9), (0.99, 2.97 - 0.99**3, 1e-9), (1.2, 2.0, 0.02)):
         found, q = curve.first(lambda q, u=u: q[0] - u)

@@ -202,7 +202,8 @@ def test_a_map_of_all_classes_shows_the_motion_that_decides():
         columns.append(MapColumn(across, 0, cells, np.zeros((0, 5))))
     result = map_result()
     result.plan, result.case, result.columns, result.curves = plan, case, columns, []
-    result.grid, result.over_classes = (partial(getattr(MapResult, name), result) for name in ("grid", "over_classes"))
+    for name in ("grid", "over_classes", "_by_class", "_leading"):
+        setattr(result, name, partial(getattr(MapResult, name), result))
     figure = map_figures.stability_map(result)
     colours = np.ma.filled(figure.axes[0].collections[0].get_array(), np.nan)
     assert np.array_equal(colours, [[7.0] * 3 + [np.nan] * 3, [7.0] * 3 + [-3.0] * 3], equal_nan=True)

@@ -113,7 +113,7 @@ def _read(tmp_path, name="h.h5") -> Header:
 
 
 def test_a_kept_case_knows_which_keys_were_given(tmp_path, monkeypatch):
-    """What was not given is asked of no valve: a soft one bears the pressure of its case, and not the usual ones."""
+    """Pressures that were not given are asked of no valve: a soft one bears its own, and not the usual ones."""
     monkeypatch.setenv("DBVFIV_CACHE", str(tmp_path / "cache"))
     case = Case().replace({"drive.pressure": 1e3, "valve.wall_thickness": 0.01})
     kept = _kept(tmp_path, case)
@@ -165,7 +165,7 @@ def test_key_points_that_are_gone_still_give_their_valve(tmp_path, monkeypatch):
 
 
 def test_a_file_that_has_changed_is_not_taken_for_the_one_that_was_kept(tmp_path, monkeypatch, one_sentence):
-    """Where the copy cannot be written either; one that has gone is missed where it is read."""
+    """A changed file is refused where the copy cannot be written; one that has gone is missed where it is read."""
     (tmp_path / "taken").write_text("a file where the cache should be")
     monkeypatch.setenv("DBVFIV_CACHE", str(tmp_path / "taken"))
     own = Attachment(str(tmp_path / "own.csv"), LATIN)

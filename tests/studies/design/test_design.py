@@ -85,7 +85,7 @@ def test_gradients_at_random_designs(number):
 
 
 def test_a_wall_whose_rubber_is_unstable_has_no_margin(monkeypatch):
-    """Which is known before its modes are looked for."""
+    """A state that is not valid is known as such before its modes are looked for."""
     problem = DesignProblem(load_small(KEYS, ASKED, LOSSY).case)
     monkeypatch.setattr(StabilityWalk, "refusal", lambda self, place: "The constants of CR are unstable.")
     monkeypatch.setattr(StabilityWalk, "search", lambda self, place: pytest.fail("modes are looked for"))

@@ -148,7 +148,7 @@ def test_keys_end_where_the_case_says(name, value, inward):
 
 
 def test_one_sided_differences_of_a_jump_are_none():
-    """Of a smooth function they differ little from one step to two; of a jump by a half, of a root by 0.3."""
+    """Differences of a smooth function change little from one step to two; of a jump by a half, of a root by 0.3."""
 
     def steps(f, h=2e-5):
         return (Sensitivity("loss", 0.0, (f(k * h) / (k * h),), {"flow": 1.0}) for k in (1, 2))
