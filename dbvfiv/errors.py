@@ -7,8 +7,11 @@ there is no room for the answer (exit status 1).
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
+
+Result = TypeVar("Result")
 
 
 class CaseError(ValueError):
@@ -56,6 +59,16 @@ class DiskFull(RuntimeError):
 
     No ``SolveError``: it ends a study, which would go on to the next value after one that was not solved.
     """
+
+
+def attempt(work: Callable[[], Result]) -> Result:
+    """Do some work on a case, with what geometry, mesh and shell refuse as a `CaseError`."""
+    try:
+        return work()
+    except CaseError:
+        raise
+    except ValueError as error:
+        raise CaseError(str(error)) from error
 
 
 def as_path(given: Any, what: str) -> Path:

@@ -29,7 +29,7 @@ from .model.state import SteadyState
 from .studies.modes.search import critical_damping_factor
 from .studies.session import Session
 from .studies.stability.place import check_scan, is_surrounding
-from .studies.stability.verdict import NEUTRAL, UNDECIDED, Verdict
+from .studies.stability.verdict import UNDECIDED, Verdict
 from .studies.stability.walk import StabilityWalk
 
 #: Leading modes that a reduced operator takes where it is made; where it is enriched it takes those whose error it is
@@ -243,9 +243,8 @@ class Explorer:
         spectrum = self.walk.spectrum(place, self.case.modes.count)
         found = self.walk.sample(place, self.walk.cell(place, spectrum))
         # the count may have pointed to unstable modes beyond the band of the list
-        both = spectrum.eigenvalues, found.eigenvalues
-        values = max(both, key=lambda listed: np.sum(listed.real > NEUTRAL * np.abs(listed)))
-        return Answer(place, state, replace(found, eigenvalues=values).verdict, values, 0.0, True)
+        best = max(replace(found, eigenvalues=spectrum.eigenvalues), found, key=lambda sample: sample.pairs)
+        return Answer(place, state, best.verdict, best.eigenvalues, 0.0, True)
 
     def with_margin(self, answer: Answer) -> Answer:
         """A confirmed answer with the factor on the damping at which flutter begins or ends.

@@ -262,7 +262,7 @@ class Case(Section):
         """Pressure at which the fluid in the valve boils, Pa, over that around the jet; None where it does not."""
         if self.fluid.vapour_pressure is None:
             return None
-        return self.fluid.vapour_pressure - self.fluid.ambient_pressure - self.downstream.pressure
+        return self.fluid.vapour_pressure + self.vacuum_pressure
 
     @property
     def vacuum_pressure(self) -> float:

@@ -86,7 +86,8 @@ def perform(kind: str, case, request, name: str, output: Path | None, plots: Pat
     case = case.replace({"project.units": changes.pop("project.units", case.project.units)})
     choices = {key: value for key, value in request.choices.items() if value is not None}
     session = Session(case, name).replace(changes)
-    refuse_read(session.case, output, "The sheet" if request.sheet is not None else "The result")
+    if request.sheet is not None:  # a result is checked by its session
+        refuse_read(session.case, output, "The sheet")
     with in_units(case.units):
         session.mesh  # a case that gives no model fails before a table begins
         live = None if as_json else find_study(kind).live

@@ -83,7 +83,12 @@ class ValveMesh:
     @property
     def stands_apart(self) -> bool:
         """True where the lips leave more than their gap at rest."""
-        return self.lip_gap < self.rest_area[0] - self.wall_deduction[0]
+        return self.lip_gap < self.lip_passage
+
+    @property
+    def lip_passage(self) -> float:
+        """Area, m2, of the passage at the lip at rest."""
+        return float(self.rest_area[0] - self.wall_deduction[0])
 
     @property
     def mirrored(self) -> np.ndarray | None:

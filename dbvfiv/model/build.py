@@ -125,7 +125,7 @@ def build_flow(case: Case, mesh: ValveMesh) -> FlowLaw:
         return UniformLoad(len(mesh.z), 1.0 if case.drive.side == "inside" else -1.0)
     storage = 1.0 if case.fluid.continuity == "storage" else 0.0
     # lips on stops stay where they are at rest, lens and all; faces come down to their gap
-    shut = mesh.lip_gap if case.faces_touch else float(mesh.rest_area[0] - mesh.wall_deduction[0])
+    shut = mesh.lip_gap if case.faces_touch else mesh.lip_passage
     terms, floor = terms_of(case), case.film_share * shut
     given = {"back": case.downstream.pressure, "perimeter": mesh.perimeter, "density": case.fluid.density}
     given |= _levels(case, mesh)

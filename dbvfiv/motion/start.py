@@ -77,7 +77,8 @@ def steady_fluid(motion: ValveMotion, q: np.ndarray, inlet: float, velocity: flo
     model = motion.model
     area = model.rows.areas(model.nodal(q))
     sealed = model.seal(area) is not None
-    if not velocity and (inlet <= model.flow.back or not (velocity is None or sealed)):
+    at_rest = velocity == 0.0 and not sealed
+    if at_rest or (not velocity and inlet <= model.flow.back):
         return None
     inner = motion.fluid.steady_inner(area, inlet)
     if velocity is None and sealed:

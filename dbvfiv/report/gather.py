@@ -20,11 +20,10 @@ import numpy as np
 from ..case.parameters import Mu
 from ..effects import with_effect, without_numbers
 from ..errors import CaseError, SolveError
-from ..geometry.divisions import least_rows
-from ..geometry.surface import surface_of
 from ..model.sizes import ValveSizes
 from ..observer import Observer, is_watched
 from ..studies.case import Case
+from ..studies.onset.search import coarse_mesh
 from ..studies.session import Session, kept_run, load_result
 from ..studies.stability.place import why_it_moves
 from ..studies.stability.verdict import DIVERGES
@@ -165,10 +164,8 @@ def heads_of(case: Case) -> tuple[float, ...]:
 
 
 def second_mesh(case: Case) -> dict[str, Any]:
-    """Keys of a mesh with half the elements each way, and a row at least for every piece of the surface."""
-    mesh, rows = case.mesh, least_rows(surface_of(case.valve, case.part))
-    ways = {"mesh.around": (mesh.around, 4), "mesh.along": (mesh.along, max(6, rows))}
-    return {key: min(number, max(least, round(number / 2))) for key, (number, least) in ways.items()}
+    """Keys of a mesh with half the elements each way."""
+    return coarse_mesh(case, 0.5, 4)
 
 
 def planned(case: Case) -> Iterator[Run]:

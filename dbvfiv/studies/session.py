@@ -11,7 +11,7 @@ from typing import Any
 
 from ..case.materials import HIGHEST_LEVEL
 from ..case.parameters import PARAMETERS
-from ..errors import CaseError
+from ..errors import CaseError, attempt
 from ..model.equilibria import (
     find_equilibrium,
     model_warnings,
@@ -199,7 +199,7 @@ class Session:
             return self
         if self._cracks is None:
             ratio = self.case.steady.cracking_area
-            found = _attempt(lambda: sealing_for_cracking(self.case, ratio, observer))
+            found = attempt(lambda: sealing_for_cracking(self.case, ratio, observer))
             self._cracks = self.replace({"valve.cracking_head": None, "valve.sealing_pressure": found})
         return self._cracks
 
@@ -213,7 +213,7 @@ class Session:
             If the case gives no model, or asks for a pressure that no wall like it bears.
         """
         free_programs()
-        model = _attempt(lambda: ValveModel(self.case))
+        model = attempt(lambda: ValveModel(self.case))
         for name, pressure in zip(("drive.pressure", "closure.rated_pressure"), self.case.straining_pressures()):
             if pressure and (strain := hoop_strain(model, pressure)) > HIGHEST_LEVEL:
                 said = (
@@ -255,7 +255,7 @@ class Session:
             origin, changes = self.origin
             self._at_levels = origin.settle(observer).replace(changes).settle(observer)
         elif self._at_levels is None:
-            found = _attempt(lambda: settle_levels(self.case, *self.case.straining_pressures(), observer))
+            found = attempt(lambda: settle_levels(self.case, *self.case.straining_pressures(), observer))
             self._at_levels = Session(self.case.replace(self.case.materials.at_levels(found.levels)), self.name)
             self._at_levels.settled = found
         return self._at_levels
@@ -414,16 +414,6 @@ def _is_free(record: GrowingRecord, path: Path) -> bool:
     if why:
         record.warn(f"The case file that was asked for is left out: {str(path)!r} {why}; `info --case` writes it.")
     return not why
-
-
-def _attempt(work: Callable[[], Any]) -> Any:
-    """Do some work on a case, with what geometry, mesh and shell refuse as a `CaseError`."""
-    try:
-        return work()
-    except CaseError:
-        raise
-    except ValueError as error:
-        raise CaseError(str(error)) from error
 
 
 def load_result(path: str | Path) -> Any:

@@ -90,8 +90,13 @@ class StiffnessSpectrum:
 
 def stiffness_spectrum(model: Any, q: np.ndarray, pressure: float, count: int = 4) -> StiffnessSpectrum:
     """Lowest eigenvalues of a state (n,) at a pressure, Pa; see `spectrum_of`."""
+    return spectrum_of(*_matrices(model, q, pressure), pressure, count)
+
+
+def _matrices(model: Any, q: np.ndarray, pressure: float):
+    """Tangent stiffness and mass, sparse, of a state (n,) at a pressure, Pa."""
     matrix = model.shell.dofs.matrix
-    return spectrum_of(matrix(model.tangent(q, pressure).stiffness), matrix(model.mass(q)), pressure, count)
+    return matrix(model.tangent(q, pressure).stiffness), matrix(model.mass(q))
 
 
 def spectrum_of(stiffness, mass, pressure: float, count: int = 4, tolerance: float = 1e-8) -> StiffnessSpectrum:
@@ -335,8 +340,7 @@ def _least_in_magnitude(model: Any, q: np.ndarray, pressure: float) -> float:
     ------
     SolveError
     """
-    matrix = model.shell.dofs.matrix
-    stiffness, mass = matrix(model.tangent(q, pressure).stiffness), matrix(model.mass(q))
+    stiffness, mass = _matrices(model, q, pressure)
     try:
         values = _about_zero(partial(_nearest, stiffness, mass), _among(1, stiffness))[0]
     except (spla.ArpackError, ArithmeticError) as error:

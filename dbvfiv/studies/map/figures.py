@@ -99,8 +99,7 @@ def cycle_amplitude(result: StudyResult) -> Figure:
     """
     amplitude = 1e3 * result.cycle_grid("amplitude")
     growing = result.cycle_grid("growing")
-    outcomes = [OUTCOMES.index(outcome) for outcome in (FLUTTERS, DIVERGES)]
-    unstable = (result.grid("unstable") != 0) | np.isin(result.over_classes("outcome"), outcomes)
+    unstable = (result.grid("unstable") != 0) | unstable_cells(result)
     norm = matplotlib.colors.Normalize(0.0, float(np.nanmax(amplitude)))
     figure, panels = _panels(result)
     x, y = (np.asarray(_shown(axis, np.asarray(axis.values))) for axis in (result.plan.x, result.plan.y))
@@ -132,6 +131,11 @@ def certified_cells(result: StudyResult) -> np.ndarray:
 def invalid_cells(result: StudyResult) -> np.ndarray:
     """(laws, rows, columns) where the constants of the rubber do not hold."""
     return result.over_classes("outcome") == OUTCOMES.index(NOT_VALID)
+
+
+def unstable_cells(result: StudyResult) -> np.ndarray:
+    """(laws, rows, columns) where the valve flutters or diverges."""
+    return np.isin(result.over_classes("outcome"), [OUTCOMES.index(name) for name in (FLUTTERS, DIVERGES)])
 
 
 def growth_levels(growth: np.ndarray) -> np.ndarray:
@@ -284,8 +288,7 @@ def label_regions(axes, result: StudyResult, law: int) -> None:
     in any.
     """
     outcome, stable = result.over_classes("outcome")[law], OUTCOMES.index(STABLE)
-    unstable = np.isin(outcome, [OUTCOMES.index(name) for name in (FLUTTERS, DIVERGES)])
-    sure, invalid = certified_cells(result)[law], invalid_cells(result)[law]
+    sure, invalid, unstable = (of(result)[law] for of in (certified_cells, invalid_cells, unstable_cells))
     cells = [_drawn_cells(axis) for axis in (result.plan.x, result.plan.y)]
     sealed = result.grid("sealed")[law] > 0
     regions = {"unstable": sure & unstable, "not valid": invalid, "stable": sure & (outcome == stable) & ~sealed}

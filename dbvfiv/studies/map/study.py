@@ -377,21 +377,23 @@ class MapResult(StudyResult):
         Growth rate and frequency are those of the most unstable motion, the outcome is the one that decides; a cell is
         certified if it is in all classes, or unstable in one that is.
         """
-        others = range(len(self.plan.laws), len(self.plan.parts))
-        if not others:
-            return self.grid(name)
-
-        def table(name: str) -> np.ndarray:
-            more = (grid_of(self.plan, self.columns, name, [part]) for part in others)
-            return np.stack(np.broadcast_arrays(self.grid(name), *more))
-
         if name == "outcome":
-            return table(name).min(axis=0)  # they are in that order
+            return self._by_class(name).min(axis=0)  # they are in that order
         if name == "certified":
-            certified = table(name).astype(bool)
-            return certified.all(axis=0) | (certified & (table("unstable") > 0)).any(axis=0)
+            certified = self._by_class(name).astype(bool)
+            return certified.all(axis=0) | (certified & (self._by_class("unstable") > 0)).any(axis=0)
+        return np.array(self._leading()[name], float)
+
+    def _by_class(self, name: str) -> np.ndarray:
+        """A quantity of the cells (classes, laws, y, x); the laws differ in that of the equilibria alone."""
+        others = range(len(self.plan.laws), len(self.plan.parts))
+        more = (grid_of(self.plan, self.columns, name, [part]) for part in others)
+        return np.stack(np.broadcast_arrays(self.grid(name), *more))
+
+    def _leading(self) -> dict[str, Any]:
+        """Growth rate, frequency and class of the most unstable motion in each cell, (laws, y, x)."""
         names = [motion.name for motion in self.plan.classes]
-        return np.array(leading_class(names, table("growth_rate"), table("frequency"))[name], float)
+        return leading_class(names, *map(self._by_class, ("growth_rate", "frequency")))
 
     @property
     def probability(self) -> np.ndarray:
@@ -447,7 +449,10 @@ class MapResult(StudyResult):
         return found
 
     def _picture(self, law: int) -> dict[str, Any]:
-        leading = {"leading": self._leading(law)} if self.classes else {}
+        leading = {}
+        if self.classes:
+            of_law = {name: table[law] for name, table in self._leading().items()}
+            leading["leading"] = of_law | {"certified": self.over_classes("certified")[law].tolist()}
         followed = cycles.summary_of(self.record, self.plan, law) if self.has_cycles else {}
         sealed = {"sealed": self.grid("sealed")[law].astype(bool).tolist()} if self.case.valve.is_preset else {}
         mine = [curve for curve in self.curves if curve.law == law and not curve.level]
@@ -468,16 +473,6 @@ class MapResult(StudyResult):
             | leading
             | followed
         )
-
-    def _leading(self, law: int) -> dict[str, Any]:
-        """Growth rate, frequency and class of the most unstable motion in each cell, (y, x)."""
-        names = [motion.name for motion in self.plan.classes]
-        rates, frequencies = (
-            np.stack([self.grid(name)[law], *(np.array(note[name], float) for note in self.classes)])
-            for name in ("growth_rate", "frequency")
-        )
-        certified = self.over_classes("certified")[law].astype(bool)
-        return leading_class(names, rates, frequencies) | {"certified": certified.tolist()}
 
     def _missed(self, lost: int) -> str:
         return f"{lost} of {len(self.columns)} columns were not reached"

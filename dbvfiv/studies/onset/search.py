@@ -294,16 +294,20 @@ ALIKE = 0.25
 NO_ONSET = "has no onset like it"
 
 
+def coarse_mesh(case: Case, share: float, least: int = 6) -> dict[str, int]:
+    """Keys of a mesh with a share of the elements each way, `least` around, and a row for each piece of the surface."""
+    mesh, rows = case.mesh, max(6, least_rows(surface_of(case.valve, case.part)))
+    ways = {"mesh.around": (mesh.around, least), "mesh.along": (mesh.along, rows)}
+    return {key: min(number, max(fewest, round(share * number))) for key, (number, fewest) in ways.items()}
+
+
 def coarse_case(case: Case, share: float) -> tuple[Case, float]:
-    """The case on fewer elements, along no fewer than its surface has pieces, and the ratio of mesh widths; that is 1
-    where either way stays all but as fine, so that the difference says nothing of it.
+    """The case on fewer elements, see `coarse_mesh`, and the ratio of mesh widths; that is 1 where either way stays all
+    but as fine, so that the difference says nothing of it.
     """
-    mesh, pieces = case.mesh, least_rows(surface_of(case.valve, case.part))
-    ways = (mesh.around, 6), (mesh.along, max(6, pieces))
-    around, along = (min(n, max(least, int(round(share * n)))) for n, least in ways)
-    ratios = mesh.around / around, mesh.along / along
-    ratio = float(np.sqrt(np.prod(ratios))) if min(ratios) >= LEAST_RATIO else 1.0
-    return case.replace({"mesh.around": around, "mesh.along": along}), ratio
+    coarse = case.replace(coarse_mesh(case, share))
+    ratios = case.mesh.around / coarse.mesh.around, case.mesh.along / coarse.mesh.along
+    return coarse, float(np.sqrt(np.prod(ratios))) if min(ratios) >= LEAST_RATIO else 1.0
 
 
 def with_uncertainty(

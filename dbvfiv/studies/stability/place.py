@@ -16,7 +16,7 @@ from ...case.parameters import OUTSIDE, PARAMETERS, PIPES, SYSTEM_NAMES, Mu
 from ...case.quantity import Quantity
 from ...case.section import Section
 from ...case.valve import Valve
-from ...errors import CaseError, SolveError
+from ...errors import CaseError, SolveError, attempt
 from ...materials.shipped import shipped_loss
 from ...model.valve import ValveModel
 from ..case import Case
@@ -313,13 +313,4 @@ def models_of(case: Case, own: ValveModel) -> Callable[[Mapping[str, float]], Va
 
 def rebuilder(case: Case) -> Callable[[Mapping[str, float]], ValveModel]:
     """Models of a case for design parameters; what geometry, mesh and shell refuse is a `CaseError`."""
-
-    def build(design: Mapping[str, float]) -> ValveModel:
-        try:
-            return ValveModel(redesigned(case, design))
-        except CaseError:
-            raise
-        except ValueError as error:
-            raise CaseError(str(error)) from error
-
-    return build
+    return lambda design: attempt(lambda: ValveModel(redesigned(case, design)))

@@ -168,20 +168,20 @@ class Verdict:
             return next(iter(parts.values()))
         worst = min(parts, key=lambda name: (OUTCOMES.index(parts[name].outcome), -_or_least(parts[name].growth_rate)))
         ratios = [part.damping_ratio for part in parts.values() if np.isfinite(part.damping_ratio)]
-        unstable = [part.critical_damping_factor for part in parts.values() if not part.stable]
-        factors = unstable or [part.critical_damping_factor for part in parts.values()]
-        known = [factor for factor in factors if np.isfinite(factor)]
-        factor = max(known, default=np.nan)
-        if len(known) < len(unstable) or not (unstable or all(p.is_examined_down_to(factor) for p in parts.values())):
-            factor = np.nan
-        sought = [part.damping_sought for part in parts.values() if not (unstable and part.stable)]
-        sought = [x for x in sought if np.isfinite(x)] if unstable else [] if known else sought
+        bad = [part for part in parts.values() if not part.stable]
+        factors, last = np.array([(p.critical_damping_factor, p.damping_sought) for p in bad or parts.values()]).T
+        factor = np.fmax.reduce(factors)
+        if bad:
+            known, sought = np.isfinite(factors).all(), np.fmax.reduce(last)
+        else:
+            known = all(part.is_examined_down_to(factor) for part in parts.values())
+            sought = np.nan if np.isfinite(factor) else last.max()
         return replace(
             parts[worst],
             reason=" ".join(f"In {name}: {lowered(part.reason)}" for name, part in parts.items()),
             damping_ratio=min(ratios, default=np.nan),
-            critical_damping_factor=factor,
-            damping_sought=float(np.max(sought)) if sought else np.nan,
+            critical_damping_factor=float(factor) if known else np.nan,
+            damping_sought=float(sought),
             certain=all(part.certain for part in parts.values()),
             band=min((part.band for part in parts.values() if not np.isnan(part.band)), default=np.nan),
         )
