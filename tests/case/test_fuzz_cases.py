@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import random
+import re
 
 import numpy as np
 import pytest
@@ -76,10 +77,17 @@ def value(r: random.Random, depth: int = 0) -> str:
     return scalar(r)
 
 
+def near(r: random.Random, line: str) -> str:
+    """A line with its first number multiplied, as somebody might who tries another valve."""
+    return re.sub(r"\d+(\.\d+)?", lambda found: f"{float(found[0]) * r.choice([0.5, 0.9, 1, 1.1, 2]):g}", line, count=1)
+
+
 def damaged(r: random.Random) -> str:
-    """A case file with one to six slips; some begin with every key, some with none."""
+    """A case file with up to six slips among other values; some begin with every key, some with none."""
     lines = list(LINES) if r.random() < 0.6 else []
-    for _ in range(r.randrange(1, 7)):
+    for at in r.sample(range(len(lines)), r.randrange(4) if lines else 0):
+        lines[at] = near(r, lines[at])
+    for _ in range(r.choice([0, 0, 1, 2, 3, 4, 5, 6])):
         at = r.randrange(len(lines) + 1)
         keyed = [i for i, line in enumerate(lines) if " = " in line and line[0] not in "# "]
         what = r.randrange(10)
