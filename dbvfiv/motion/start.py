@@ -24,20 +24,11 @@ from .equations import ValveMotion
 from .stepper import MotionState, consistent_state
 
 
-@dataclass(frozen=True)
-class Kick:
-    """The mode that a push followed.
-
-    Attributes
-    ----------
-    eigenvalue : complex, 1/s
-    """
-
-    eigenvalue: complex
-
-
-def first_state(motion: ValveMotion, case: Case, inlet: float, observer: Observer) -> tuple[MotionState, Kick | None]:
-    """State that a case starts from, with inlet pressure (Pa) of the first instant.
+def first_state(
+    motion: ValveMotion, case: Case, inlet: float, observer: Observer
+) -> tuple[MotionState, complex | None]:
+    """State that a case starts from, with inlet pressure (Pa) of the first instant; and the eigenvalue, 1/s, of the
+    mode that it was kicked along, if it was.
 
     Parameters
     ----------
@@ -124,8 +115,8 @@ class Push:
 
 def kicked(
     motion: ValveMotion, q: np.ndarray, inner: np.ndarray | None, inlet: float, push: Push
-) -> tuple[MotionState, Kick]:
-    """Steady state pushed along one of its leading modes.
+) -> tuple[MotionState, complex]:
+    """Steady state pushed along one of its leading modes, and the eigenvalue of that, 1/s.
 
     Parameters
     ----------
@@ -159,7 +150,7 @@ def kicked(
     shape = push.opening / lip * mode.q
     flow = (push.opening / lip * mode.u).real if motion.fluid.moves and len(mode.u) else 0.0
     eigenvalue = complex(mode.eigenvalue)
-    return on_mode(motion, q, inner, inlet, shape, eigenvalue, flow), Kick(eigenvalue)
+    return on_mode(motion, q, inner, inlet, shape, eigenvalue, flow), eigenvalue
 
 
 def on_mode(

@@ -36,7 +36,7 @@ def swung(model, inlet, step, duration, opening=1e-5):
     """Lip's swing, m, after a small kick along the leading mode, and its eigenvalue."""
     motion = ValveMotion(model)
     q = steady_positions(model, inlet)
-    state, kick = kicked(motion, q, steady_fluid(motion, q, inlet), inlet, Push(1, opening, 6, SearchOptions()))
+    state, eigenvalue = kicked(motion, q, steady_fluid(motion, q, inlet), inlet, Push(1, opening, 6, SearchOptions()))
     stepper, lip = (
         Stepper(motion, scheme("generalised-alpha"), lambda t: inlet),
         model.shell.dofs.index[model.mesh.rows[0, 0], 1],
@@ -45,7 +45,7 @@ def swung(model, inlet, step, duration, opening=1e-5):
     for _ in range(round(duration / step)):
         state = stepper.step(state, step).state
         swing.append(state.q[lip] - q[lip])
-    return np.array(swing), kick.eigenvalue, motion
+    return np.array(swing), eigenvalue, motion
 
 
 @pytest.mark.parametrize(

@@ -342,12 +342,12 @@ class Runner:
         """
         self._begin(0)
         inlet = self.drive(0.0)
-        state, kick = (first, None) if first is not None else self._first(inlet)
+        state, eigenvalue = (first, None) if first is not None else self._first(inlet)
         energy = sum(self.motion.energies(state.q, state.v)) + self.motion.outside_energy(state.q, state.v)
         energy += self.model.weight_energy(state.q)
         self.progress = progress = Progress(state, energy=energy, control=tuple(self.control.pack()))
-        if kick is not None:
-            progress.eigenvalue = kick.eigenvalue
+        if eigenvalue is not None:
+            progress.eigenvalue = eigenvalue
             self._judge_rubber(state, inlet)
         row = self._reader.first(progress, inlet)
         self.history.append(row)
