@@ -393,7 +393,8 @@ class Runner:
 
     def _go(self) -> Runner:
         progress, every = self.progress, self.options.judge_every
-        judged, before = _next_verdict(progress.steps, every), self._certain_before()
+        _, judged = _verdicts_beside(progress.steps, every)
+        before = self._certain_before()
         try:
             while not self.stopped and progress.state.time < self.options.end:
                 self._step()
@@ -404,7 +405,7 @@ class Runner:
                     verdict = self._judge()
                     certain = verdict.name if verdict.decided else ""
                     self.stopped = bool(certain) and certain in self.options.stop_when and certain == before
-                    before, judged = certain, _next_verdict(progress.steps, every)
+                    before, (_, judged) = certain, _verdicts_beside(progress.steps, every)
         except StepFailure as failure:
             smallest = self.options.control.step * self.options.control.smallest
             self._fail(
@@ -430,7 +431,7 @@ class Runner:
     def _certain_before(self) -> str:
         """The certain verdict that a run had before it goes on, as the same once more may end it."""
         steps = self.progress.steps
-        due = _last_verdict(steps, self.options.judge_every)
+        due, _ = _verdicts_beside(steps, self.options.judge_every)
         found = [note for note in self.record.notes("verdict") if note["steps"] == due > 0]
         if not found and due == steps > 0:  # ended before it was judged
             found = [self._judge().summary()]
@@ -497,17 +498,11 @@ class Runner:
         )
 
 
-def _next_verdict(steps: int, every: int) -> int:
-    """Number of the step after which the next verdict is due; the same sequence wherever a run was resumed."""
-    due = every
-    while due <= steps:
-        due = max(due + every, int(1.05 * due))
-    return due
-
-
-def _last_verdict(steps: int, every: int) -> int:
-    """Number of the step of the last verdict that was due up to a number of steps; 0 without one."""
+def _verdicts_beside(steps: int, every: int) -> tuple[int, int]:
+    """Numbers of the steps after which the last verdict was due, 0 without one, and the next one will be; the same
+    sequence wherever a run was resumed.
+    """
     last, due = 0, every
     while due <= steps:
         last, due = due, max(due + every, int(1.05 * due))
-    return last
+    return last, due
