@@ -68,6 +68,8 @@ class CycleTracer:
         Values of the parameter at which a cycle is wanted.
     events : mapping of str to callable
         Functions of a `Cycle` whose zeros are special points of that name.
+    report : callable
+        Told of each point and special point as it is found.
 
     Attributes
     ----------
@@ -90,9 +92,10 @@ class CycleTracer:
         shape: OrbitOptions = OrbitOptions(),
         values: Sequence[float] = (),
         events: Mapping[str, Callable[[Cycle], float]] = {},
+        report: Callable[[CyclePoint | SpecialCycle], None] = lambda item: None,
     ):
         self.solver, self.parameter, self.options, self.shape = solver, parameter, options, shape
-        self.values, self.events = tuple(values), dict(events)
+        self.values, self.events, self.report = tuple(values), dict(events), report
         self.scale = options.units([parameter])[parameter]
         self._limits = options.limits.get(parameter, (-np.inf, np.inf))
         self.points: list[CyclePoint] = []
@@ -106,24 +109,18 @@ class CycleTracer:
     # -- the branch
     # ----
 
-    def extend(
-        self,
-        cycle: Cycle,
-        asked: bool = False,
-        report: Callable[[CyclePoint], None] = lambda item: None,
-        origin: Cycle | None = None,
-    ) -> None:
+    def extend(self, cycle: Cycle, origin: Cycle | None = None) -> None:
         """Take a cycle as the next point; two of them give the way to go.
 
         `origin` is what the branch starts from, at rest at an onset; it helps predictions and is no point of the
         branch.
         """
-        point = self._accept(cycle, asked)
+        point = self._accept(cycle)
         if origin is not None:
             self._begin_at(origin)
         if len(self.points) > 1:
-            self._report(report, self._between(*self.points[-2:]))
-        report(point)
+            self._report(self._between(*self.points[-2:]))
+        self.report(point)
 
     def restore(self, points: Sequence[CyclePoint], origin: Cycle | None = None) -> None:
         """Go on from points that are known, with the `origin` of `extend`; `extend` where there is but one."""
@@ -140,44 +137,40 @@ class CycleTracer:
         length = self.points[0].arclength - self._distance(self.points[0].cycle, origin)
         self._origin = [CyclePoint(origin, origin.mu[self.parameter], length, None)]
 
-    def run(
-        self,
-        report: Callable[[CyclePoint | SpecialCycle], None] = lambda item: None,
-        step: float | None = None,
-    ) -> Said:
+    def run(self, step: float | None = None) -> Said:
         """Go on until the parameter leaves its limits, the cycles shrink to nothing, the points are used up or no cycle
         is found; the reason of the end. `step` is the first step, that of the options by default.
         """
-        self.reason = self._steps(report, self.options.step if step is None else step)
-        self._report(report, self._left_over())
+        self.reason = self._steps(self.options.step if step is None else step)
+        self._report(self._left_over())
         return self.reason
 
-    def _steps(self, report, step: float) -> Said:
+    def _steps(self, step: float) -> Said:
         while len(self.points) < self.options.max_points:
             if len(self.points) > 1 and self._is_over():
                 return self._limit()
             done, step, reason = self._advance(step)
             if done is None:
-                self._report(report, self._ahead())
+                self._report(self._ahead())
                 return reason
             self.next_step = step
             if self._has_turned_back():
                 del self.points[-1]
                 return Reason.VANISHED(name=self.parameter, value=self.points[-1].value)
             found = self._between(self.points[-2], self.points[-1])
-            self._report(report, found)
-            report(self.points[-1])
+            self._report(found)
+            self.report(self.points[-1])
             stopping = [special for special in found if special.title in self.options.stop_at]
             if stopping:
                 return Reason.STOPPED(kind=stopping[0].title)
         return self._limit() if self._is_over() else Reason.POINTS()
 
-    def _report(self, report, found: list[SpecialCycle]) -> None:
+    def _report(self, found: list[SpecialCycle]) -> None:
         for special in found:
             alike = (value for kind, value in self.known if kind in (special.kind, special.title))
             if all(abs(value - special.value) > KNOWN * self.scale for value in alike):
                 self.special.append(special)
-                report(special)
+                self.report(special)
 
     def _limit(self) -> Said:
         return Reason.LIMIT(name=self.parameter, value=self.points[-1].value)
@@ -205,7 +198,7 @@ class CycleTracer:
             try:
                 cycle, expected = self._step(step, target)
                 cycle, angle = self._landed(self._checked(cycle, expected))
-                point = self._accept(cycle, cycle.mu[self.parameter] in self.values)
+                point = self._accept(cycle)
             except ContinuationError as error:
                 reason = str(error)
                 if (
@@ -344,13 +337,13 @@ class CycleTracer:
     # -- points
     # ----
 
-    def _accept(self, cycle: Cycle, asked: bool) -> CyclePoint:
+    def _accept(self, cycle: Cycle) -> CyclePoint:
         """Take a cycle as the next point, with the phase of the one before."""
-        point = self.describe(cycle, asked)
+        point = self.describe(cycle)
         self.points.append(point)
         return point
 
-    def describe(self, cycle: Cycle, asked: bool = False, after: CyclePoint | None = None) -> CyclePoint:
+    def describe(self, cycle: Cycle, after: CyclePoint | None = None) -> CyclePoint:
         """A cycle with its exponents and what events make of it; `after` is the point it follows, the last without."""
         after = self.points[-1] if after is None and self.points else after
         exponents = None
@@ -360,7 +353,7 @@ class CycleTracer:
         value = cycle.mu[self.parameter]
         tests = {name: float(event(cycle)) for name, event in self.events.items()}
         length = 0.0 if after is None else after.arclength + self._distance(after.cycle, cycle)
-        return CyclePoint(cycle, value, length, exponents, asked, tests)
+        return CyclePoint(cycle, value, length, exponents, value in self.values, tests)
 
     def _distance(self, one: Cycle, other: Cycle) -> float:
         h = max(one.motion.harmonics, other.motion.harmonics, key=lambda h: h.count)
@@ -465,8 +458,7 @@ class CycleTracer:
             cycle = self._solved(guess, mu, (self.parameter,), (condition,))
         except ContinuationError:
             return None
-        point = self.describe(cycle, after=first)
-        return CyclePoint(cycle, point.value, arclength, point.exponents, False, point.tests)
+        return replace(self.describe(cycle, after=first), arclength=arclength, asked=False)
 
     def _ahead(self) -> list[SpecialCycle]:
         """Events just ahead of a branch that does not go on, as where motions cease to be smooth at one."""

@@ -271,9 +271,9 @@ def continue_orbits(
     first = Cycle(orbit.motion, dict(orbit.mu), 0.0, 0, 0)
 
     def steps():
-        follower.tracer.extend(first, False, follower.take)
-        follower.tracer.extend(follower.second_orbit(first), False, follower.take)
-        return follower.tracer.run(follower.take)
+        follower.tracer.extend(first)
+        follower.tracer.extend(follower.second_orbit(first))
+        return follower.tracer.run()
 
     return follower.run(steps, observers)
 
@@ -327,9 +327,9 @@ def orbits_from_hopf(
 
     def steps():
         rest, first, second = follower.beside_hopf(special)
-        follower.tracer.extend(first, False, follower.take, rest)
-        follower.tracer.extend(second, False, follower.take)
-        return follower.tracer.run(follower.take)
+        follower.tracer.extend(first, rest)
+        follower.tracer.extend(second)
+        return follower.tracer.run()
 
     return follower.run(steps, observers)
 
@@ -374,7 +374,7 @@ def resume(
     # an interruption may have met a special point before the orbit behind it
     met = [special for special in branch.special if special.index >= len(branch) - 2]
     follower.tracer.known = [(special.kind, special.mu[follower.parameter]) for special in met]
-    return follower.run(lambda: follower.tracer.run(follower.take, step), observers)
+    return follower.run(lambda: follower.tracer.run(step), observers)
 
 
 def orbit_at(system, branch: Branch, index: int, discretisation: OrbitOptions | None = None) -> Orbit:
@@ -416,7 +416,8 @@ class _Follower:
         unit = (options.state_scale or 1.0) * np.sqrt(n)
         kept = replace(options, state_scale=unit, max_points=options.max_points + 1)
         shape = replace(self.shape, exponents=min(self.shape.exponents, max(n - 1, 1)))
-        self.parameter, self.tracer = parameter, CycleTracer(OrbitSolver(system, shape), parameter, kept, shape)
+        self.parameter = parameter
+        self.tracer = CycleTracer(OrbitSolver(system, shape), parameter, kept, shape, report=self.take)
         self.observers: list = []
 
     def second_orbit(self, first: Cycle) -> Cycle:

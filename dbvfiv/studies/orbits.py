@@ -360,15 +360,16 @@ class Follower:
             except SolveError as error:
                 missed.append(str(error))
         cycles.sort(key=lambda cycle: np.linalg.norm(cycle.motion.coefficients[1:3, self.lip]))
-        tracer = self.tracer(values, first.motion)
+        tracer = self.tracer(values, first.motion, tell)
         tracer.known = list(known)
-        asked = [cycle.mu[self.name] in values for cycle in cycles]
-        tracer.extend(cycles[0], asked[0], tell, rest)
-        for cycle, is_asked in zip(cycles[1:], asked[1:]):
-            tracer.extend(cycle, is_asked, tell)
+        tracer.extend(cycles[0], rest)
+        for cycle in cycles[1:]:
+            tracer.extend(cycle)
         return tracer, missed
 
-    def tracer(self, values: Sequence[float], first: PeriodicMotion) -> CycleTracer:
+    def tracer(
+        self, values: Sequence[float], first: PeriodicMotion, tell: Callable[[CyclePoint | SpecialCycle], None]
+    ) -> CycleTracer:
         """Tracer of a branch through ascending values of the parameter; `first` is a motion on the branch."""
         asked = self.case.cycle
         swing = np.sqrt(2.0) * np.linalg.norm(first.coefficients[1:3, self.lip])
@@ -388,7 +389,7 @@ class Follower:
             harmonics=1, max_harmonics=asked.max_harmonics, tail=asked.tolerance, exponents=asked.exponents
         )
         events = {TOUCHING: lambda cycle: self.orbit(cycle).clearance}
-        return CycleTracer(self.solver, self.name, options, shape, values, events)
+        return CycleTracer(self.solver, self.name, options, shape, values, events, tell)
 
     def orbit(self, cycle: Cycle) -> Orbit:
         """Orbit of a cycle, from which its results are taken."""
