@@ -35,13 +35,11 @@ from continuation.stability import CountMonitor
 from continuation.tracer import Monitor, Tracer
 
 
-def solve_bogdanov_takens(tracer, z, v, w):
-    """Newton on ``F = 0, g = 0, w' B v = 0`` in state and both parameters; see `solve_augmented`."""
-    return solve_augmented(tracer, BogdanovTakensCondition(w, v), z[: tracer.problem.n + 2], tracer.frame)
-
-
-def bogdanov_takens_special(tracer, result, tangent, index):
-    """Special point of a fold curve where the zero eigenvalue is double."""
+def locate_bogdanov_takens(tracer, z, v, w, tangent, index) -> SpecialPoint:
+    """Special point of a fold curve where the zero eigenvalue is double, by Newton's method on ``F = 0, g = 0,
+    w' B v = 0`` in state and both parameters; see `solve_augmented`.
+    """
+    result = solve_augmented(tracer, BogdanovTakensCondition(w, v), z[: tracer.problem.n + 2], tracer.frame)
     value = result.local.condition
     values = {"omega": 0.0, "iterations": result.iterations}
     vectors = {"right": value.v / np.linalg.norm(value.v), "left": value.w}
@@ -84,12 +82,12 @@ class FoldCurveMonitor(Monitor):
         v, w = point.data["orientation"]
         if kind == "bogdanov-takens":
             try:
-                result = solve_bogdanov_takens(tracer, point.z, v, w)
+                found = locate_bogdanov_takens(tracer, point.z, v, w, point.tangent, index)
             except NotConverged as error:
                 return special_at(tracer, kind, point, index, False, str(error))
-            if tracer.fraction(before, after, result.z)[1] >= 1.0:
+            if tracer.fraction(before, after, found.z)[1] >= 1.0:
                 return special_at(tracer, kind, point, index, False, "Newton's method left the bracket")
-            return bogdanov_takens_special(tracer, result, point.tangent, index)
+            return found
         coefficient = fold_coefficient(tracer.problem.system, point.local.u, point.local.mu, v, w)
         return special_at(
             tracer, kind, point, index, True, "", {"quadratic_coefficient": coefficient}, {"right": v, "left": w}
@@ -167,8 +165,7 @@ class HopfCurveMonitor(Monitor):
         condition = before.local.condition
         w, v = null_vectors(before.local.linear, condition.w.real, condition.v.real)
         try:
-            result = solve_bogdanov_takens(tracer, z, v, w)
-            point = bogdanov_takens_special(tracer, result, before.tangent[: n + 2], index)
+            point = locate_bogdanov_takens(tracer, z, v, w, before.tangent[: n + 2], index)
             point.z, point.tangent = np.append(point.z, 0.0), np.append(point.tangent, 0.0)
         except NotConverged as error:
             point = special_at(tracer, "bogdanov-takens", before, index, False, str(error))
@@ -227,10 +224,7 @@ def continue_fold(
     >>> bool(abs(27 * curve.values("a")**2 - 4 * curve.values("b")**3).max() < 1e-8)
     True
     """
-    borders = _borders("fold curve", special)
-    return _start(
-        curve_tracer(system, "fold curve", special.mu, parameters, borders, options, observers, spectrum), special
-    )
+    return _continue(system, "fold curve", special, parameters, options, observers, spectrum)
 
 
 def continue_hopf(
@@ -277,19 +271,7 @@ def continue_hopf(
     >>> bool(abs(curve.values("B") - 1 - curve.values("A")**2).max() < 1e-8)
     True
     """
-    borders = _borders("hopf curve", special)
-    tracer = curve_tracer(system, "hopf curve", special.mu, parameters, borders, options, observers, spectrum, lyapunov)
-    return _start(tracer, special)
-
-
-def _borders(kind, special):
-    """Left and right vectors of a special point from which a curve of a kind can start."""
-    special_of(special, f"A {kind} starts at")
-    if special.kind not in STARTS[kind] or "right" not in special.vectors:
-        raise NotABifurcation(
-            f"A {kind} starts at a located point of kind {', '.join(STARTS[kind])}; this is {special!r}."
-        )
-    return special.vectors["left"], special.vectors["right"]
+    return _continue(system, "hopf curve", special, parameters, options, observers, spectrum, lyapunov)
 
 
 def curve_tracer(system, kind, mu, parameters, borders, options, observers, spectrum, lyapunov=True):
@@ -308,8 +290,15 @@ def curve_tracer(system, kind, mu, parameters, borders, options, observers, spec
     )
 
 
-def _start(tracer, special):
-    """Curve from a special point, in the direction the options ask for."""
+def _continue(system, kind, special, parameters, options, observers, spectrum, lyapunov=True):
+    """Curve of a kind from a special point, in the direction the options ask for."""
+    special_of(special, f"A {kind} starts at")
+    if special.kind not in STARTS[kind] or "right" not in special.vectors:
+        raise NotABifurcation(
+            f"A {kind} starts at a located point of kind {', '.join(STARTS[kind])}; this is {special!r}."
+        )
+    borders = special.vectors["left"], special.vectors["right"]
+    tracer = curve_tracer(system, kind, special.mu, parameters, borders, options, observers, spectrum, lyapunov)
     problem = tracer.problem
     extra = [special.values["omega"]] if problem.e else []
     n = problem.n
@@ -323,6 +312,5 @@ def _start(tracer, special):
     direction = np.zeros(z.size)
     direction[n + 1] = tracer.options.direction
     point = tracer.start(z, direction, frame)
-    kind = "hopf curve" if problem.e else "fold curve"
     branch = Branch(kind, n, problem.names, problem.condition.extra_names, dict(special.mu), [point.record()])
     return tracer.run(branch, point, tracer.options.step)
