@@ -99,12 +99,8 @@ class Exponents:
     @property
     def dimensions(self) -> np.ndarray:
         """(k,) dimensions of the perturbations: 1 where the multiplier is real, 2 of a pair."""
-        return np.array([1 if self.is_real(value) else 2 for value in self.values], int)
-
-    def is_real(self, value: complex) -> bool:
-        """True where the multiplier of an exponent is real."""
-        near = 1e-3 * self.omega
-        return abs(value.imag) < near or abs(value.imag - 0.5 * self.omega) < near
+        high, near = self.values.imag, 1e-3 * self.omega
+        return np.where((np.abs(high) < near) | (np.abs(high - 0.5 * self.omega) < near), 1, 2)
 
     @property
     def stable(self) -> bool:

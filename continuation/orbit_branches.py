@@ -120,13 +120,8 @@ class Orbit:
     @property
     def exponents(self) -> np.ndarray:
         """Non-trivial Floquet exponents, complex, by growth; imaginary parts within half a turn per period."""
-        return np.array(
-            [v for value in self.floquet.values for v in ([value] if self._is_real(value) else [value, value.conj()])],
-            complex,
-        )
-
-    def _is_real(self, value: complex) -> bool:
-        return self.floquet.is_real(value)
+        each = zip(self.floquet.values, self.floquet.dimensions)
+        return np.array([v for value, size in each for v in (value, value.conj())[:size]], complex)
 
     @property
     def nontrivial(self) -> np.ndarray:
