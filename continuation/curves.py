@@ -63,20 +63,14 @@ class FoldCurveMonitor(Monitor):
         point.tests["cusp"] = float(0.5 * w @ system.d2(point.local.u, point.local.mu, v, v))
 
     def between(self, tracer, before, after, index, found):
-        special = []
+        self._last = before.data["orientation"]
+        kinds = [kind for kind in ("cusp", "bogdanov-takens") if before.tests[kind] * after.tests[kind] < 0]
+        special = [self._locate(tracer, kind, before, after, index) for kind in kinds]
         self._last = after.data["orientation"]
-        for kind in ("cusp", "bogdanov-takens"):
-            if before.tests[kind] * after.tests[kind] < 0:
-                special.append(self._locate(tracer, kind, before, after, index))
         return special
 
     def _locate(self, tracer, kind, before, after, index):
-        def test(point):
-            point.data["orientation"] = before.data["orientation"]
-            self.measure(tracer, point)
-            return point.tests[kind]
-
-        point = tracer.root(before, after, test, tolerance=1e-3 if kind != "cusp" else 1e-11)
+        point = self.zero(tracer, before, after, kind, tolerance=1e-3 if kind != "cusp" else 1e-11)
         if point is None:
             return special_at(tracer, kind, after, index, False, "the curve was lost")
         v, w = point.data["orientation"]
@@ -142,12 +136,7 @@ class HopfCurveMonitor(Monitor):
 
     def _root(self, tracer, kind, name, before, after, index):
         bound = 2 * max(abs(before.tests[name]), abs(after.tests[name]))
-
-        def test(point):
-            self.measure(tracer, point)
-            return point.tests[name]
-
-        point = tracer.root(before, after, test, tolerance=1e-11)
+        point = self.zero(tracer, before, after, name, tolerance=1e-11)
         if point is None:
             return [special_at(tracer, kind, after, index, False, "the curve was lost")]
         if abs(point.tests[name]) > bound:
