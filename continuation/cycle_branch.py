@@ -243,7 +243,7 @@ class CycleTracer:
             omega = (1 - share) * last.motion.omega + share * cycle.motion.omega
             motion = PeriodicMotion(h, (1 - share) * ends[0] + share * ends[1], omega)
             expected = replace(cycle, motion=motion, mu=cycle.mu | {self.parameter: limit})
-            cycle = self._checked(self._solved(motion, expected.mu, (), ()), expected)
+            cycle = self._checked(self._solved(expected), expected)
         angle = self._angle(cycle) if len(self.points) > 1 else 0.0
         if angle > self.options.max_angle:
             raise NotConverged(Reason.TURNED(), Reason.TURNED)
@@ -286,30 +286,24 @@ class CycleTracer:
 
     def _step(self, step: float, target: float | None) -> tuple[Cycle, Cycle]:
         """The cycle a step ahead, or at a value of the parameter, and the one expected there."""
-        last = self.points[-1]
-        free, conditions = (), ()
+        last = self.points[-1].cycle
         if target is not None:
-            motion, value = self._expected(target, step), target
-        else:
-            motion = predict_by_arclength(self._last(), last.arclength + step, self._series())
-            value = self._value_at(step)
-            way = motion.coefficients - motion.harmonics.resized(last.motion.coefficients)
-            free, conditions = (self.parameter,), (self._plane(way, value - last.value, motion, value),)
-        mu = last.cycle.mu | {self.parameter: value}
-        return self._solved(motion, mu, free, conditions), replace(last.cycle, motion=motion, mu=mu)
+            expected = replace(last, motion=self._expected(target, step), mu=last.mu | {self.parameter: target})
+            return self._solved(expected), expected
+        expected = self._predicted(self._last(), self.points[-1].arclength + step, self._series())
+        return self._solved(expected, last, expected), expected
 
-    def _solved(self, motion, mu, free, conditions) -> Cycle:
-        options = self.shape
-        while True:
-            cycle = self.solver.solve(motion, mu, free, conditions)
-            if cycle.motion.tail <= options.tail:
-                return cycle
-            count = min(cycle.motion.harmonics_for(options.tail), options.max_harmonics)
-            if count <= cycle.motion.harmonics.count:
-                said = Reason.HARMONICS(count=options.max_harmonics, share=cycle.motion.tail)
-                raise NotConverged(said, said.kind)
-            motion, mu = cycle.motion.resized(count), cycle.mu
-            conditions = tuple(Condition(motion.harmonics.resized(c.row), c.extra, c.value) for c in conditions)
+    def _predicted(self, near: Sequence[CyclePoint], arclength: float, h: Harmonics) -> Cycle:
+        """The cycle at an arclength, by the polynomial through points."""
+        mu = near[-1].cycle.mu | {self.parameter: value_by_arclength(near, arclength)}
+        return replace(near[-1].cycle, motion=predict_by_arclength(near, arclength, h), mu=mu)
+
+    def _solved(self, expected: Cycle, *way: Cycle) -> Cycle:
+        """The cycle near one expected, at its value of the parameter, or in the plane through it normal to the way
+        between two cycles.
+        """
+        free, conditions = ((self.parameter,), (self._plane(*way, expected),)) if way else ((), ())
+        return self.solver.resolve(expected.motion, expected.mu, self.shape, free, conditions)
 
     def _expected(self, target: float, step: float) -> PeriodicMotion:
         """The motion at a value about a step ahead."""
@@ -327,10 +321,12 @@ class CycleTracer:
         longer = min(last.harmonics.count + 2, options.max_harmonics)
         return Harmonics(longer) if last.tail > 0.4 * options.tail else last.harmonics
 
-    def _plane(self, way: np.ndarray, moved: float, motion: PeriodicMotion, value: float) -> Condition:
-        """Normal to a way of coefficients and of the parameter, through a motion at a value."""
-        row, extra = way * self._weight, np.zeros(len(self.solver.unknowns((self.parameter,))))
-        extra[-1] = moved / self.scale**2
+    def _plane(self, start: Cycle, end: Cycle, through: Cycle) -> Condition:
+        """Normal to the way of coefficients and of the parameter between two cycles, through a third."""
+        motion, value = through.motion, through.mu[self.parameter]
+        first, last = (motion.harmonics.resized(one.motion.coefficients) for one in (start, end))
+        row, extra = (last - first) * self._weight, np.zeros(len(self.solver.unknowns((self.parameter,))))
+        extra[-1] = (end.mu[self.parameter] - start.mu[self.parameter]) / self.scale**2
         size = np.sqrt(np.sum(row**2 / self._weight) + (extra[-1] * self.scale) ** 2)
         return Condition(row / size, extra / size, float(np.vdot(row, motion.coefficients) + extra[-1] * value) / size)
 
@@ -449,16 +445,11 @@ class CycleTracer:
     def _interpolated(self, near: Sequence[CyclePoint], arclength: float) -> CyclePoint | None:
         """A cycle between points, at an arclength; None where it is not found."""
         h = max((p.motion.harmonics for p in near), key=lambda h: h.count)
-        guess = predict_by_arclength(near, arclength, h)
-        value, first, last = value_by_arclength(near, arclength), near[0], near[-1]
-        way = h.resized(last.motion.coefficients) - h.resized(first.motion.coefficients)
-        condition = self._plane(way, last.value - first.value, guess, value)
-        mu = near[0].cycle.mu | {self.parameter: value}
         try:
-            cycle = self._solved(guess, mu, (self.parameter,), (condition,))
+            cycle = self._solved(self._predicted(near, arclength, h), near[0].cycle, near[-1].cycle)
         except ContinuationError:
             return None
-        return replace(self.describe(cycle, after=first), arclength=arclength, asked=False)
+        return replace(self.describe(cycle, after=near[0]), arclength=arclength, asked=False)
 
     def _ahead(self) -> list[SpecialCycle]:
         """Events just ahead of a branch that does not go on, as where motions cease to be smooth at one."""

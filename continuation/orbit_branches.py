@@ -181,16 +181,7 @@ def find_orbit(system, states, period: float, mu, options: OrbitOptions | None =
     solver = OrbitSolver(system, options)
     least = 1e-6 * np.linalg.norm(guess.coefficients[1:])
     require(least != 0.0, "The guess of an orbit must vary over its period.")
-    while True:
-        cycle = solver.solve(guess, mu)
-        if np.linalg.norm(cycle.motion.coefficients[1:]) <= least:
-            raise NotConverged("The guess shrank to an equilibrium.", Reason.REST, cycle)
-        count = cycle.motion.harmonics.count
-        if cycle.motion.tail <= options.tail:
-            return add_exponents(solver, cycle, options)
-        if count >= options.max_harmonics:
-            raise NotConverged(Reason.HARMONICS(count=count, share=cycle.motion.tail), Reason.HARMONICS)
-        guess = cycle.motion.resized(min(cycle.motion.harmonics_for(options.tail), options.max_harmonics))
+    return add_exponents(solver, solver.resolve(guess, mu, options, least=least), options)
 
 
 def add_exponents(solver: CycleSolver, cycle: Cycle, options: OrbitOptions) -> Orbit:
