@@ -84,12 +84,9 @@ def is_covered(found, aim, options) -> bool:
     if found.everything:
         return True
     growth, band = leading_band(found, aim, options)
-    if options.limit_point is not None:
-        low, high = found.region.complete_between(band)
-        return low <= growth and high > 0
-    inside = found.eigenvalues.imag <= band * (1 + 1e-12)
     low, high = found.region.complete_between(band)
-    if inside.sum() < aim:
+    inside = found.eigenvalues.imag <= band * (1 + 1e-12)
+    if options.limit_point is None and inside.sum() < aim:
         # a band may hold fewer: enough if it is searched down to strongly damped modes
         return options.max_frequency is not None and low <= -DEPTH * band and high > 0
     return low <= growth and high > 0

@@ -22,7 +22,7 @@ from ...record.files import Header, kind_of
 from ...record.mesh import MeshData
 from ...record.record import GrowingRecord, Record, StoredRecord
 from ...record.states import state_table
-from ...verdict import JudgeOptions, Shuttings, Verdict, judge
+from ...verdict import Shuttings, Verdict, judge
 from ..case import Case
 from .history import HISTORY, STATES, Keeper, Progress, Reader, pumped_flow, supplied_pressure, tables_of
 
@@ -101,13 +101,7 @@ class RunVerdict:
 _LIVELINESS = ("closed", "steady", "decaying", "limit cycle", "growing", "undecided", "irregular", "chatters")
 
 
-def assess(
-    history: Columns,
-    model: ValveModel,
-    residual: float = np.nan,
-    options: JudgeOptions = JudgeOptions(),
-    since: float = 0.0,
-) -> RunVerdict:
+def assess(history: Columns, model: ValveModel, residual: float = np.nan, since: float = 0.0) -> RunVerdict:
     """Verdict on a history.
 
     A valve is closed where its lips are shut and nothing flows, see `openness`. Faces that part and meet again and
@@ -127,17 +121,16 @@ def assess(
     chosen = time >= since
     known = residual if np.isfinite(residual) else None
     signals = ("mass_flow", "lip_displacement", "lip_opening")
-    found = [judge(time[chosen], history[name][chosen], options, residual=known) for name in signals]
-    given = time[chosen], openness(history, model)[chosen], options
+    found = [judge(time[chosen], history[name][chosen], residual=known) for name in signals]
     chatter: dict[str, Any] = {}
-    if judge(*given, closed_below=1.0).name == "closed":
+    if judge(time[chosen], openness(history, model)[chosen], closed_below=1.0).name == "closed":
         reason = "Its lips are shut, and nothing flows."
         found = [replace(v, name="closed", decided=True, reason=reason) for v in found]
     elif model.contact is not None:
         parted = parting(history, model)[chosen]
         shuttings = Shuttings.of(time[chosen], parted, 1.0)
         if shuttings.chatters:
-            opens = judge(time[chosen], parted, options, closed_below=1.0)
+            opens = judge(time[chosen], parted, closed_below=1.0)
             signals = (history[name][chosen] for name in ("lip_opening", "lip_velocity", "mass_flow"))
             chatter = shuttings.evidence(time[chosen], *signals)
             told = {name: getattr(opens, name) for name in ("decided", "reason", "period", "cycles")}
