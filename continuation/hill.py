@@ -261,11 +261,8 @@ def _perturbations(reduced, pairs) -> list[tuple[complex, complex, np.ndarray]]:
     inside = lambda sigma: abs(sigma.imag) <= (0.5 + _EDGE) * omega  # noqa: E731
     shaped = ((sigma, reduced.shaped(x)) for sigma, x in pairs)
     kept = [(s, x) for s, x in shaped if _is_whole(h, x) and (inside(s) or _cut_off(reduced, s, x) <= _CLOSED)]
-    return sorted(_each_once(sorted(kept, key=lambda pair: not inside(pair[0])), inside, omega), key=_decay)
-
-
-def _decay(one) -> float:
-    return -one[0].real
+    found = _each_once(sorted(kept, key=lambda pair: not inside(pair[0])), inside, omega)
+    return sorted(found, key=lambda one: -one[0].real)
 
 
 def _nearest(parts, shift: complex, most: int = 3 * _STEPS):
