@@ -124,24 +124,22 @@ def envelope(result: StudyResult) -> Figure:
     return figure
 
 
-def _some(result: StudyResult) -> list[Any]:
+def _some(result: StudyResult) -> Iterator[tuple[Any, np.ndarray, str]]:
+    """Some cycles, each with its colour and its label."""
     points = [point for point in result.points if point.asked] or list(result.points)
-    return [points[i] for i in np.unique(np.linspace(0, len(points) - 1, SHOWN).round().astype(int))]
+    shown = [points[i] for i in np.unique(np.linspace(0, len(points) - 1, SHOWN).round().astype(int))]
+    labels = [PARAMETERS[result.parameter].amount(point.value, 4) for point in shown]
+    return zip(shown, pressure_colours([point.value for point in shown]), labels)
 
 
 def phase_plane(result: StudyResult) -> Figure:
     """Orbits of some cycles in the plane of displacement and velocity of the lip."""
     figure, axes = new_panel(6.6, 5.2, _title(result), "Displacement of one lip, mm", "Its velocity, m/s")
-    shown = _some(result)
-    row = PARAMETERS[result.parameter]
-    for point, colour in zip(shown, pressure_colours([point.value for point in shown])):
-        lip, rate = (
-            np.append(point.orbit.lip, point.orbit.lip[0]),
-            np.append(point.orbit.lip_rate, point.orbit.lip_rate[0]),
-        )
+    for point, colour, label in _some(result):
+        lip, rate = (np.append(x, x[0]) for x in (point.orbit.lip, point.orbit.lip_rate))
         look = {"ls": "--"} if point.stable is False else {}
-        axes.plot(1e3 * lip, rate, color=colour, label=row.amount(point.value, 4), **look)
-    axes.legend(loc="center left", bbox_to_anchor=(1.0, 0.5), title=row.words, frameon=False)
+        axes.plot(1e3 * lip, rate, color=colour, label=label, **look)
+    axes.legend(loc="center left", bbox_to_anchor=(1.0, 0.5), title=PARAMETERS[result.parameter].words, frameon=False)
     return figure
 
 
@@ -181,14 +179,11 @@ def wave(result: StudyResult) -> Figure:
 def spectrum(result: StudyResult) -> Figure:
     """Harmonics of the displacement of the lip of some cycles."""
     figure, axes = new_panel(6.8, 4.4, _title(result), "Harmonic", "Amplitude of one lip, mm")
-    shown = _some(result)
-    row = PARAMETERS[result.parameter]
-    for point, colour in zip(shown, pressure_colours([point.value for point in shown])):
+    for point, colour, label in _some(result):
         parts = 1e3 * point.orbit.lip_harmonics[1:]
-        label = row.amount(point.value, 4)
         axes.semilogy(np.arange(1, len(parts) + 1), parts, "o-", ms=4, lw=1.0, color=colour, label=label)
     axes.xaxis.get_major_locator().set_params(integer=True)
-    axes.legend(loc="center left", bbox_to_anchor=(1.0, 0.5), title=row.words)
+    axes.legend(loc="center left", bbox_to_anchor=(1.0, 0.5), title=PARAMETERS[result.parameter].words)
     return figure
 
 
