@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from types import SimpleNamespace
 
 import numpy as np
 
@@ -293,7 +294,10 @@ class Follower:
             If the mode does not move the middle of the lips.
         """
         mu, n = onset.place.for_system(), self.system.size - self.system.inner
-        forms = _AtRest(ValveForms(self.system.model(mu), self.walk.equilibrium(onset.place), mu))
+        forms = ValveForms(self.system.model(mu), self.walk.equilibrium(onset.place), mu)
+        # velocities are none of the unknowns of periodic motions
+        steady = np.concatenate([forms.q, forms.rest[2 * len(forms.q) :]])
+        forms = SimpleNamespace(pencil=forms.pencil, slope=forms.slope, rest=steady)
         weight = np.append(np.ones(n), np.full(self.system.inner, self.system.flow_weight))
         row, rest = np.zeros(self.system.size), forms.rest[self.lip]
         row[self.lip] = 1.0
@@ -402,14 +406,6 @@ def _goes_on(rest: float, first: float, second: float, ratio: float) -> bool:
     """
     square = ratio**2
     return (2 * square - 1) * (second - rest) * np.sign(first - rest) > square**2 * abs(first - rest)
-
-
-class _AtRest:
-    """Steady state of a valve with the unknowns of its periodic motions: velocities are none of them."""
-
-    def __init__(self, forms: ValveForms):
-        self.pencil, self.slope = forms.pencil, forms.slope
-        self.rest = np.concatenate([forms.q, forms.rest[2 * len(forms.q) :]])
 
 
 def _basis(system: PeriodicValve, spectrum) -> np.ndarray:
