@@ -10,6 +10,7 @@ from __future__ import annotations
 import json
 import os
 from dataclasses import dataclass, field, replace
+from operator import itemgetter
 from pathlib import Path
 from typing import Any
 
@@ -292,17 +293,12 @@ class Branch:
                 return own[observable] if observable in own else self.values(observable)[special.index]
 
             return observable, lambda: self.values(observable), beside
-        label = f"unknown {observable}"
         if observable is None:
             label, function = "largest |u|", lambda u: np.abs(u).max()
         elif callable(observable):
             label, function = getattr(observable, "__name__", "observable"), observable
         else:
-            index = int(observable)
-
-            def function(u):
-                return u[index]
-
+            label, function = f"unknown {observable}", itemgetter(int(observable))
         return label, lambda: np.array([function(u) for u in self.states]), lambda special: function(special.u)
 
 

@@ -17,17 +17,10 @@ from continuation.linear import Bordered, bordered
 from continuation.system import Derivatives
 
 
-def unit_last(size, dtype=float):
-    """Last unit vector (size,)."""
-    e = np.zeros(size, dtype)
-    e[-1] = 1.0
-    return e
-
-
 def null_pair(solver, p, q):
     """``g, v, w`` of the bordered matrix; ``w`` is conjugated, so that ``w* M = -g q*``."""
     border = Bordered(solver, p, np.conj(q))
-    one = unit_last(p.size + 1)
+    one = np.eye(1, p.size + 1, p.size)[0]
     right, left = border.solve(one), border.solve_transpose(one)
     return right[-1], right[:-1], np.conj(left[:-1]), border
 

@@ -35,13 +35,11 @@ from continuation.stability import CountMonitor
 from continuation.tracer import Monitor, Tracer
 
 
-def solve_bogdanov_takens(tracer, z, v, w):
-    """Newton on ``F = 0, g = 0, w' B v = 0`` in state and both parameters; see `solve_augmented`."""
-    return solve_augmented(tracer, BogdanovTakensCondition(w, v), z[: tracer.problem.n + 2], tracer.frame)
-
-
-def bogdanov_takens_special(tracer, result, tangent, index):
-    """Special point of a fold curve where the zero eigenvalue is double."""
+def locate_bogdanov_takens(tracer, z, v, w, tangent, index) -> SpecialPoint:
+    """Special point of a fold curve where the zero eigenvalue is double, by Newton's method on ``F = 0, g = 0,
+    w' B v = 0`` in state and both parameters; see `solve_augmented`.
+    """
+    result = solve_augmented(tracer, BogdanovTakensCondition(w, v), z[: tracer.problem.n + 2], tracer.frame)
     value = result.local.condition
     values = {"omega": 0.0, "iterations": result.iterations}
     vectors = {"right": value.v / np.linalg.norm(value.v), "left": value.w}
@@ -65,31 +63,25 @@ class FoldCurveMonitor(Monitor):
         point.tests["cusp"] = float(0.5 * w @ system.d2(point.local.u, point.local.mu, v, v))
 
     def between(self, tracer, before, after, index, found):
-        special = []
+        self._last = before.data["orientation"]
+        kinds = [kind for kind in ("cusp", "bogdanov-takens") if before.tests[kind] * after.tests[kind] < 0]
+        special = [self._locate(tracer, kind, before, after, index) for kind in kinds]
         self._last = after.data["orientation"]
-        for kind in ("cusp", "bogdanov-takens"):
-            if before.tests[kind] * after.tests[kind] < 0:
-                special.append(self._locate(tracer, kind, before, after, index))
         return special
 
     def _locate(self, tracer, kind, before, after, index):
-        def test(point):
-            point.data["orientation"] = before.data["orientation"]
-            self.measure(tracer, point)
-            return point.tests[kind]
-
-        point = tracer.root(before, after, test, tolerance=1e-3 if kind != "cusp" else 1e-11)
+        point = self.zero(tracer, before, after, kind, tolerance=1e-3 if kind != "cusp" else 1e-11)
         if point is None:
             return special_at(tracer, kind, after, index, False, "the curve was lost")
         v, w = point.data["orientation"]
         if kind == "bogdanov-takens":
             try:
-                result = solve_bogdanov_takens(tracer, point.z, v, w)
+                found = locate_bogdanov_takens(tracer, point.z, v, w, point.tangent, index)
             except NotConverged as error:
                 return special_at(tracer, kind, point, index, False, str(error))
-            if tracer.fraction(before, after, result.z)[1] >= 1.0:
+            if tracer.fraction(before, after, found.z)[1] >= 1.0:
                 return special_at(tracer, kind, point, index, False, "Newton's method left the bracket")
-            return bogdanov_takens_special(tracer, result, point.tangent, index)
+            return found
         coefficient = fold_coefficient(tracer.problem.system, point.local.u, point.local.mu, v, w)
         return special_at(
             tracer, kind, point, index, True, "", {"quadratic_coefficient": coefficient}, {"right": v, "left": w}
@@ -144,12 +136,7 @@ class HopfCurveMonitor(Monitor):
 
     def _root(self, tracer, kind, name, before, after, index):
         bound = 2 * max(abs(before.tests[name]), abs(after.tests[name]))
-
-        def test(point):
-            self.measure(tracer, point)
-            return point.tests[name]
-
-        point = tracer.root(before, after, test, tolerance=1e-11)
+        point = self.zero(tracer, before, after, name, tolerance=1e-11)
         if point is None:
             return [special_at(tracer, kind, after, index, False, "the curve was lost")]
         if abs(point.tests[name]) > bound:
@@ -167,8 +154,7 @@ class HopfCurveMonitor(Monitor):
         condition = before.local.condition
         w, v = null_vectors(before.local.linear, condition.w.real, condition.v.real)
         try:
-            result = solve_bogdanov_takens(tracer, z, v, w)
-            point = bogdanov_takens_special(tracer, result, before.tangent[: n + 2], index)
+            point = locate_bogdanov_takens(tracer, z, v, w, before.tangent[: n + 2], index)
             point.z, point.tangent = np.append(point.z, 0.0), np.append(point.tangent, 0.0)
         except NotConverged as error:
             point = special_at(tracer, "bogdanov-takens", before, index, False, str(error))
@@ -227,10 +213,7 @@ def continue_fold(
     >>> bool(abs(27 * curve.values("a")**2 - 4 * curve.values("b")**3).max() < 1e-8)
     True
     """
-    borders = _borders("fold curve", special)
-    return _start(
-        curve_tracer(system, "fold curve", special.mu, parameters, borders, options, observers, spectrum), special
-    )
+    return _continue(system, "fold curve", special, parameters, options, observers, spectrum)
 
 
 def continue_hopf(
@@ -277,19 +260,7 @@ def continue_hopf(
     >>> bool(abs(curve.values("B") - 1 - curve.values("A")**2).max() < 1e-8)
     True
     """
-    borders = _borders("hopf curve", special)
-    tracer = curve_tracer(system, "hopf curve", special.mu, parameters, borders, options, observers, spectrum, lyapunov)
-    return _start(tracer, special)
-
-
-def _borders(kind, special):
-    """Left and right vectors of a special point from which a curve of a kind can start."""
-    special_of(special, f"A {kind} starts at")
-    if special.kind not in STARTS[kind] or "right" not in special.vectors:
-        raise NotABifurcation(
-            f"A {kind} starts at a located point of kind {', '.join(STARTS[kind])}; this is {special!r}."
-        )
-    return special.vectors["left"], special.vectors["right"]
+    return _continue(system, "hopf curve", special, parameters, options, observers, spectrum, lyapunov)
 
 
 def curve_tracer(system, kind, mu, parameters, borders, options, observers, spectrum, lyapunov=True):
@@ -308,8 +279,15 @@ def curve_tracer(system, kind, mu, parameters, borders, options, observers, spec
     )
 
 
-def _start(tracer, special):
-    """Curve from a special point, in the direction the options ask for."""
+def _continue(system, kind, special, parameters, options, observers, spectrum, lyapunov=True):
+    """Curve of a kind from a special point, in the direction the options ask for."""
+    special_of(special, f"A {kind} starts at")
+    if special.kind not in STARTS[kind] or "right" not in special.vectors:
+        raise NotABifurcation(
+            f"A {kind} starts at a located point of kind {', '.join(STARTS[kind])}; this is {special!r}."
+        )
+    borders = special.vectors["left"], special.vectors["right"]
+    tracer = curve_tracer(system, kind, special.mu, parameters, borders, options, observers, spectrum, lyapunov)
     problem = tracer.problem
     extra = [special.values["omega"]] if problem.e else []
     n = problem.n
@@ -323,6 +301,5 @@ def _start(tracer, special):
     direction = np.zeros(z.size)
     direction[n + 1] = tracer.options.direction
     point = tracer.start(z, direction, frame)
-    kind = "hopf curve" if problem.e else "fold curve"
     branch = Branch(kind, n, problem.names, problem.condition.extra_names, dict(special.mu), [point.record()])
     return tracer.run(branch, point, tracer.options.step)

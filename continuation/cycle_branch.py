@@ -68,6 +68,8 @@ class CycleTracer:
         Values of the parameter at which a cycle is wanted.
     events : mapping of str to callable
         Functions of a `Cycle` whose zeros are special points of that name.
+    report : callable
+        Told of each point and special point as it is found.
 
     Attributes
     ----------
@@ -90,9 +92,10 @@ class CycleTracer:
         shape: OrbitOptions = OrbitOptions(),
         values: Sequence[float] = (),
         events: Mapping[str, Callable[[Cycle], float]] = {},
+        report: Callable[[CyclePoint | SpecialCycle], None] = lambda item: None,
     ):
         self.solver, self.parameter, self.options, self.shape = solver, parameter, options, shape
-        self.values, self.events = tuple(values), dict(events)
+        self.values, self.events, self.report = tuple(values), dict(events), report
         self.scale = options.units([parameter])[parameter]
         self._limits = options.limits.get(parameter, (-np.inf, np.inf))
         self.points: list[CyclePoint] = []
@@ -106,24 +109,18 @@ class CycleTracer:
     # -- the branch
     # ----
 
-    def extend(
-        self,
-        cycle: Cycle,
-        asked: bool = False,
-        report: Callable[[CyclePoint], None] = lambda item: None,
-        origin: Cycle | None = None,
-    ) -> None:
+    def extend(self, cycle: Cycle, origin: Cycle | None = None) -> None:
         """Take a cycle as the next point; two of them give the way to go.
 
         `origin` is what the branch starts from, at rest at an onset; it helps predictions and is no point of the
         branch.
         """
-        point = self._accept(cycle, asked)
+        point = self._accept(cycle)
         if origin is not None:
             self._begin_at(origin)
         if len(self.points) > 1:
-            self._report(report, self._between(*self.points[-2:]))
-        report(point)
+            self._report(self._between(*self.points[-2:]))
+        self.report(point)
 
     def restore(self, points: Sequence[CyclePoint], origin: Cycle | None = None) -> None:
         """Go on from points that are known, with the `origin` of `extend`; `extend` where there is but one."""
@@ -140,44 +137,40 @@ class CycleTracer:
         length = self.points[0].arclength - self._distance(self.points[0].cycle, origin)
         self._origin = [CyclePoint(origin, origin.mu[self.parameter], length, None)]
 
-    def run(
-        self,
-        report: Callable[[CyclePoint | SpecialCycle], None] = lambda item: None,
-        step: float | None = None,
-    ) -> Said:
+    def run(self, step: float | None = None) -> Said:
         """Go on until the parameter leaves its limits, the cycles shrink to nothing, the points are used up or no cycle
         is found; the reason of the end. `step` is the first step, that of the options by default.
         """
-        self.reason = self._steps(report, self.options.step if step is None else step)
-        self._report(report, self._left_over())
+        self.reason = self._steps(self.options.step if step is None else step)
+        self._report(self._left_over())
         return self.reason
 
-    def _steps(self, report, step: float) -> Said:
+    def _steps(self, step: float) -> Said:
         while len(self.points) < self.options.max_points:
             if len(self.points) > 1 and self._is_over():
                 return self._limit()
             done, step, reason = self._advance(step)
             if done is None:
-                self._report(report, self._ahead())
+                self._report(self._ahead())
                 return reason
             self.next_step = step
             if self._has_turned_back():
                 del self.points[-1]
                 return Reason.VANISHED(name=self.parameter, value=self.points[-1].value)
             found = self._between(self.points[-2], self.points[-1])
-            self._report(report, found)
-            report(self.points[-1])
+            self._report(found)
+            self.report(self.points[-1])
             stopping = [special for special in found if special.title in self.options.stop_at]
             if stopping:
                 return Reason.STOPPED(kind=stopping[0].title)
         return self._limit() if self._is_over() else Reason.POINTS()
 
-    def _report(self, report, found: list[SpecialCycle]) -> None:
+    def _report(self, found: list[SpecialCycle]) -> None:
         for special in found:
             alike = (value for kind, value in self.known if kind in (special.kind, special.title))
             if all(abs(value - special.value) > KNOWN * self.scale for value in alike):
                 self.special.append(special)
-                report(special)
+                self.report(special)
 
     def _limit(self) -> Said:
         return Reason.LIMIT(name=self.parameter, value=self.points[-1].value)
@@ -205,7 +198,7 @@ class CycleTracer:
             try:
                 cycle, expected = self._step(step, target)
                 cycle, angle = self._landed(self._checked(cycle, expected))
-                point = self._accept(cycle, cycle.mu[self.parameter] in self.values)
+                point = self._accept(cycle)
             except ContinuationError as error:
                 reason = str(error)
                 if (
@@ -250,7 +243,7 @@ class CycleTracer:
             omega = (1 - share) * last.motion.omega + share * cycle.motion.omega
             motion = PeriodicMotion(h, (1 - share) * ends[0] + share * ends[1], omega)
             expected = replace(cycle, motion=motion, mu=cycle.mu | {self.parameter: limit})
-            cycle = self._checked(self._solved(motion, expected.mu, (), ()), expected)
+            cycle = self._checked(self._solved(expected), expected)
         angle = self._angle(cycle) if len(self.points) > 1 else 0.0
         if angle > self.options.max_angle:
             raise NotConverged(Reason.TURNED(), Reason.TURNED)
@@ -293,30 +286,24 @@ class CycleTracer:
 
     def _step(self, step: float, target: float | None) -> tuple[Cycle, Cycle]:
         """The cycle a step ahead, or at a value of the parameter, and the one expected there."""
-        last = self.points[-1]
-        free, conditions = (), ()
+        last = self.points[-1].cycle
         if target is not None:
-            motion, value = self._expected(target, step), target
-        else:
-            motion = predict_by_arclength(self._last(), last.arclength + step, self._series())
-            value = self._value_at(step)
-            way = motion.coefficients - motion.harmonics.resized(last.motion.coefficients)
-            free, conditions = (self.parameter,), (self._plane(way, value - last.value, motion, value),)
-        mu = last.cycle.mu | {self.parameter: value}
-        return self._solved(motion, mu, free, conditions), replace(last.cycle, motion=motion, mu=mu)
+            expected = replace(last, motion=self._expected(target, step), mu=last.mu | {self.parameter: target})
+            return self._solved(expected), expected
+        expected = self._predicted(self._last(), self.points[-1].arclength + step, self._series())
+        return self._solved(expected, last, expected), expected
 
-    def _solved(self, motion, mu, free, conditions) -> Cycle:
-        options = self.shape
-        while True:
-            cycle = self.solver.solve(motion, mu, free, conditions)
-            if cycle.motion.tail <= options.tail:
-                return cycle
-            count = min(cycle.motion.harmonics_for(options.tail), options.max_harmonics)
-            if count <= cycle.motion.harmonics.count:
-                said = Reason.HARMONICS(count=options.max_harmonics, share=cycle.motion.tail)
-                raise NotConverged(said, said.kind)
-            motion, mu = cycle.motion.resized(count), cycle.mu
-            conditions = tuple(Condition(motion.harmonics.resized(c.row), c.extra, c.value) for c in conditions)
+    def _predicted(self, near: Sequence[CyclePoint], arclength: float, h: Harmonics) -> Cycle:
+        """The cycle at an arclength, by the polynomial through points."""
+        mu = near[-1].cycle.mu | {self.parameter: value_by_arclength(near, arclength)}
+        return replace(near[-1].cycle, motion=predict_by_arclength(near, arclength, h), mu=mu)
+
+    def _solved(self, expected: Cycle, *way: Cycle) -> Cycle:
+        """The cycle near one expected, at its value of the parameter, or in the plane through it normal to the way
+        between two cycles.
+        """
+        free, conditions = ((self.parameter,), (self._plane(*way, expected),)) if way else ((), ())
+        return self.solver.resolve(expected.motion, expected.mu, self.shape, free, conditions)
 
     def _expected(self, target: float, step: float) -> PeriodicMotion:
         """The motion at a value about a step ahead."""
@@ -334,23 +321,25 @@ class CycleTracer:
         longer = min(last.harmonics.count + 2, options.max_harmonics)
         return Harmonics(longer) if last.tail > 0.4 * options.tail else last.harmonics
 
-    def _plane(self, way: np.ndarray, moved: float, motion: PeriodicMotion, value: float) -> Condition:
-        """Normal to a way of coefficients and of the parameter, through a motion at a value."""
-        row, extra = way * self._weight, np.zeros(len(self.solver.unknowns((self.parameter,))))
-        extra[-1] = moved / self.scale**2
+    def _plane(self, start: Cycle, end: Cycle, through: Cycle) -> Condition:
+        """Normal to the way of coefficients and of the parameter between two cycles, through a third."""
+        motion, value = through.motion, through.mu[self.parameter]
+        first, last = (motion.harmonics.resized(one.motion.coefficients) for one in (start, end))
+        row, extra = (last - first) * self._weight, np.zeros(len(self.solver.unknowns((self.parameter,))))
+        extra[-1] = (end.mu[self.parameter] - start.mu[self.parameter]) / self.scale**2
         size = np.sqrt(np.sum(row**2 / self._weight) + (extra[-1] * self.scale) ** 2)
         return Condition(row / size, extra / size, float(np.vdot(row, motion.coefficients) + extra[-1] * value) / size)
 
     # -- points
     # ----
 
-    def _accept(self, cycle: Cycle, asked: bool) -> CyclePoint:
+    def _accept(self, cycle: Cycle) -> CyclePoint:
         """Take a cycle as the next point, with the phase of the one before."""
-        point = self.describe(cycle, asked)
+        point = self.describe(cycle)
         self.points.append(point)
         return point
 
-    def describe(self, cycle: Cycle, asked: bool = False, after: CyclePoint | None = None) -> CyclePoint:
+    def describe(self, cycle: Cycle, after: CyclePoint | None = None) -> CyclePoint:
         """A cycle with its exponents and what events make of it; `after` is the point it follows, the last without."""
         after = self.points[-1] if after is None and self.points else after
         exponents = None
@@ -360,7 +349,7 @@ class CycleTracer:
         value = cycle.mu[self.parameter]
         tests = {name: float(event(cycle)) for name, event in self.events.items()}
         length = 0.0 if after is None else after.arclength + self._distance(after.cycle, cycle)
-        return CyclePoint(cycle, value, length, exponents, asked, tests)
+        return CyclePoint(cycle, value, length, exponents, value in self.values, tests)
 
     def _distance(self, one: Cycle, other: Cycle) -> float:
         h = max(one.motion.harmonics, other.motion.harmonics, key=lambda h: h.count)
@@ -456,17 +445,11 @@ class CycleTracer:
     def _interpolated(self, near: Sequence[CyclePoint], arclength: float) -> CyclePoint | None:
         """A cycle between points, at an arclength; None where it is not found."""
         h = max((p.motion.harmonics for p in near), key=lambda h: h.count)
-        guess = predict_by_arclength(near, arclength, h)
-        value, first, last = value_by_arclength(near, arclength), near[0], near[-1]
-        way = h.resized(last.motion.coefficients) - h.resized(first.motion.coefficients)
-        condition = self._plane(way, last.value - first.value, guess, value)
-        mu = near[0].cycle.mu | {self.parameter: value}
         try:
-            cycle = self._solved(guess, mu, (self.parameter,), (condition,))
+            cycle = self._solved(self._predicted(near, arclength, h), near[0].cycle, near[-1].cycle)
         except ContinuationError:
             return None
-        point = self.describe(cycle, after=first)
-        return CyclePoint(cycle, point.value, arclength, point.exponents, False, point.tests)
+        return replace(self.describe(cycle, after=near[0]), arclength=arclength, asked=False)
 
     def _ahead(self) -> list[SpecialCycle]:
         """Events just ahead of a branch that does not go on, as where motions cease to be smooth at one."""

@@ -15,7 +15,7 @@ import numpy as np
 import scipy.linalg as la
 
 from continuation.cycle_linearisation import FREQUENCY, Condition, CycleLinearisation, apply_change, free_values
-from continuation.options import NotConverged, Reason, require
+from continuation.options import NotConverged, OrbitOptions, Reason, require
 from continuation.periodic import PeriodicMotion
 
 #: Directions of a motion itself that belong to the basis: those above this share of the largest.
@@ -141,6 +141,23 @@ class CycleSolver:
         last = sizes[-1] if sizes else np.nan
         sentence = f"{len(sizes)} corrections, the last of {last:.2g} of its size."
         raise NotConverged(f"No periodic motion was found near the guess: {sentence}", Reason.ITERATIONS)
+
+    def resolve(self, guess, mu, shape: OrbitOptions, free=(), conditions=(), least: float = -1.0) -> Cycle:
+        """Correct a guess as `solve` does, with a series that is made longer until its last harmonics hold no more than
+        the share allowed. A motion about its mean of a norm up to `least` is none.
+        """
+        while True:
+            cycle = self.solve(guess, mu, free, conditions)
+            if np.linalg.norm(cycle.motion.coefficients[1:]) <= least:
+                raise NotConverged("The guess shrank to an equilibrium.", Reason.REST, cycle)
+            if cycle.motion.tail <= shape.tail:
+                return cycle
+            count = min(cycle.motion.harmonics_for(shape.tail), shape.max_harmonics)
+            if count <= cycle.motion.harmonics.count:
+                said = Reason.HARMONICS(count=shape.max_harmonics, share=cycle.motion.tail)
+                raise NotConverged(said, said.kind)
+            guess, mu = cycle.motion.resized(count), cycle.mu
+            conditions = tuple(Condition(guess.harmonics.resized(c.row), c.extra, c.value) for c in conditions)
 
     def unknowns(self, free: Sequence[str]) -> tuple[str, ...]:
         """Free unknowns beside the motion: the frequency first for an autonomous system."""

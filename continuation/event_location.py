@@ -214,11 +214,9 @@ class EventMonitor(Monitor):
     def __init__(self, event: Event):
         self.event = event
 
-    def value(self, tracer, point):
-        return float(self.event.function(tracer.problem.u(point.z), tracer.problem.mu(point.z)))
-
     def measure(self, tracer, point):
-        point.tests[self.event.name] = self.value(tracer, point)
+        value = self.event.function(tracer.problem.u(point.z), tracer.problem.mu(point.z))
+        point.tests[self.event.name] = float(value)
 
     def between(self, tracer, before, after, index, found):
         name = self.event.name
@@ -229,6 +227,6 @@ class EventMonitor(Monitor):
         values = {"stop": float(self.event.stop)} if self.event.stop else {}
         if f1 == 0:
             return [special_at(tracer, name, after, index, True, "", values)]
-        zero = tracer.root(before, after, lambda point: self.value(tracer, point))
+        zero = self.zero(tracer, before, after, name)
         reason = "" if zero is not None else "the curve was lost in the bracket"
         return [special_at(tracer, name, zero or after, index, zero is not None, reason, values)]

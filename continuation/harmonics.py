@@ -97,11 +97,6 @@ class Harmonics:
         out[:kept] = coefficients[:kept]
         return out
 
-    def turned(self, coefficients: np.ndarray, angle: float) -> np.ndarray:
-        """Coefficients of the same motion with its phase counted from `angle`."""
-        turn = np.exp(1j * angle * np.arange(self.count + 1))
-        return self.real(self.complex(coefficients) * turn.reshape((-1,) + (1,) * (coefficients.ndim - 1)))
-
 
 class Rates:
     """Functions of d/dt applied to samples of motions ``exp(shift t)`` times a periodic function.

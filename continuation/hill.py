@@ -99,12 +99,8 @@ class Exponents:
     @property
     def dimensions(self) -> np.ndarray:
         """(k,) dimensions of the perturbations: 1 where the multiplier is real, 2 of a pair."""
-        return np.array([1 if self.is_real(value) else 2 for value in self.values], int)
-
-    def is_real(self, value: complex) -> bool:
-        """True where the multiplier of an exponent is real."""
-        near = 1e-3 * self.omega
-        return abs(value.imag) < near or abs(value.imag - 0.5 * self.omega) < near
+        high, near = self.values.imag, 1e-3 * self.omega
+        return np.where((np.abs(high) < near) | (np.abs(high - 0.5 * self.omega) < near), 1, 2)
 
     @property
     def stable(self) -> bool:
@@ -265,11 +261,8 @@ def _perturbations(reduced, pairs) -> list[tuple[complex, complex, np.ndarray]]:
     inside = lambda sigma: abs(sigma.imag) <= (0.5 + _EDGE) * omega  # noqa: E731
     shaped = ((sigma, reduced.shaped(x)) for sigma, x in pairs)
     kept = [(s, x) for s, x in shaped if _is_whole(h, x) and (inside(s) or _cut_off(reduced, s, x) <= _CLOSED)]
-    return sorted(_each_once(sorted(kept, key=lambda pair: not inside(pair[0])), inside, omega), key=_decay)
-
-
-def _decay(one) -> float:
-    return -one[0].real
+    found = _each_once(sorted(kept, key=lambda pair: not inside(pair[0])), inside, omega)
+    return sorted(found, key=lambda one: -one[0].real)
 
 
 def _nearest(parts, shift: complex, most: int = 3 * _STEPS):

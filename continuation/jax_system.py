@@ -112,6 +112,8 @@ class JaxSystem(System):
         """Derivative along directions, each of the state or a parameter: of B times a frozen vector where one is given,
         else of F.
         """
+        if frozen and self.constant_mass:
+            return np.zeros(self.size)
         mu = _floats(mu)
         tangents = []
         for vector, name in directions:
@@ -125,18 +127,12 @@ class JaxSystem(System):
     # -- mass
 
     def mass_d(self, u, mu, c, a):
-        if self.constant_mass:
-            return np.zeros(self.size)
         return self._directional(u, mu, [(a, None)], c)
 
     def mass_d2(self, u, mu, c, a, b):
-        if self.constant_mass:
-            return np.zeros(self.size)
         return self._directional(u, mu, [(a, None), (b, None)], c)
 
     def mass_parameter(self, u, mu, name, c):
-        if self.constant_mass:
-            return np.zeros(self.size)
         return self._directional(u, mu, [(None, name)], c)
 
 

@@ -29,7 +29,7 @@ REFINEMENTS = 2
 
 
 class _Solver:
-    """Products with the matrix of a factorisation."""
+    """Products with the matrix that is solved with."""
 
     def matvec(self, x):
         return self.matrix @ x
@@ -131,7 +131,7 @@ def factorise(matrix, ordering: str = "COLAMD"):
     return SparseSolver(matrix, ordering) if sp.issparse(matrix) else DenseSolver(np.asarray(matrix))
 
 
-class MatrixLinearisation:
+class MatrixLinearisation(_Solver):
     """``A`` and ``B`` given as matrices, both dense or both sparse.
 
     Parameters
@@ -152,7 +152,7 @@ class MatrixLinearisation:
     def __init__(self, jacobian, mass=None):
         sparse = sp.issparse(jacobian)
         self.size = jacobian.shape[0]
-        self.jacobian = sp.csc_matrix(jacobian) if sparse else np.asarray(jacobian, float)
+        self.jacobian = self.matrix = sp.csc_matrix(jacobian) if sparse else np.asarray(jacobian, float)
         if mass is None:
             self.mass = sp.identity(self.size, format="csc") if sparse else np.eye(self.size)
         else:
@@ -169,12 +169,6 @@ class MatrixLinearisation:
         if self._solver is None:
             self._solver = factorise(self.jacobian)
         return self._solver
-
-    def matvec(self, x):
-        return self.jacobian @ x
-
-    def rmatvec(self, x):
-        return self.jacobian.T @ x
 
     def solve(self, rhs):
         return self._factors.solve(rhs)

@@ -120,13 +120,8 @@ class Orbit:
     @property
     def exponents(self) -> np.ndarray:
         """Non-trivial Floquet exponents, complex, by growth; imaginary parts within half a turn per period."""
-        return np.array(
-            [v for value in self.floquet.values for v in ([value] if self._is_real(value) else [value, value.conj()])],
-            complex,
-        )
-
-    def _is_real(self, value: complex) -> bool:
-        return self.floquet.is_real(value)
+        each = zip(self.floquet.values, self.floquet.dimensions)
+        return np.array([v for value, size in each for v in (value, value.conj())[:size]], complex)
 
     @property
     def nontrivial(self) -> np.ndarray:
@@ -186,16 +181,7 @@ def find_orbit(system, states, period: float, mu, options: OrbitOptions | None =
     solver = OrbitSolver(system, options)
     least = 1e-6 * np.linalg.norm(guess.coefficients[1:])
     require(least != 0.0, "The guess of an orbit must vary over its period.")
-    while True:
-        cycle = solver.solve(guess, mu)
-        if np.linalg.norm(cycle.motion.coefficients[1:]) <= least:
-            raise NotConverged("The guess shrank to an equilibrium.", Reason.REST, cycle)
-        count = cycle.motion.harmonics.count
-        if cycle.motion.tail <= options.tail:
-            return add_exponents(solver, cycle, options)
-        if count >= options.max_harmonics:
-            raise NotConverged(Reason.HARMONICS(count=count, share=cycle.motion.tail), Reason.HARMONICS)
-        guess = cycle.motion.resized(min(cycle.motion.harmonics_for(options.tail), options.max_harmonics))
+    return add_exponents(solver, solver.resolve(guess, mu, options, least=least), options)
 
 
 def add_exponents(solver: CycleSolver, cycle: Cycle, options: OrbitOptions) -> Orbit:
@@ -271,9 +257,9 @@ def continue_orbits(
     first = Cycle(orbit.motion, dict(orbit.mu), 0.0, 0, 0)
 
     def steps():
-        follower.tracer.extend(first, False, follower.take)
-        follower.tracer.extend(follower.second_orbit(first), False, follower.take)
-        return follower.tracer.run(follower.take)
+        follower.tracer.extend(first)
+        follower.tracer.extend(follower.second_orbit(first))
+        return follower.tracer.run()
 
     return follower.run(steps, observers)
 
@@ -327,9 +313,9 @@ def orbits_from_hopf(
 
     def steps():
         rest, first, second = follower.beside_hopf(special)
-        follower.tracer.extend(first, False, follower.take, rest)
-        follower.tracer.extend(second, False, follower.take)
-        return follower.tracer.run(follower.take)
+        follower.tracer.extend(first, rest)
+        follower.tracer.extend(second)
+        return follower.tracer.run()
 
     return follower.run(steps, observers)
 
@@ -374,7 +360,7 @@ def resume(
     # an interruption may have met a special point before the orbit behind it
     met = [special for special in branch.special if special.index >= len(branch) - 2]
     follower.tracer.known = [(special.kind, special.mu[follower.parameter]) for special in met]
-    return follower.run(lambda: follower.tracer.run(follower.take, step), observers)
+    return follower.run(lambda: follower.tracer.run(step), observers)
 
 
 def orbit_at(system, branch: Branch, index: int, discretisation: OrbitOptions | None = None) -> Orbit:
@@ -416,7 +402,8 @@ class _Follower:
         unit = (options.state_scale or 1.0) * np.sqrt(n)
         kept = replace(options, state_scale=unit, max_points=options.max_points + 1)
         shape = replace(self.shape, exponents=min(self.shape.exponents, max(n - 1, 1)))
-        self.parameter, self.tracer = parameter, CycleTracer(OrbitSolver(system, shape), parameter, kept, shape)
+        self.parameter = parameter
+        self.tracer = CycleTracer(OrbitSolver(system, shape), parameter, kept, shape, report=self.take)
         self.observers: list = []
 
     def second_orbit(self, first: Cycle) -> Cycle:

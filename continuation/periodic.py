@@ -74,10 +74,6 @@ class PeriodicMotion:
         """Values (len, n) at phases, rad."""
         return self.harmonics.basis_at(phases) @ self.coefficients
 
-    def rate(self, phases) -> np.ndarray:
-        """Rates (len, n) at phases, rad."""
-        return self.omega * (self.harmonics.basis_at(phases) @ self.harmonics.rate(self.coefficients))
-
     def with_rates(self, phases) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Values, rates and second rates (len, n) at phases, rad."""
         h, basis = self.harmonics, self.harmonics.basis_at(phases)

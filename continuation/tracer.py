@@ -50,6 +50,15 @@ class Monitor:
     def accept(self, tracer, before, after, found) -> None:
         """Note that the step was accepted."""
 
+    def zero(self, tracer, before, after, name, tolerance=1e-10) -> CurvePoint | None:
+        """Point between two where a test function vanishes; None where the curve is lost."""
+
+        def test(point):
+            self.measure(tracer, point)
+            return point.tests[name]
+
+        return tracer.root(before, after, test, tolerance)
+
 
 class Observer:
     """Hooks of a run, which do nothing by default; override those of interest."""
@@ -196,7 +205,7 @@ class Tracer:
         away = self.problem.norm(z - before.z - s * chord) / np.sqrt(length2)
         return s, away
 
-    def root(self, before: CurvePoint, after: CurvePoint, function, tolerance=1e-10) -> CurvePoint | None:
+    def root(self, before: CurvePoint, after: CurvePoint, function, tolerance: float = 1e-10) -> CurvePoint | None:
         """Zero of a function of points between two of opposite sign (Brent); None where the curve is lost."""
         met = {0.0: before, 1.0: after}
 

@@ -168,6 +168,8 @@ def largest_pairs(
 TYPICAL = 3.0
 #: Vectors that a search for the very lowest mode works with.
 FEW = 12
+#: Length outside a basis, over the whole, of vectors that are left out of it.
+COMPRESSION = 1e-7
 
 
 class TransferBasis:
@@ -184,8 +186,6 @@ class TransferBasis:
         Any pencil of the family; only M, K, G, J are used.
     modes : int
         Number of structural modes.
-    compression : float
-        Static corrections smaller than this, relative to the largest, are left out.
     workspace : Workspace, optional
         Keeps the symbolic factorisation between pencils of one pattern.
 
@@ -207,14 +207,7 @@ class TransferBasis:
     1
     """
 
-    def __init__(
-        self,
-        pencil: CoupledPencil,
-        *,
-        modes: int = 24,
-        compression: float = 1e-7,
-        workspace: Workspace | None = None,
-    ):
+    def __init__(self, pencil: CoupledPencil, *, modes: int = 24, workspace: Workspace | None = None):
         workspace = workspace or Workspace()
         typical = _at_typical_frequency(pencil, workspace)
         values, vectors = lowest_modes(typical, modes, workspace)
@@ -224,21 +217,21 @@ class TransferBasis:
         if pencil.m and self.V.shape[1] < pencil.n:
             factor = workspace.factor_stiffness(typical.replace(C=0.0 * pencil.M))
             parts = [factor.solve(pencil.G.toarray()).real, factor.solve_transposed(pencil.J.toarray().T).real]
-            self._extend(pencil.M, np.hstack([p / (np.linalg.norm(p) or 1.0) for p in parts]), compression)
+            self._extend(pencil.M, np.hstack([p / (np.linalg.norm(p) or 1.0) for p in parts]))
 
     @property
     def size(self) -> int:
         """Number k of basis vectors."""
         return self.V.shape[1]
 
-    def enlarged(self, pencil: CoupledPencil, *vectors, compression: float = 1e-7) -> TransferBasis:
+    def enlarged(self, pencil: CoupledPencil, *vectors, compression: float = COMPRESSION) -> TransferBasis:
         """Larger basis with vectors (n, j) of its pencil besides, real or complex; this one stays as it is."""
         other = copy(self)
         columns = [part for v in vectors for part in ((v.real, v.imag) if np.iscomplexobj(v) else (v,))]
         other._extend(pencil.M, np.hstack(columns), compression)
         return other
 
-    def _extend(self, mass, X, compression: float):
+    def _extend(self, mass, X, compression: float = COMPRESSION):
         """Append what vectors have outside the space, as far as it matters."""
         room = self.V.shape[0] - self.V.shape[1]
         self.V = np.hstack([self.V, outside(self.V, mass, X, compression)[:, :room]])

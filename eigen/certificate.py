@@ -15,7 +15,7 @@ from .krylov import KrylovPairs, krylov_pairs
 from .operator import CoupledPencil, real_apply
 from .pairs import SAME, Found, acceptable, all_pairs, newton, normalised
 from .search import leading_modes
-from .spectrum import SearchOptions, Spectrum, number_right_of
+from .spectrum import PAIRS, SearchOptions, Spectrum, number_right_of
 
 
 @dataclass(frozen=True)
@@ -171,31 +171,29 @@ def missing_pairs(
 
 def joined(spectrum: Spectrum, found: Found, line: float) -> Spectrum:
     """The spectrum with further unstable pairs, sorted; as long as was asked for, if not more are unstable."""
-    names = ("eigenvalues", "q", "u", "residual", "backward_error")
-    new = zip(names, (found.values, found.q, found.u, found.residual, found.backward))
-    parts = {name: np.concatenate([getattr(spectrum, name), part], axis=-1) for name, part in new}
+    parts = {name: np.concatenate([getattr(one, name) for one in (spectrum, found)], axis=-1) for name in PAIRS}
     order = np.lexsort((parts["eigenvalues"].imag, -parts["eigenvalues"].real))
     order = order[: max(spectrum.asked, int(np.sum(parts["eigenvalues"].real > line)))]
-    real = found.values.imag == 0
+    real = found.eigenvalues.imag == 0
     notes = []
     if real.any():
-        rates = ", ".join(f"{value.real:.4g}" for value in found.values[real])
+        rates = ", ".join(f"{value.real:.4g}" for value in found.eigenvalues[real])
         notes.append(
             f"Motions that grow by {rates} 1/s without oscillating lie far from where modes are searched for; the "
             f"independent count pointed to them."
         )
-    beyond = found.values.imag > 2 * np.pi * spectrum.band
+    beyond = found.eigenvalues.imag > 2 * np.pi * spectrum.band
     for chosen, where in (
         (beyond, f"beyond the band up to {spectrum.band:.4g} Hz in which the list is complete"),
         (~real & ~beyond, "where the search did not reach"),
     ):
         if chosen.any():
-            frequencies = ", ".join(f"{value.imag / (2 * np.pi):.4g}" for value in found.values[chosen])
+            frequencies = ", ".join(f"{value.imag / (2 * np.pi):.4g}" for value in found.eigenvalues[chosen])
             notes.append(f"Unstable modes at {frequencies} Hz lie {where}; the independent count pointed to them.")
     return replace(
         spectrum,
         **{name: part[..., order] for name, part in parts.items()},
-        refined=spectrum.refined + found.values.size,
+        refined=spectrum.refined + found.eigenvalues.size,
         notes=(*spectrum.notes, *notes),
     )
 

@@ -209,7 +209,8 @@ class ColumnSolver:
         leading = [family.reach(mu).leading(row) for row, mu in zip(values, points)]
         counts: dict[int, Count] = {}
         leading, trusted = _corrected(model, points, leading)
-        cells = [Cell.of(leading[i], values[i], _nobody(family, mu), False, REDUCED) for i, mu in enumerate(points)]
+        nobody = [Certificate(-1, -1, False, 0.0, _counted_band(family, mu)) for mu in points]
+        cells = [Cell.of(*own, False, REDUCED) for own in zip(leading, values, nobody)]
 
         def count(counter, chosen, within_band=False):
             for i in chosen:
@@ -423,11 +424,6 @@ def _corrected(model: ReducedColumn, points, leading: list[np.ndarray]) -> tuple
             row = np.concatenate([exact, leading[i][OPTIONS.held :]])
             found[i], trusted[i] = row[np.argsort(-row.real)], True
     return found, trusted
-
-
-def _nobody(family: PencilFamily, mu: Hashable) -> Certificate:
-    """Region in which eigenvalues would be counted, where nobody did."""
-    return Certificate(-1, -1, False, 0.0, _counted_band(family, mu))
 
 
 def _counted(reduced: ReducedFamily, mu: Hashable, leading: np.ndarray, within_band: bool = False) -> Count:

@@ -267,7 +267,7 @@ class CoupledPencil:
         if not set(parts) <= set(FLUID_PARTS):
             return replace(self, **parts)
         other = object.__new__(type(self))
-        for name in part_names():
+        for name in (part.name for part in fields(CoupledPencil)):
             other._put(name, parts[name] if name in parts else getattr(self, name))
         other._check_fluid()
         return other
@@ -438,11 +438,6 @@ def real_apply(matrix, x: np.ndarray) -> np.ndarray:
         return out.reshape((matrix.shape[0],) + x.shape[1:])
     out = matrix @ flat.view(float).reshape(flat.shape[0], -1)
     return np.ascontiguousarray(out).view(complex).reshape((matrix.shape[0],) + x.shape[1:])
-
-
-def part_names() -> tuple[str, ...]:
-    """Names of all parts of a pencil, the relaxation among them."""
-    return tuple(f.name for f in fields(CoupledPencil))
 
 
 def _real_csr(name: str, value) -> sp.csr_matrix:

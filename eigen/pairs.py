@@ -10,7 +10,7 @@ import scipy.linalg as la
 
 from .factor import SingularShiftError, Workspace, first_regular
 from .operator import CoupledPencil, real_apply
-from .spectrum import Mode, Oval, SearchedRegion
+from .spectrum import LEFT, PAIRS, Mode, Oval, SearchedRegion
 
 
 def all_pairs(pencil: CoupledPencil, *, left: bool):
@@ -222,11 +222,11 @@ TIGHT = 1e-9  # residual above which the inner unknowns of the fluid are compute
 class Found:
     """Pairs collected so far, upper half-plane."""
 
-    values: np.ndarray
+    eigenvalues: np.ndarray
     q: np.ndarray
     u: np.ndarray
     residual: np.ndarray
-    backward: np.ndarray
+    backward_error: np.ndarray
     left_q: np.ndarray | None = None
     left_u: np.ndarray | None = None
     ovals: dict[complex, Oval] = field(default_factory=dict)
@@ -247,7 +247,7 @@ class Found:
     @property
     def parts(self) -> tuple[str, ...]:
         """Names of the arrays with an entry or a column for each pair."""
-        return ("values", "q", "u", "residual", "backward") + ("left_q", "left_u") * (self.left_q is not None)
+        return PAIRS if self.left_q is None else PAIRS + LEFT
 
     def note(self, sentence: str) -> None:
         """Add a sentence once."""
@@ -310,7 +310,7 @@ def polish(pencil, shifted, batch, tolerance) -> None:
         bad = np.flatnonzero(batch.residual > 0.3 * tolerance)
         if not bad.size:
             return
-        values, q, u = batch.values[bad], batch.q[:, bad], batch.u[:, bad]
+        values, q, u = batch.eigenvalues[bad], batch.q[:, bad], batch.u[:, bad]
         dq, du = shifted.solve(*pencil.apply(values, q, u))
         eq, eu = shifted.solve(*pencil.apply_derivative(values, q, u))
         along = np.sum(q.conj() * eq, axis=0) + np.sum(u.conj() * eu, axis=0)
@@ -323,8 +323,8 @@ def polish(pencil, shifted, batch, tolerance) -> None:
         if not better.any():
             return
         chosen = bad[better]
-        batch.values[chosen], batch.residual[chosen] = new[better], residual[better]
-        batch.backward[chosen] = backward[better]
+        batch.eigenvalues[chosen], batch.residual[chosen] = new[better], residual[better]
+        batch.backward_error[chosen] = backward[better]
         batch.q[:, chosen], batch.u[:, chosen] = q[:, better], u[:, better]
 
 
@@ -339,29 +339,28 @@ def refine(pencil, batch, aim, band, tolerance, found) -> np.ndarray:
     good = batch.residual <= tolerance
     if good.all():
         return np.zeros(0, complex)
-    inside = batch.values.imag <= band * (1 + 1e-12)
-    ranked = np.sort(batch.values.real[good & inside])[::-1]
+    inside = batch.eigenvalues.imag <= band * (1 + 1e-12)
+    ranked = np.sort(batch.eigenvalues.real[good & inside])[::-1]
     matters = ranked[aim - 1] if ranked.size >= aim else -np.inf
     workspace = Workspace()
     for i in np.flatnonzero(~good):
-        if batch.values[i].real < matters or not inside[i]:
-            good[i] = acceptable(batch.residual[i], batch.backward[i], tolerance)
+        start = batch.eigenvalues[i]
+        if start.real < matters or not inside[i]:
+            good[i] = acceptable(batch.residual[i], batch.backward_error[i], tolerance)
             continue
         value, q, u, residual, backward = newton(
-            pencil, batch.values[i], batch.q[:, i], batch.u[:, i], workspace=workspace, tolerance=tolerance
+            pencil, start, batch.q[:, i], batch.u[:, i], workspace=workspace, tolerance=tolerance
         )
-        moved = abs(value - batch.values[i]) > 1e-3 * abs(batch.values[i])
+        moved = abs(value - start) > 1e-3 * abs(start)
         if moved or not acceptable(residual, backward, tolerance):
             found.rejected += 1
-            found.note(
-                f"A pair near {batch.values[i]:.6g} was rejected: its residual {residual:.1g} exceeds the tolerance."
-            )
+            found.note(f"A pair near {start:.6g} was rejected: its residual {residual:.1g} exceeds the tolerance.")
             continue
         good[i] = True
-        batch.values[i], batch.residual[i], batch.backward[i] = value, residual, backward
+        batch.eigenvalues[i], batch.residual[i], batch.backward_error[i] = value, residual, backward
         batch.q[:, [i]], batch.u[:, [i]] = normalised(q[:, None], u[:, None])
         found.refined += 1
-    dropped = batch.values[~good]
+    dropped = batch.eigenvalues[~good]
     for name in batch.parts:
         setattr(batch, name, getattr(batch, name)[..., good])
     return dropped
@@ -369,11 +368,11 @@ def refine(pencil, batch, aim, band, tolerance, found) -> np.ndarray:
 
 def merge(found: Found, batch: Found) -> None:
     """Add what is new; of an eigenvalue found twice keep the pair of smaller residual."""
-    partner = np.full(batch.values.size, -1)
-    taken = np.zeros(found.values.size, bool)
+    partner = np.full(batch.eigenvalues.size, -1)
+    taken = np.zeros(found.eigenvalues.size, bool)
     for i in np.argsort(batch.residual):
-        distance = np.where(taken, np.inf, np.abs(found.values - batch.values[i]))
-        if distance.size and distance.min() <= SAME * abs(batch.values[i]):
+        distance = np.where(taken, np.inf, np.abs(found.eigenvalues - batch.eigenvalues[i]))
+        if distance.size and distance.min() <= SAME * abs(batch.eigenvalues[i]):
             partner[i] = int(np.argmin(distance))
             taken[partner[i]] = True
     for i in np.flatnonzero(partner >= 0):
@@ -400,14 +399,14 @@ def empty(pencil, left) -> Found:
 
 def attach_left(pencil, batch, solve, found) -> None:
     """Left vectors from the same factor, matched by eigenvalue; strays by inverse iteration."""
-    k = batch.values.size
+    k = batch.eigenvalues.size
     batch.left_q = np.zeros((pencil.n, k), complex)
     batch.left_u = np.zeros((pencil.b, k), complex)
     pairs = solve(lambda values, *_: _all_there(batch, values))
     found.applications += pairs.applications
     free = np.ones(pairs.eigenvalues.size, bool)
     workspace = Workspace()
-    for i, value in enumerate(batch.values):
+    for i, value in enumerate(batch.eigenvalues):
         distance = np.where(free, np.abs(pairs.eigenvalues - value), np.inf)
         j = int(np.argmin(distance)) if distance.size else -1
         if j >= 0 and distance[j] <= SAME * abs(value):
@@ -421,10 +420,10 @@ def attach_left(pencil, batch, solve, found) -> None:
 
 def _all_there(batch, values) -> bool:
     """True where every eigenvalue of the right vectors has turned up."""
-    if values.size < batch.values.size:
+    if values.size < batch.eigenvalues.size:
         return False
-    gaps = np.abs(values[:, None] - batch.values).min(axis=0)
-    return bool((gaps <= 0.01 * SAME * np.abs(batch.values)).all())
+    gaps = np.abs(values[:, None] - batch.eigenvalues).min(axis=0)
+    return bool((gaps <= 0.01 * SAME * np.abs(batch.eigenvalues)).all())
 
 
 def left_by_inverse_iteration(pencil, value, workspace):

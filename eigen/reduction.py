@@ -92,22 +92,14 @@ class FamilyReduction:
         Keep the symbolic factorisation between families of one pattern: of the stiffness, and of that which a typical
         motion sees where parts of it relax.
 
-    options : ReductionOptions
-
     Raises
     ------
     SingularShiftError
         If the stiffness is singular.
     """
 
-    def __init__(
-        self,
-        family: PencilFamily,
-        static: Workspace | None = None,
-        stiffened: Workspace | None = None,
-        options: ReductionOptions = OPTIONS,
-    ):
-        self.family, self.options = family, options
+    def __init__(self, family: PencilFamily, static: Workspace | None = None, stiffened: Workspace | None = None):
+        self.family = family
         self.solver = (static or Workspace()).factor_stiffness(self._elastic(family.stiffness))
         self._workspace, self._stiffened = stiffened or Workspace(), (None, None)
         #: Of a family next to another one: frequency, shares and solver of that.
@@ -127,20 +119,20 @@ class FamilyReduction:
             self.solver.solve(family.forces.toarray()),
             self.solver.solve_transposed(family.slope.toarray().T.copy()),
         ]
-        first, inertia = orthonormal(family.mass, np.hstack(still), self.options.compression, passes=1)
+        first, inertia = orthonormal(family.mass, np.hstack(still), OPTIONS.compression, passes=1)
         # one step of subspace iteration on the lowest motions found there
         stiffness = first.T @ (family.stiffness @ first)
         lowest = la.eigh(
-            0.5 * (stiffness + stiffness.T), subset_by_index=(0, min(self.options.inertia_modes, first.shape[1]) - 1)
+            0.5 * (stiffness + stiffness.T), subset_by_index=(0, min(OPTIONS.inertia_modes, first.shape[1]) - 1)
         )[1]
         moving = self.solver.solve(inertia @ lowest)
-        return ReducedFamily(family, np.hstack([first, moving]), self.options.compression)
+        return ReducedFamily(family, np.hstack([first, moving]), OPTIONS.compression)
 
     @cached_property
     def wide(self) -> ReducedFamily:
         """First stage with the lowest motions of the structure itself, for bands that damping does not end."""
-        lowest = lowest_modes(self._elastic(self.family.stiffness), self.options.band_modes)[1]
-        return ReducedFamily(self.family, np.hstack([lowest, self.coarse.V]), self.options.compression)
+        lowest = lowest_modes(self._elastic(self.family.stiffness), OPTIONS.band_modes)[1]
+        return ReducedFamily(self.family, np.hstack([lowest, self.coarse.V]), OPTIONS.compression)
 
     def first(self, points) -> ReducedFamily:
         """First stage for some parameter points: with the lowest motions where all modes of a band are close to
@@ -155,8 +147,8 @@ class FamilyReduction:
         `mu` is a parameter point of this one whose relaxation is that of both by and large.
         """
         other = object.__new__(FamilyReduction)
-        other.family, other.solver, other.options = family, self.solver, self.options
-        other.coarse = other.wide = ReducedFamily(family, space, self.options.compression)
+        other.family, other.solver = family, self.solver
+        other.coarse = other.wide = ReducedFamily(family, space, OPTIONS.compression)
         relaxation = self.family.relaxation(mu)
         other._beside = () if relaxation is None else (*self._typical(mu), self._stiffened_by(relaxation, mu))
         family.model = weakref.ref(other)
@@ -215,7 +207,7 @@ class FamilyReduction:
         if relaxation is not None:
             frequency, share = self._typical(points[0])
             typical = 1.0 + share @ relaxation.factors(1j * frequency).real
-            solver, passes = self._stiffened_by(relaxation, points[0]), self.options.corrections
+            solver, passes = self._stiffened_by(relaxation, points[0]), OPTIONS.corrections
         for pairs, mu in zip(several, points):
             below = 1.0 + pairs.values * self.family.rayleigh(mu)[1]
             relaxed = 0.0 if relaxation is None else share @ relaxation.factors(pairs.values)
@@ -239,7 +231,7 @@ class FamilyReduction:
             return self._beside[:2]
         coarse = self.coarse
         squares = la.eigvalsh(0.5 * (coarse.stiffness + coarse.stiffness.T))
-        low = squares[squares > 0][: self.options.typical_modes]
+        low = squares[squares > 0][: OPTIONS.typical_modes]
         frequency = float(np.exp(0.5 * np.log(low).mean())) if low.size else 1.0
         return frequency, np.array([m.diagonal().sum() for m in coarse.relaxation(mu).matrices]) / squares.sum()
 
@@ -257,7 +249,7 @@ class FamilyReduction:
         """Second stage: a space made of the corrected leading vectors of a first one at some parameter points."""
         columns = self._corrected_leading(first, points, most)
         # where nothing leads anywhere there is nothing to be found better
-        return ReducedFamily(self.family, columns, self.options.weak) if columns.shape[1] else first
+        return ReducedFamily(self.family, columns, OPTIONS.weak) if columns.shape[1] else first
 
     def deeper(self, fine: ReducedFamily, points, most: int) -> ReducedFamily:
         """A second stage made wider by its own leading vectors, corrected once more.
@@ -266,7 +258,7 @@ class FamilyReduction:
         leaves 1e-5 of an eigenvalue however many points they come from.
         """
         columns = self._corrected_leading(fine, points, most)
-        return ReducedFamily(self.family, columns, self.options.deeper, base=fine) if columns.shape[1] else fine
+        return ReducedFamily(self.family, columns, OPTIONS.deeper, base=fine) if columns.shape[1] else fine
 
     def leading_vectors(self, mu: Hashable, most: int) -> np.ndarray:
         """Right and left leading vectors at a parameter point, corrected with the full matrices, real and imaginary
@@ -280,7 +272,7 @@ class FamilyReduction:
         """Right and left leading vectors of a reduced model at some points, corrected with the full matrices, real and
         imaginary parts side by side.
         """
-        several = [model.pairs(mu, most, self.options.snapshot) for mu in points]
+        several = [model.pairs(mu, most, OPTIONS.snapshot) for mu in points]
         corrected = self._corrected(several, points)
         return np.hstack([part for both in corrected for x in both for part in (x.real, x.imag)])
 
@@ -309,7 +301,7 @@ class FamilyReduction:
         """Relative error of leading eigenvalues at one point, at most: their change, as in `error`, or the product of
         the shares by which right and left vectors change, which is large where corrections do not converge.
         """
-        pairs, mass = model.pairs(mu, self.options.held), self.family.mass
+        pairs, mass = model.pairs(mu, OPTIONS.held), self.family.mass
         corrected = self._corrected([pairs], [mu])[0]
 
         def size(x: np.ndarray) -> np.ndarray:
@@ -318,11 +310,11 @@ class FamilyReduction:
         right, left = (size(new - old) / size(old) for new, old in zip(corrected, (pairs.q, pairs.w)))
         return max(self._change(pairs, mu, corrected), float((right * left).max(initial=0.0)))
 
-    def error(self, model: ReducedFamily, points, most: int | None = None) -> float:
+    def error(self, model: ReducedFamily, points) -> float:
         """Largest relative change of leading eigenvalues of a reduced model under a correction with the full matrices,
         at some points.
         """
-        pairs = ((model.pairs(mu, most or self.options.held), mu) for mu in points)
+        pairs = ((model.pairs(mu, OPTIONS.held), mu) for mu in points)
         return max((self._change(*own) for own in pairs), default=0.0)
 
     def _change(self, pairs: Pairs, mu: Hashable, corrected: tuple[np.ndarray, np.ndarray] | None = None) -> float:

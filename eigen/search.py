@@ -23,7 +23,7 @@ def band_sought(options) -> float:
 
 def number_in_band(found, options) -> int:
     """Eigenvalues found up to the end of the band."""
-    return int(np.sum(found.values.imag <= band_sought(options)))
+    return int(np.sum(found.eigenvalues.imag <= band_sought(options)))
 
 
 def would_do(values, ovals: list[Oval], found, aim, options) -> bool:
@@ -43,7 +43,7 @@ def apart_from_limit(values, options) -> np.ndarray:
 
 def leading_band(found, aim, options) -> tuple[float, float]:
     """Growth rate of the last of the leading modes, and the band that holds them, rad/s."""
-    values = found.values
+    values = found.eigenvalues
     if options.limit_point is not None:
         floor = CLEAR * options.limit_point
         values = values[values.real > floor]
@@ -68,9 +68,9 @@ def leading_band(found, aim, options) -> tuple[float, float]:
 def _widest_covered(found, aim) -> tuple[float, float] | None:
     """The widest band whose leading modes the region covers, with the growth rate of the last."""
     region = found.region
-    tops = np.unique(found.values.imag)[::-1]
+    tops = np.unique(found.eigenvalues.imag)[::-1]
     for band in tops[:: max(1, tops.size // 60)]:
-        growth = np.sort(found.values.real[found.values.imag <= band])[::-1]
+        growth = np.sort(found.eigenvalues.real[found.eigenvalues.imag <= band])[::-1]
         if growth.size < aim:
             return None
         low, high = region.complete_between(float(band), samples=100)
@@ -84,12 +84,9 @@ def is_covered(found, aim, options) -> bool:
     if found.everything:
         return True
     growth, band = leading_band(found, aim, options)
-    if options.limit_point is not None:
-        low, high = found.region.complete_between(band)
-        return low <= growth and high > 0
-    inside = found.values.imag <= band * (1 + 1e-12)
     low, high = found.region.complete_between(band)
-    if inside.sum() < aim:
+    inside = found.eigenvalues.imag <= band * (1 + 1e-12)
+    if options.limit_point is None and inside.sum() < aim:
         # a band may hold fewer: enough if it is searched down to strongly damped modes
         return options.max_frequency is not None and low <= -DEPTH * band and high > 0
     return low <= growth and high > 0
@@ -161,7 +158,7 @@ def next_shift(pencil, found, aim, options, workspace) -> complex:
     """
     if pencil.relaxation is not None:
         return found.shifts[0] * (2.5, 0.4)[len(found.shifts) % 2] ** ((len(found.shifts) + 1) // 2)
-    if not found.values.size and all(isinstance(s, float) for s in found.shifts):
+    if not found.eigenvalues.size and all(isinstance(s, float) for s in found.shifts):
         closer = min(found.shifts) / 3.0
         if options.max_frequency is None:
             return closer
@@ -255,7 +252,7 @@ def _search(pencil, count, options, workspace, first, solver) -> Found:
         if found.everything or (is_covered(found, aim, options) and not given):
             break
         if not queue and not given and len(found.shifts) < options.max_shifts:
-            if options.max_frequency is not None and found.values.size and fresh == 0 and len(found.shifts) > 1:
+            if options.max_frequency is not None and found.eigenvalues.size and fresh == 0 and len(found.shifts) > 1:
                 break  # the band holds no more within reach
             queue = [next_shift(pencil, found, aim, options, workspace)]
     return found
@@ -356,17 +353,17 @@ def _result(pencil, found: Found, count, options) -> Spectrum:
     """Sort, cut to the number asked for, and say what is certified."""
     region = found.region
     _, band = leading_band(found, max(count, options.least), options)
-    order = _by_growth(found.values, np.flatnonzero(found.values.imag <= band * (1 + 1e-12)))
+    order = _by_growth(found.eigenvalues, np.flatnonzero(found.eigenvalues.imag <= band * (1 + 1e-12)))
     if options.limit_point is not None:
-        order = order[found.values.real[order] > CLEAR * options.limit_point]
+        order = order[found.eigenvalues.real[order] > CLEAR * options.limit_point]
     order = order[:count]
     if options.limit_point is not None and options.max_frequency is None and order.size:
-        band = float(found.values.imag[order].max())
+        band = float(found.eigenvalues.imag[order].max())
     low, high = region.complete_between(band)
     notes = list(found.notes)
-    growth = found.values.real[order]
+    growth = found.eigenvalues.real[order]
     certified = int(np.sum(growth >= low))
-    all_there_are = found.everything and order.size == int(np.sum(found.values.imag <= band * (1 + 1e-12)))
+    all_there_are = found.everything and order.size == int(np.sum(found.eigenvalues.imag <= band * (1 + 1e-12)))
     complete = certified == order.size and (order.size >= count or all_there_are)
     if options.limit_point is not None and order.size < count:
         complete = certified == order.size and low <= CLEAR * options.limit_point
@@ -389,11 +386,7 @@ def _result(pencil, found: Found, count, options) -> Spectrum:
             f"{band / (2 * np.pi):.6g} Hz."
         )
     spectrum = Spectrum(
-        eigenvalues=found.values[order],
-        q=found.q[:, order],
-        u=found.u[:, order],
-        residual=found.residual[order],
-        backward_error=found.backward[order],
+        **{name: getattr(found, name)[..., order] for name in found.parts},
         asked=count,
         status="complete" if complete else "incomplete",
         complete_above=low,
@@ -406,9 +399,7 @@ def _result(pencil, found: Found, count, options) -> Spectrum:
         rejected=found.rejected,
         notes=tuple(notes),
     )
-    if not options.left:
-        return spectrum
-    return _with_left(pencil, spectrum, found.left_q[:, order], found.left_u[:, order])
+    return _with_left(pencil, spectrum) if options.left else spectrum
 
 
 def _within(found, options, low) -> str:
@@ -429,8 +420,10 @@ def _by_growth(values, chosen):
     return chosen[np.lexsort((-values.real, values.imag, -np.round(values.real / unit)))]
 
 
-def _with_left(pencil, spectrum, left_q, left_u) -> Spectrum:
-    w, W, error, defective = biorthogonalise(pencil, spectrum.eigenvalues, spectrum.q, spectrum.u, left_q, left_u)
+def _with_left(pencil, spectrum) -> Spectrum:
+    """The spectrum with its left vectors scaled."""
+    vectors = spectrum.q, spectrum.u, spectrum.left_q, spectrum.left_u
+    w, W, error, defective = biorthogonalise(pencil, spectrum.eigenvalues, *vectors)
     notes = spectrum.notes
     if defective:
         which = ", ".join(f"{spectrum.eigenvalues[i]:.6g}" for i in defective)

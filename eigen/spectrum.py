@@ -196,6 +196,10 @@ class SearchedRegion:
         return float(low.max()), float(high.min())
 
 
+#: Arrays with an entry or a column for each eigenpair, and those of its left vector.
+PAIRS, LEFT = ("eigenvalues", "q", "u", "residual", "backward_error"), ("left_q", "left_u")
+
+
 @dataclass(frozen=True)
 class Spectrum:
     """Leading eigenpairs of a pencil, sorted by growth rate; a conjugate pair is given once.
@@ -308,17 +312,8 @@ class Spectrum:
 
     def select(self, chosen) -> Spectrum:
         """Result with some of the pairs."""
-
-        def cut(array):
-            return None if array is None else array[..., chosen]
-
-        return replace(
-            self,
-            **{
-                name: cut(getattr(self, name))
-                for name in ("eigenvalues", "q", "u", "residual", "backward_error", "left_q", "left_u")
-            },
-        )
+        names = PAIRS if self.left_q is None else PAIRS + LEFT
+        return replace(self, **{name: getattr(self, name)[..., chosen] for name in names})
 
 
 @dataclass(frozen=True)

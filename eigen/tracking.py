@@ -102,19 +102,9 @@ class _State:
     def of(pencil: CoupledPencil, spectrum: Spectrum, count: int) -> _State:
         pair = np.flatnonzero(spectrum.eigenvalues.imag > 0)
         rank = np.arange(len(spectrum))
-
-        def both(a):
-            return np.concatenate([a, a[..., pair].conj()], axis=-1)
-
-        return _State(
-            pencil,
-            both(spectrum.eigenvalues),
-            both(spectrum.q),
-            both(spectrum.u),
-            both(spectrum.left_q),
-            both(spectrum.left_u),
-            np.concatenate([rank, rank[pair]]) < count,
-        )
+        own = spectrum.eigenvalues, spectrum.q, spectrum.u, spectrum.left_q, spectrum.left_u
+        both = (np.concatenate([a, a[..., pair].conj()], axis=-1) for a in own)
+        return _State(pencil, *both, np.concatenate([rank, rank[pair]]) < count)
 
 
 def track(

@@ -179,7 +179,7 @@ class ValveMotion:
         shell = model.shell
         self._factor: CoupledFactor | None = None
         self._correction: OutsideCorrection | None = None
-        self._masses: MassSolver | None = None
+        self._masses: DirectFactor | None = None
         free = shell.dofs.free
         scale = np.ones(free.shape)
         scale[:, 3:] = 0.5 * float(np.mean(shell.geometry.thickness))
@@ -325,8 +325,11 @@ class ValveMotion:
 
     def accelerated(self, q: np.ndarray, force: np.ndarray) -> np.ndarray:
         """Accelerations (n,) by a force (n,) against the inertia of the wall and of the fluid outside."""
-        self._masses = self._masses or MassSolver(self.model)
-        return self._masses.solve(q, force, self.outside)
+        self._masses = factor = self._masses or DirectFactor(*self.model.shell.dofs.pattern)
+        factor.refactor(self.model.mass(q))
+        if self.outside is None:
+            return factor.solve(force)
+        return self.outside.correction(lambda f, _: (factor.solve(f), np.zeros_like(f[:0])), 1.0).solve(force, None)[0]
 
     def begin_step(self, state, h: float, theta: float, rate: float, inlet: float):
         """Step of the fluid from a state, see `dbvfiv.flow.stepping.MovingFluid.step`; the added mass outside is
@@ -393,19 +396,18 @@ class ValveMotion:
         sources, by_area, by_rate, by_inner = fluid.operators(*passage, inner, inlet)
         bend = model.rows.second(model.nodal(v), model.nodal(v))
         known = sources + by_area @ passage[1] + by_rate @ bend
-        apart = (np.zeros((m, m)),) if self.fluid.compressed else _blocks(by_rate, by_inner)
-        self._solver(0 if self.fluid.compressed else len(inner)).refactor(*coupled, *apart)
+        if self.fluid.compressed:
+            self._solver(0).refactor(*coupled, np.zeros((m, m)))
+        else:
+            self._solver(len(inner)).refactor(*coupled, by_rate[:m], by_inner[:m], by_rate[m:], by_inner[m:])
         self._add_outside(1.0)
         pressure = self._force(nodal, known[:m], still)
         a, _ = self._solve(pressure - forces, -known[m:][: self._factor.inner])
-        acceleration = bend + model.rows.second(self._position(nodal), model.nodal(a))
+        position = nodal.copy()
+        position[:, :3] += model.shell.mesh.nodes
+        acceleration = bend + model.rows.second(position, model.nodal(a))
         state = fluid.moving(passage, acceleration, inner, inlet)
         return a, self.load(q, v, q, v, fluid.instant(state, inlet))
-
-    def _position(self, nodal):
-        out = nodal.copy()
-        out[:, :3] += self.model.shell.mesh.nodes
-        return out
 
     def instant(self, state, inlet: float):
         """A step of no length of the fluid at a state."""
@@ -424,31 +426,3 @@ class ValveMotion:
     def outside_energy(self, q: np.ndarray, v: np.ndarray) -> float:
         """Kinetic energy of the fluid outside, J of the part; zero where there is none."""
         return 0.0 if self.outside is None else self.outside.energy(q, v)
-
-
-def _blocks(by_rate: np.ndarray, by_inner: np.ndarray) -> tuple[np.ndarray, ...]:
-    """Derivatives of pressures and equations (m + l, m) and (m + l, l), in the order of `CoupledFactor.refactor`."""
-    m = by_rate.shape[1]
-    return by_rate[:m], by_inner[:m], by_rate[m:], by_inner[m:]
-
-
-class MassSolver:
-    """Accelerations that a force gives the wall, with the added mass of fluid outside.
-
-    Parameters
-    ----------
-    model : ValveModel
-    """
-
-    def __init__(self, model: ValveModel):
-        self._model = model
-        self._factor = DirectFactor(*model.shell.dofs.pattern)
-
-    def solve(self, q: np.ndarray, force: np.ndarray, outside: MovingOutside | None = None) -> np.ndarray:
-        """Accelerations (n,) at positions (n,) by a force (n,)."""
-        factor = self._factor
-        factor.values[:] = self._model.mass(q)
-        factor.refactor()
-        if outside is None:
-            return factor.solve(force)
-        return outside.correction(lambda f, _: (factor.solve(f), np.zeros_like(f[:0])), 1.0).solve(force, None)[0]

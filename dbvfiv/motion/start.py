@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -24,20 +24,11 @@ from .equations import ValveMotion
 from .stepper import MotionState, consistent_state
 
 
-@dataclass(frozen=True)
-class Kick:
-    """The mode that a push followed.
-
-    Attributes
-    ----------
-    eigenvalue : complex, 1/s
-    """
-
-    eigenvalue: complex
-
-
-def first_state(motion: ValveMotion, case: Case, inlet: float, observer: Observer) -> tuple[MotionState, Kick | None]:
-    """State that a case starts from, with inlet pressure (Pa) of the first instant.
+def first_state(
+    motion: ValveMotion, case: Case, inlet: float, observer: Observer
+) -> tuple[MotionState, complex | None]:
+    """State that a case starts from, with inlet pressure (Pa) of the first instant; and the eigenvalue, 1/s, of the
+    mode that it was kicked along, if it was.
 
     Parameters
     ----------
@@ -61,13 +52,7 @@ def first_state(motion: ValveMotion, case: Case, inlet: float, observer: Observe
     if transient.start == "steady":
         return consistent_state(motion, 0.0, q, np.zeros(model.size), inlet, inner), None
     observer.progress("mode to follow")
-    push = Push(
-        transient.kick_mode,
-        transient.kick_opening,
-        case.modes.count,
-        SearchOptions(case.modes.max_frequency, tolerance=case.modes.tolerance),
-    )
-    return kicked(motion, q, inner, inlet, push)
+    return kicked(motion, q, inner, inlet, case)
 
 
 def steady_fluid(motion: ValveMotion, q: np.ndarray, inlet: float, velocity: float | None = None) -> np.ndarray | None:
@@ -100,32 +85,10 @@ def steady_positions(model: ValveModel, inlet: float, options: SteadyOptions | N
     return path.q
 
 
-@dataclass(frozen=True)
-class Push:
-    """A push along a mode.
-
-    Attributes
-    ----------
-    mode : int
-        Which oscillating mode, counted by growth rate from 1.
-    opening : float
-        By how much it moves the lip in y, m: half of what the clear opening changes by.
-    count : int
-        Among how many leading modes it is looked for; more are searched where these hold too few that oscillate.
-    search : SearchOptions
-        What is asked of the search; see `dbvfiv.model.leading.select_search`.
-    """
-
-    mode: int
-    opening: float
-    count: int = 10
-    search: SearchOptions = field(default_factory=SearchOptions)
-
-
 def kicked(
-    motion: ValveMotion, q: np.ndarray, inner: np.ndarray | None, inlet: float, push: Push
-) -> tuple[MotionState, Kick]:
-    """Steady state pushed along one of its leading modes.
+    motion: ValveMotion, q: np.ndarray, inner: np.ndarray | None, inlet: float, case: Case
+) -> tuple[MotionState, complex]:
+    """Steady state pushed along one of its leading modes, and the eigenvalue of that, 1/s.
 
     Parameters
     ----------
@@ -136,7 +99,8 @@ def kicked(
         The fluid's unknowns in it.
     inlet : float
         Its inlet pressure, Pa.
-    push : Push
+    case : Case
+        Its `transient.kick_mode` and `transient.kick_opening` are taken, and `modes` for the search.
 
     Raises
     ------
@@ -147,19 +111,21 @@ def kicked(
     linear = linearise(model, q, max(inlet, model.flow.back))  # below that nothing flows either
     pencil = linear.pencil(motion.mu)
     try:
-        found, index = _find_mode(pencil, motion.mu, push, linear.resolved(motion.mu))
+        found, index = _find_mode(pencil, motion.mu, case, linear.resolved(motion.mu))
     except (SingularShiftError, np.linalg.LinAlgError) as error:
         said = str(error).rstrip(".")
         raise SolveError(f"The mode to push along at {inlet:.6g} Pa was not found: {said}.") from error
-    mode = found.mode(index)
+    mode, opening = found.mode(index), case.transient.kick_opening
     nodal = model.nodal(mode.q)
     lip = nodal[model.mesh.centre_line[0], 1]
     if abs(lip) < 1e-6 * np.abs(nodal[:, :3]).max():
-        raise SolveError(f"Mode {push.mode} does not move the middle of the lip, so no push can be measured there.")
-    shape = push.opening / lip * mode.q
-    flow = (push.opening / lip * mode.u).real if motion.fluid.moves and len(mode.u) else 0.0
+        raise SolveError(
+            f"Mode {case.transient.kick_mode} does not move the middle of the lip, so no push can be measured there."
+        )
+    shape = opening / lip * mode.q
+    flow = (opening / lip * mode.u).real if motion.fluid.moves and len(mode.u) else 0.0
     eigenvalue = complex(mode.eigenvalue)
-    return on_mode(motion, q, inner, inlet, shape, eigenvalue, flow), Kick(eigenvalue)
+    return on_mode(motion, q, inner, inlet, shape, eigenvalue, flow), eigenvalue
 
 
 def on_mode(
@@ -194,18 +160,21 @@ def on_mode(
     return consistent_state(motion, 0.0, moved, v, inlet, still + flow, memory)
 
 
-def _find_mode(pencil: CoupledPencil, mu: Mu, push: Push, resolved: float = np.inf) -> tuple[Spectrum, int]:
-    """Leading modes, by the rule of all studies, and the place of the one to push along among them."""
-    count = max(push.count, push.mode)
+def _find_mode(pencil: CoupledPencil, mu: Mu, case: Case, resolved: float) -> tuple[Spectrum, int]:
+    """Leading modes, by the rule of all studies, and the place of the one to push along among them; more are searched
+    for than the case lists where these hold too few that oscillate.
+    """
+    wanted, asked = case.transient.kick_mode, SearchOptions(case.modes.max_frequency, tolerance=case.modes.tolerance)
+    count = max(case.modes.count, wanted)
     while True:
-        search = select_search(push.search, mu, lambda n: lowest_frequencies(pencil, n), count, resolved)
+        search = select_search(asked, mu, lambda n: lowest_frequencies(pencil, n), count, resolved)
         found = leading_modes(pencil, count, search.options)
         oscillating = [i for i in range(len(found)) if found.eigenvalues[i].imag > 1e-6 * abs(found.eigenvalues[i])]
-        if len(oscillating) >= push.mode:
-            return found, oscillating[push.mode - 1]
+        if len(oscillating) >= wanted:
+            return found, oscillating[wanted - 1]
         if len(found) < count or count > 100:
             raise SolveError(
-                f"Only {len(oscillating)} oscillating modes were found, so there is no mode {push.mode} to push the "
+                f"Only {len(oscillating)} oscillating modes were found, so there is no mode {wanted} to push the "
                 f"valve along."
             )
         count *= 2

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from types import SimpleNamespace
 
 import numpy as np
 
@@ -293,7 +294,10 @@ class Follower:
             If the mode does not move the middle of the lips.
         """
         mu, n = onset.place.for_system(), self.system.size - self.system.inner
-        forms = _AtRest(ValveForms(self.system.model(mu), self.walk.equilibrium(onset.place), mu))
+        forms = ValveForms(self.system.model(mu), self.walk.equilibrium(onset.place), mu)
+        # velocities are none of the unknowns of periodic motions
+        steady = np.concatenate([forms.q, forms.rest[2 * len(forms.q) :]])
+        forms = SimpleNamespace(pencil=forms.pencil, slope=forms.slope, rest=steady)
         weight = np.append(np.ones(n), np.full(self.system.inner, self.system.flow_weight))
         row, rest = np.zeros(self.system.size), forms.rest[self.lip]
         row[self.lip] = 1.0
@@ -360,15 +364,16 @@ class Follower:
             except SolveError as error:
                 missed.append(str(error))
         cycles.sort(key=lambda cycle: np.linalg.norm(cycle.motion.coefficients[1:3, self.lip]))
-        tracer = self.tracer(values, first.motion)
+        tracer = self.tracer(values, first.motion, tell)
         tracer.known = list(known)
-        asked = [cycle.mu[self.name] in values for cycle in cycles]
-        tracer.extend(cycles[0], asked[0], tell, rest)
-        for cycle, is_asked in zip(cycles[1:], asked[1:]):
-            tracer.extend(cycle, is_asked, tell)
+        tracer.extend(cycles[0], rest)
+        for cycle in cycles[1:]:
+            tracer.extend(cycle)
         return tracer, missed
 
-    def tracer(self, values: Sequence[float], first: PeriodicMotion) -> CycleTracer:
+    def tracer(
+        self, values: Sequence[float], first: PeriodicMotion, tell: Callable[[CyclePoint | SpecialCycle], None]
+    ) -> CycleTracer:
         """Tracer of a branch through ascending values of the parameter; `first` is a motion on the branch."""
         asked = self.case.cycle
         swing = np.sqrt(2.0) * np.linalg.norm(first.coefficients[1:3, self.lip])
@@ -388,7 +393,7 @@ class Follower:
             harmonics=1, max_harmonics=asked.max_harmonics, tail=asked.tolerance, exponents=asked.exponents
         )
         events = {TOUCHING: lambda cycle: self.orbit(cycle).clearance}
-        return CycleTracer(self.solver, self.name, options, shape, values, events)
+        return CycleTracer(self.solver, self.name, options, shape, values, events, tell)
 
     def orbit(self, cycle: Cycle) -> Orbit:
         """Orbit of a cycle, from which its results are taken."""
@@ -401,14 +406,6 @@ def _goes_on(rest: float, first: float, second: float, ratio: float) -> bool:
     """
     square = ratio**2
     return (2 * square - 1) * (second - rest) * np.sign(first - rest) > square**2 * abs(first - rest)
-
-
-class _AtRest:
-    """Steady state of a valve with the unknowns of its periodic motions: velocities are none of them."""
-
-    def __init__(self, forms: ValveForms):
-        self.pencil, self.slope = forms.pencil, forms.slope
-        self.rest = np.concatenate([forms.q, forms.rest[2 * len(forms.q) :]])
 
 
 def _basis(system: PeriodicValve, spectrum) -> np.ndarray:

@@ -65,7 +65,6 @@ def test_series_are_exact():
     slope = (h.basis_at(t + step) - h.basis_at(t - step)) @ c / (2 * step)
     assert np.allclose(h.basis_at(t) @ h.rate(c), slope, atol=1e-8)
     assert np.allclose(Rates(h, 2.0).apply(1, h.evaluate(c)), 2.0 * h.evaluate(h.rate(c)))
-    assert np.allclose(h.basis_at(t) @ h.turned(c, 0.4), h.basis_at(t + 0.4) @ c)
     # a filter of the rate, and a shift of it: x = exp(s t) p has (d/dt) x = exp(s t) (d/dt + s) p
     shifted = Rates(h, 2.0, 0.5 + 1j)
     assert np.allclose(shifted.apply(1, h.evaluate(c)), h.evaluate(2.0 * h.rate(c) + (0.5 + 1j) * c))
@@ -124,7 +123,7 @@ def test_forced_duffing_against_integration():
         slope = np.array([[0, 1], [-(1 + 3 * mu["e"] * x**2) / w**2, -mu["d"] / w]])
         return np.concatenate([[v, force], (slope @ m).ravel()])
 
-    x0, v0 = cycle.motion.at([0.0])[0, 0], cycle.motion.rate([0.0])[0, 0]
+    x0, v0, _ = (part[0, 0] for part in cycle.motion.with_rates([0.0]))
     run = solve_ivp(rate, (0, 2 * np.pi), [x0, v0, 1, 0, 0, 1], rtol=1e-11, atol=1e-13)
     assert np.allclose(run.y[:2, -1], [x0, v0], atol=1e-7)
     multipliers = np.linalg.eigvals(run.y[2:, -1].reshape(2, 2))
@@ -229,21 +228,23 @@ def test_events_are_located():
     system, guess = periodic.of_first_order(circling(lambda mu: mu), 2), PeriodicMotion.of_samples(0.3 * CIRCLE, 2, 1.0)
     event = {"radius": lambda cycle: float(np.linalg.norm(cycle.motion.at([0.0]))) - 0.6}
     options = ContinuationOptions(limits={"mu": (0.0, 0.5)}, location_tolerance=1e-9)
-    tracer = begun(system, guess, {"mu": 0.09}, 0.12, "mu", options, values=(0.2, 0.3), events=event)
     told = []
-    tracer.run(told.append)
+    wanted = {"values": (0.12, 0.2, 0.3), "events": event, "report": told.append}
+    tracer = begun(system, guess, {"mu": 0.09}, 0.12, "mu", options, **wanted)
+    tracer.run()
     (special,) = tracer.special
     assert special.kind == "radius" and abs(special.value - 0.36) < 1e-5 and special in told
-    assert {0.2, 0.3} <= {p.value for p in tracer.points if p.asked}
+    assert [p.value for p in tracer.points if p.asked] == [0.12, 0.2, 0.3]
     again = CycleTracer(tracer.solver, "mu", options, values=(0.2, 0.3), events=event)
     again.restore(tracer.points[:3])
     again.run()
     assert np.isclose(again.points[-1].value, tracer.points[-1].value) and len(again.special) == 1
     for known, count in (((), 1), ([("radius", 0.36)], 0)):  # between the two cycles that a branch starts with
-        between = CycleTracer(tracer.solver, "mu", options, events=event)
-        between.known, told = list(known), []
+        told = []
+        between = CycleTracer(tracer.solver, "mu", options, events=event, report=told.append)
+        between.known = list(known)
         for radius in (0.5, 0.65):
-            between.extend(tracer.solver.solve(guess, {"mu": radius**2}), report=told.append)
+            between.extend(tracer.solver.solve(guess, {"mu": radius**2}))
         assert len(told) == 2 + count and [s.kind for s in between.special] == ["radius"] * count
 
 
@@ -269,7 +270,8 @@ def test_a_fold_between_the_origin_and_the_first_cycles():
     (fold,) = tracer.special
     assert fold.kind == FOLD and fold.located and abs(fold.value + 0.25) < 1e-6
     steps = {}
-    tracer.run(lambda _: steps.setdefault(len(tracer.points), tracer.next_step))
+    tracer.report = lambda _: steps.setdefault(len(tracer.points), tracer.next_step)
+    tracer.run()
     assert len(tracer.special) == 1
     again = CycleTracer(solver, "mu", options)
     again.restore(tracer.points[:3], origin)
@@ -294,7 +296,8 @@ def test_a_restored_branch_tells_what_its_last_step_met():
         told.append(item)
         steps[len(tracer.points)] = tracer.next_step
 
-    tracer.run(tell)
+    tracer.report = tell
+    tracer.run()
     assert [special.kind for special in tracer.special] == ["branch point"]
     passed = next(i for i, point in enumerate(tracer.points) if point.value > 0)
     again = CycleTracer(tracer.solver, "mu", options)
@@ -323,9 +326,9 @@ def test_an_event_that_ends_a_branch_is_located_from_one_side():
     system = Walled(lambda u, v, a, t, mu: v - rate(u, mu), 2)
     event = {"wall": lambda cycle: 0.6 - float(np.linalg.norm(cycle.motion.at([0.0])))}
     options = ContinuationOptions(limits={"mu": (0.0, 0.5)})
-    tracer = begun(system, guess, {"mu": 0.09}, 0.12, "mu", options, events=event)
     told = []
-    assert "no further cycle" in tracer.run(told.append)
+    tracer = begun(system, guess, {"mu": 0.09}, 0.12, "mu", options, events=event, report=told.append)
+    assert "no further cycle" in tracer.run()
     (special,) = tracer.special
     assert special.kind == "wall" and special.located and special in told
     assert abs(special.value - 0.36) < 1e-4

@@ -160,7 +160,8 @@ def test_what_branches_hold_is_what_steps_find():
     for strength, group, time in zip(wall._strength, wall._group, wall.times[wall._time]):
         share = lambda s, g=strength, t=time: g * s * t / (1 + s * t)  # noqa: E731
         branches.append(motion.rates.apply(share, slow[:, :, :, group])[0])
-    half = PeriodicMotion(motion.harmonics, motion.harmonics.turned(motion.coefficients, np.pi), motion.omega)
+    later = motion.harmonics.project(motion.at(motion.harmonics.phases + np.pi))
+    half = PeriodicMotion(motion.harmonics, later, motion.omega)
     exact = memory.held(half.samples[:, : model.size], half.rates)[0]
     found = []
     for count in (17, 34):

@@ -59,7 +59,7 @@ def lip_after(point, steps: int) -> float:
     """Displacement of the lip after one period in time, from the cycle."""
     orbit, model = point.orbit, point.orbit.model
     motion, n = ValveMotion(model, Mu(density=orbit.mu["density"], alpha=0.0, beta=3e-3)), model.size
-    x, v = orbit.motion.at([0.0])[0], orbit.motion.rate([0.0])[0]
+    x, v, _ = (part[0] for part in orbit.motion.with_rates([0.0]))
     state = consistent_state(motion, 0.0, x[:n], v[:n], orbit.mu["inlet"], np.array([x[n]]))
     stepper = Stepper(motion, scheme("generalised-alpha"), lambda t: orbit.mu["inlet"])
     for _ in range(steps):

@@ -93,7 +93,7 @@ def test_special_points_of_the_part_before_are_told_to_the_branch(file):
         keeper.keep(SpecialCycle("fold", point, value, 0.0, True))
     told = []
     tracer = SimpleNamespace(next_step=0.01, points=[], known=[])
-    tracer.run = lambda report, step: told.extend(tracer.known) or Reason.POINTS()
+    tracer.run = lambda step: told.extend(tracer.known) or Reason.POINTS()
     keeper.follow(tracer)
     assert told == [("fold", 240.0), ("fold", 241.0)]
 
@@ -105,12 +105,12 @@ def made_cycle(size, value):
 def test_a_branch_that_turns_round_at_once_begins_with_its_smaller_cycles():
     """The second cycle lies nearer to the onset than the first; a value asked for lies nearer than both."""
     follower, taken, tracer = object.__new__(Follower), [], SimpleNamespace()
-    tracer.extend = lambda cycle, asked, *_: taken.append((cycle.mu["density"], asked))
+    tracer.extend = lambda cycle, *_: taken.append(cycle.mu["density"])
     vars(follower).update(name="density", parameter="density", lip=0, tracer=lambda *_: tracer)
     follower.from_onset = lambda _: (made_cycle(0.0, 240.0), made_cycle(1.0, 238.0), made_cycle(1.25, 239.0), False)
     follower.beside = lambda _onset, _first, value: made_cycle(0.5, value)
     _, missed = follower.begin(SimpleNamespace(value=240.0), [200.0, 239.5], None)
-    assert taken == [(239.5, True), (238.0, False), (239.0, False)]
+    assert taken == [239.5, 238.0, 239.0]
     assert len(missed) == 1 and "turns round beside the onset" in missed[0]
 
 

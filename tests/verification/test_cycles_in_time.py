@@ -38,7 +38,8 @@ def run(point, steps: int, size: float = 1.0, periods: int = PERIODS) -> np.ndar
     orbit, model = point.orbit, point.orbit.model
     motion, n = ValveMotion(model, Mu(density=orbit.mu["density"], alpha=0.0, beta=3e-3)), model.size
     mean = orbit.motion.coefficients[0]
-    x, v = mean + size * (orbit.motion.at([0.0])[0] - mean), size * orbit.motion.rate([0.0])[0]
+    x, v, _ = (part[0] for part in orbit.motion.with_rates([0.0]))
+    x, v = mean + size * (x - mean), size * v
     state = consistent_state(motion, 0.0, x[:n], v[:n], orbit.mu["inlet"], np.array([x[n]]))
     options = StepOptions(tolerance=1e-6)
     stepper = Stepper(motion, scheme("generalised-alpha"), lambda t: orbit.mu["inlet"], options)

@@ -18,6 +18,7 @@ from ...drawing.style import (
     colour_bar,
     headline,
     new_figure,
+    new_panel,
     parameter_label,
     phase_looks,
     pressure_colours,
@@ -106,8 +107,8 @@ def _mark_special(result: StudyResult, axes) -> None:
 
 def envelope(result: StudyResult) -> Figure:
     """Between which displacements the lip swings, and its mean."""
-    figure = new_figure(7.0, 4.4)
-    axes = figure.subplots()
+    label = parameter_label(result.case, result.parameter)
+    figure, axes = new_panel(7.0, 4.4, _title(result), label, "Displacement of one lip, mm")
     x = _values(result)
     low, high, mean = (
         1e3 * np.array([getattr(point, name) for point in result.points])
@@ -118,50 +119,37 @@ def envelope(result: StudyResult) -> Figure:
     axes.plot(x, high, ".-", color=COMPUTED, label="largest")
     axes.plot(x, mean, "--", color=REST, label="mean")
     axes.plot(x, low, ".-", color=ACCENT, label="least")
-    axes.set_xlabel(parameter_label(result.case, result.parameter))
-    axes.set_ylabel("Displacement of one lip, mm")
     axes.set_ylim(bottom=min(0.0, float(low.min())))
-    axes.set_title(_title(result), loc="left", fontweight="bold")
     axes.legend(loc="best")
     return figure
 
 
-def _some(result: StudyResult) -> list[Any]:
+def _some(result: StudyResult) -> Iterator[tuple[Any, np.ndarray, str]]:
+    """Some cycles, each with its colour and its label."""
     points = [point for point in result.points if point.asked] or list(result.points)
-    return [points[i] for i in np.unique(np.linspace(0, len(points) - 1, SHOWN).round().astype(int))]
+    shown = [points[i] for i in np.unique(np.linspace(0, len(points) - 1, SHOWN).round().astype(int))]
+    labels = [PARAMETERS[result.parameter].amount(point.value, 4) for point in shown]
+    return zip(shown, pressure_colours([point.value for point in shown]), labels)
 
 
 def phase_plane(result: StudyResult) -> Figure:
     """Orbits of some cycles in the plane of displacement and velocity of the lip."""
-    figure = new_figure(6.6, 5.2)
-    axes = figure.subplots()
-    shown = _some(result)
-    row = PARAMETERS[result.parameter]
-    for point, colour in zip(shown, pressure_colours([point.value for point in shown])):
-        lip, rate = (
-            np.append(point.orbit.lip, point.orbit.lip[0]),
-            np.append(point.orbit.lip_rate, point.orbit.lip_rate[0]),
-        )
+    figure, axes = new_panel(6.6, 5.2, _title(result), "Displacement of one lip, mm", "Its velocity, m/s")
+    for point, colour, label in _some(result):
+        lip, rate = (np.append(x, x[0]) for x in (point.orbit.lip, point.orbit.lip_rate))
         look = {"ls": "--"} if point.stable is False else {}
-        axes.plot(1e3 * lip, rate, color=colour, label=row.amount(point.value, 4), **look)
-    axes.set_xlabel("Displacement of one lip, mm")
-    axes.set_ylabel("Its velocity, m/s")
-    axes.set_title(_title(result), loc="left", fontweight="bold")
-    axes.legend(loc="center left", bbox_to_anchor=(1.0, 0.5), title=row.words, frameon=False)
+        axes.plot(1e3 * lip, rate, color=colour, label=label, **look)
+    axes.legend(loc="center left", bbox_to_anchor=(1.0, 0.5), title=PARAMETERS[result.parameter].words, frameon=False)
     return figure
 
 
 def centre_line(result: StudyResult) -> Figure:
     """The line x = 0 at instants of a period of the last cycle."""
     point = result.nearest()
-    figure = new_figure(7.4, 4.4)
-    axes = figure.subplots()
+    figure, axes = new_panel(7.4, 4.4, _at(result, point), "Distance from the lip z, mm", "Displacement in y, mm")
     z, line = 1e3 * result.mesh.z, point.orbit.centre_line
     for k, look in enumerate(phase_looks(INSTANTS)):
         axes.plot(z, 1e3 * line[k * len(line) // INSTANTS], lw=1.3, label=f"{k}/{INSTANTS}", **look)
-    axes.set_xlabel("Distance from the lip z, mm")
-    axes.set_ylabel("Displacement in y, mm")
-    axes.set_title(_at(result, point), loc="left", fontweight="bold")
     axes.legend(loc="center left", bbox_to_anchor=(1.0, 0.5), title="of a period", fontsize=8)
     return figure
 
@@ -170,8 +158,7 @@ def wave(result: StudyResult) -> Figure:
     """The motion of the line x = 0 about its mean over one period of the last cycle: a wave along the valve."""
     point = result.nearest()
     orbit = point.orbit
-    figure = new_figure(6.6, 4.4)
-    axes = figure.subplots()
+    figure, axes = new_panel(6.6, 4.4, _at(result, point), "Distance from the lip z, mm", "Time, ms")
     moved = 1e3 * (orbit.centre_line - orbit.centre_line.mean(axis=0))
     size = np.abs(moved).max()
     image = axes.pcolormesh(
@@ -185,28 +172,18 @@ def wave(result: StudyResult) -> Figure:
         rasterized=True,
     )
     colour_bar(figure, image, axes, "Displacement about the mean, mm")
-    axes.set_xlabel("Distance from the lip z, mm")
-    axes.set_ylabel("Time, ms")
     axes.grid(False)
-    axes.set_title(_at(result, point), loc="left", fontweight="bold")
     return figure
 
 
 def spectrum(result: StudyResult) -> Figure:
     """Harmonics of the displacement of the lip of some cycles."""
-    figure = new_figure(6.8, 4.4)
-    axes = figure.subplots()
-    shown = _some(result)
-    row = PARAMETERS[result.parameter]
-    for point, colour in zip(shown, pressure_colours([point.value for point in shown])):
+    figure, axes = new_panel(6.8, 4.4, _title(result), "Harmonic", "Amplitude of one lip, mm")
+    for point, colour, label in _some(result):
         parts = 1e3 * point.orbit.lip_harmonics[1:]
-        label = row.amount(point.value, 4)
         axes.semilogy(np.arange(1, len(parts) + 1), parts, "o-", ms=4, lw=1.0, color=colour, label=label)
-    axes.set_xlabel("Harmonic")
-    axes.set_ylabel("Amplitude of one lip, mm")
     axes.xaxis.get_major_locator().set_params(integer=True)
-    axes.set_title(_title(result), loc="left", fontweight="bold")
-    axes.legend(loc="center left", bbox_to_anchor=(1.0, 0.5), title=row.words)
+    axes.legend(loc="center left", bbox_to_anchor=(1.0, 0.5), title=PARAMETERS[result.parameter].words)
     return figure
 
 

@@ -286,7 +286,7 @@ def _from_onset(case: Case, walk: StabilityWalk, record: GrowingRecord) -> None:
     known = read_points(record, onset.place.for_system(), follower.name)
     if record.notes(STEP):
         first = next((point for point in known if not point.asked), known[0])
-        tracer = follower.tracer(axis.values, first.motion)
+        tracer = follower.tracer(axis.values, first.motion, keeper.keep)
         tracer.restore(known, follower.at_rest(onset))
     else:
         record.progress(f"first cycles, beside {axis.parameter} = {onset.value:.6g}")
@@ -314,10 +314,10 @@ def _from_file(case: Case, walk: StabilityWalk, record: GrowingRecord) -> None:
         known = read_points(record, given.place.for_system(), follower.name, leg)
         if not known:
             cycle = follower.near(given.motion, given.value)
-            tracer = follower.tracer(axis.values, cycle.motion)
-            tracer.extend(cycle, given.value in axis.values, keeper.keep)
+            tracer = follower.tracer(axis.values, cycle.motion, keeper.keep)
+            tracer.extend(cycle)
         else:
-            tracer = follower.tracer(axis.values, known[0].motion)
+            tracer = follower.tracer(axis.values, known[0].motion, keeper.keep)
             tracer.restore(known)
         if len(tracer.points) < 2:
             step = np.clip(end - given.value, -AWAY * (high - low), AWAY * (high - low))
@@ -327,7 +327,7 @@ def _from_file(case: Case, walk: StabilityWalk, record: GrowingRecord) -> None:
                 keeper.end(tracer, Reason.NO_CYCLE(why=error))
                 continue
             tracer.known = keeper.special()
-            tracer.extend(second, second.mu[follower.name] in axis.values, keeper.keep)
+            tracer.extend(second)
         keeper.follow(tracer)
 
 
@@ -351,7 +351,7 @@ class _Keeper:
         self._tracer, now = tracer, {"leg": self.leg, "cycles": self.record.rows(CYCLES)}
         steps = [note["step"] for note in self.record.notes(STEP) if now.items() <= note.items()]
         tracer.known = self.special()
-        self.end(tracer, tracer.run(self.keep, steps[-1] if steps else None))
+        self.end(tracer, tracer.run(steps[-1] if steps else None))
 
     def special(self) -> list[tuple[str, float]]:
         """Kinds and values of the special points that the record holds."""

@@ -114,7 +114,7 @@ def cycles_along(case: Case, plan: MapPlan, column: MapColumn, law: int, walk: S
             reasons.append(str(error))
             continue
         reasons += missed
-        reason = tracer.run(keep)
+        reason = tracer.run()
         if reason.kind is Reason.NO_CYCLE:
             at = PARAMETERS[plan.along.parameter].text(tracer.points[-1].value)
             reasons.append(f"at {at} the branch {reason}")

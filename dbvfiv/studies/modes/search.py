@@ -407,7 +407,7 @@ def run_modes(
         beyond = missing_pairs(
             pencil, certified.spectrum, basis, certified.count.line, replace(asked, max_frequency=None), workspace
         )
-        verdict = verdict.open_above(search.left_open(verdict.band, () if beyond is None else beyond.values))
+        verdict = verdict.open_above(search.left_open(verdict.band, () if beyond is None else beyond.eigenvalues))
     modes = _shapes(model, pencil, linear, certified.spectrum, symmetry, in_vacuo)
     grazing = _one_sided(model, state, pencil, asked, options.count) if symmetry.of_equilibria else {}
     notes = (*notes, *_contact_notes(model, state, linear, modes, symmetry), *_grazing_notes(model, grazing))

@@ -19,6 +19,7 @@ from ...drawing.style import (
     driven,
     headline,
     new_figure,
+    new_panel,
     phase_looks,
     style,
 )
@@ -170,8 +171,11 @@ def centre_line(result: StudyResult, count: int = 6) -> Figure:
     chosen = rows[
         np.unique(np.linspace(0, len(rows) - 1, count + 1).round().astype(int))[: count if result.cycle else None]
     ]
-    figure = new_figure(7.2, 4.4)
-    axes = figure.add_subplot()
+    period = "the last fifth of the run"
+    if result.cycle:
+        period = f"one cycle of {1e3 * (result.cycle[1] - result.cycle[0]):.3g} ms"
+    places = "Distance from the lip z, mm", "Displacement in y, mm"
+    figure, axes = new_panel(7.2, 4.4, f"Centre line over {period}", *places)
     z = 1e3 * result.mesh.z
     for row, look in zip(chosen, phase_looks(len(chosen))):
         after = 1e3 * (h["time"][row] - h["time"][rows[0]])
@@ -180,13 +184,6 @@ def centre_line(result: StudyResult, count: int = 6) -> Figure:
         z, 1e3 * h["centre_line"][rows].min(axis=0), 1e3 * h["centre_line"][rows].max(axis=0), color="0.9", zorder=0
     )
     axes.axhline(0.0, color=REST, lw=0.9)
-    axes.set(xlabel="Distance from the lip z, mm", ylabel="Displacement in y, mm")
-    period = (
-        f"one cycle of {1e3 * (result.cycle[1] - result.cycle[0]):.3g} ms"
-        if result.cycle
-        else "the last fifth of the run"
-    )
-    axes.set_title(f"Centre line over {period}", loc="left", fontweight="bold")
     axes.set_xlim(0, z[-1])
     axes.legend(loc="upper left", bbox_to_anchor=(1.01, 1.0), title="after")
     return figure
@@ -195,8 +192,8 @@ def centre_line(result: StudyResult, count: int = 6) -> Figure:
 def phase_portrait(result: StudyResult) -> Figure:
     """Velocity of the lip over its opening; the last cycles stand out."""
     h = result.history
-    figure = new_figure(6.0, 4.6)
-    axes = figure.add_subplot()
+    plane = "Clear lip opening, mm", "Velocity of one lip, m/s"
+    figure, axes = new_panel(6.0, 4.6, "Phase portrait of the lip", *plane)
     x, v = 1e3 * h["lip_opening"], h["lip_velocity"]
     axes.plot(x, v, color="0.6", lw=0.7, label="whole run")
     rows = _cycle_rows(result)
@@ -205,8 +202,6 @@ def phase_portrait(result: StudyResult) -> Figure:
     )  # a cycle is no whole number of steps: one more closes the loop
     axes.plot(x[rows], v[rows], color=COMPUTED, lw=1.8, label="last cycle" if result.cycle else "last fifth of the run")
     axes.plot(x[0], v[0], "o", color=ACCENT, label="start")
-    axes.set(xlabel="Clear lip opening, mm", ylabel="Velocity of one lip, m/s")
-    axes.set_title("Phase portrait of the lip", loc="left", fontweight="bold")
     axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.14), ncols=3)
     return figure
 
@@ -274,16 +269,13 @@ def _space_time(result: StudyResult, name: str, factor: float, label: str, headi
     rows = np.flatnonzero(t >= start)
     rows = rows[:: max(1, len(rows) // 1500)]
     values = factor * h[name][rows].T
-    figure = new_figure(7.6, 4.2)
-    axes = figure.add_subplot()
+    figure, axes = new_panel(7.6, 4.2, heading, "Time, s", "Distance from the lip z, mm")
     # single spikes must not take the whole range; what lies beyond is said
     low, high = np.percentile(values, [0.5, 99.5])
     low, high = (low, high) if high > low else (low - 0.5, low + 0.5)
     look = {"vmin": low, "vmax": high, "cmap": MAGNITUDE, "shading": "nearest", "rasterized": True}
     drawn = axes.pcolormesh(t[rows], 1e3 * result.mesh.z, values, **look)
     axes.grid(False)
-    axes.set(xlabel="Time, s", ylabel="Distance from the lip z, mm")
-    axes.set_title(heading, loc="left", fontweight="bold")
     margin = 0.01 * (high - low)
     beyond = (values.min() < low - margin, values.max() > high + margin)
     if any(beyond):

@@ -22,7 +22,7 @@ from ...record.files import Header, kind_of
 from ...record.mesh import MeshData
 from ...record.record import GrowingRecord, Record, StoredRecord
 from ...record.states import state_table
-from ...verdict import JudgeOptions, Shuttings, Verdict, judge
+from ...verdict import Shuttings, Verdict, judge
 from ..case import Case
 from .history import HISTORY, STATES, Keeper, Progress, Reader, pumped_flow, supplied_pressure, tables_of
 
@@ -101,13 +101,7 @@ class RunVerdict:
 _LIVELINESS = ("closed", "steady", "decaying", "limit cycle", "growing", "undecided", "irregular", "chatters")
 
 
-def assess(
-    history: Columns,
-    model: ValveModel,
-    residual: float = np.nan,
-    options: JudgeOptions = JudgeOptions(),
-    since: float = 0.0,
-) -> RunVerdict:
+def assess(history: Columns, model: ValveModel, residual: float = np.nan, since: float = 0.0) -> RunVerdict:
     """Verdict on a history.
 
     A valve is closed where its lips are shut and nothing flows, see `openness`. Faces that part and meet again and
@@ -127,17 +121,16 @@ def assess(
     chosen = time >= since
     known = residual if np.isfinite(residual) else None
     signals = ("mass_flow", "lip_displacement", "lip_opening")
-    found = [judge(time[chosen], history[name][chosen], options, residual=known) for name in signals]
-    given = time[chosen], openness(history, model)[chosen], options
+    found = [judge(time[chosen], history[name][chosen], residual=known) for name in signals]
     chatter: dict[str, Any] = {}
-    if judge(*given, closed_below=1.0).name == "closed":
+    if judge(time[chosen], openness(history, model)[chosen], closed_below=1.0).name == "closed":
         reason = "Its lips are shut, and nothing flows."
         found = [replace(v, name="closed", decided=True, reason=reason) for v in found]
     elif model.contact is not None:
         parted = parting(history, model)[chosen]
         shuttings = Shuttings.of(time[chosen], parted, 1.0)
         if shuttings.chatters:
-            opens = judge(time[chosen], parted, options, closed_below=1.0)
+            opens = judge(time[chosen], parted, closed_below=1.0)
             signals = (history[name][chosen] for name in ("lip_opening", "lip_velocity", "mass_flow"))
             chatter = shuttings.evidence(time[chosen], *signals)
             told = {name: getattr(opens, name) for name in ("decided", "reason", "period", "cycles")}
@@ -342,12 +335,12 @@ class Runner:
         """
         self._begin(0)
         inlet = self.drive(0.0)
-        state, kick = (first, None) if first is not None else self._first(inlet)
+        state, eigenvalue = (first, None) if first is not None else self._first(inlet)
         energy = sum(self.motion.energies(state.q, state.v)) + self.motion.outside_energy(state.q, state.v)
         energy += self.model.weight_energy(state.q)
         self.progress = progress = Progress(state, energy=energy, control=tuple(self.control.pack()))
-        if kick is not None:
-            progress.eigenvalue = kick.eigenvalue
+        if eigenvalue is not None:
+            progress.eigenvalue = eigenvalue
             self._judge_rubber(state, inlet)
         row = self._reader.first(progress, inlet)
         self.history.append(row)
@@ -393,7 +386,8 @@ class Runner:
 
     def _go(self) -> Runner:
         progress, every = self.progress, self.options.judge_every
-        judged, before = _next_verdict(progress.steps, every), self._certain_before()
+        _, judged = _verdicts_beside(progress.steps, every)
+        before = self._certain_before()
         try:
             while not self.stopped and progress.state.time < self.options.end:
                 self._step()
@@ -404,7 +398,7 @@ class Runner:
                     verdict = self._judge()
                     certain = verdict.name if verdict.decided else ""
                     self.stopped = bool(certain) and certain in self.options.stop_when and certain == before
-                    before, judged = certain, _next_verdict(progress.steps, every)
+                    before, (_, judged) = certain, _verdicts_beside(progress.steps, every)
         except StepFailure as failure:
             smallest = self.options.control.step * self.options.control.smallest
             self._fail(
@@ -430,7 +424,7 @@ class Runner:
     def _certain_before(self) -> str:
         """The certain verdict that a run had before it goes on, as the same once more may end it."""
         steps = self.progress.steps
-        due = _last_verdict(steps, self.options.judge_every)
+        due, _ = _verdicts_beside(steps, self.options.judge_every)
         found = [note for note in self.record.notes("verdict") if note["steps"] == due > 0]
         if not found and due == steps > 0:  # ended before it was judged
             found = [self._judge().summary()]
@@ -497,17 +491,11 @@ class Runner:
         )
 
 
-def _next_verdict(steps: int, every: int) -> int:
-    """Number of the step after which the next verdict is due; the same sequence wherever a run was resumed."""
-    due = every
-    while due <= steps:
-        due = max(due + every, int(1.05 * due))
-    return due
-
-
-def _last_verdict(steps: int, every: int) -> int:
-    """Number of the step of the last verdict that was due up to a number of steps; 0 without one."""
+def _verdicts_beside(steps: int, every: int) -> tuple[int, int]:
+    """Numbers of the steps after which the last verdict was due, 0 without one, and the next one will be; the same
+    sequence wherever a run was resumed.
+    """
     last, due = 0, every
     while due <= steps:
         last, due = due, max(due + every, int(1.05 * due))
-    return last
+    return last, due
