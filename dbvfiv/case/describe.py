@@ -25,7 +25,7 @@ from ..errors import CaseError
 from .axis import FORM
 from .damping import Relaxing
 from .materials import KINDS, Materials
-from .quantity import DIMENSION, Quantity
+from .quantity import A_DIMENSION, DIMENSION, Quantity
 from .section import Described, Section, mark_of
 
 
@@ -189,17 +189,13 @@ def allowed_words(field: FieldInfo) -> str:
         return f"a list of {some} {noun}, each {each}" if some else f"a list of {noun}s"
     bounds = _bounds(_limits(field.metadata), quantity)
     if quantity:
-        noun = _article(DIMENSION[quantity.si]) if quantity.si else "a number"
+        noun = A_DIMENSION[quantity.si] if quantity.si else "a number"
         return f"{noun} {bounds}".strip()
     if kind == "integer":
         return f"an integer {bounds}".strip()
     if _strip_none(field.annotation) is str and mark_of(field, AfterValidator):
         return FORM
     return "a text that is not empty"
-
-
-def _article(noun: str) -> str:
-    return f"an {noun}" if noun[0] in "aeiou" else f"a {noun}"
 
 
 def describe_field(key: str, field: FieldInfo) -> KeyInfo:
@@ -311,7 +307,7 @@ def explain(model: type[Section], key: str | None = None) -> list[KeyInfo]:
         near += difflib.get_close_matches(plain, [_plain(i.key) for i in infos], n=1, cutoff=0.0)
         shown = " ".join(key.split())[:60]
         raise CaseError(f"{shown!r} is not a key of the case file; the nearest valid key is {near[0]}.", key=key)
-    return _unique(found)
+    return list({f.key: f for f in found}.values())
 
 
 @cache
@@ -319,10 +315,6 @@ def _plain(key: str) -> str:
     """Drop indices, and write ``materials.NAME(kind)`` as ``materials.kind``."""
     key = re.sub(r"\[\d*\]|\.\d+(?=\.|$)", "", key.strip())
     return re.sub(r"NAME\(([a-z-]+)\)", r"\1", key)
-
-
-def _unique(found: list[KeyInfo]) -> list[KeyInfo]:
-    return list({f.key: f for f in found}.values())
 
 
 def explanation_text(infos: list[KeyInfo]) -> str:

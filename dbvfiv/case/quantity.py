@@ -51,7 +51,7 @@ DIMENSION = {
     "J/m^2": "energy per area",
     "": "plain number",
 }
-_A = {si: f"{'an' if name[0] in 'aeiou' else 'a'} {name}" for si, name in DIMENSION.items()}
+A_DIMENSION = {si: f"{'an' if name[0] in 'aeiou' else 'a'} {name}" for si, name in DIMENSION.items()}
 
 
 @cache
@@ -140,10 +140,10 @@ def _to_si(text: str, si: str) -> float:
             return value
         raise ValueError("which has no unit")
     if _angle_like(unit) != (si == "deg"):
-        raise ValueError(f"which is not {_A[si]}")
+        raise ValueError(f"which is not {A_DIMENSION[si]}")
     factor = _factor(unit, si)
     if factor is None:
-        raise ValueError(f"which is not {_A[si]}")
+        raise ValueError(f"which is not {A_DIMENSION[si]}")
     # 15 digits: "6.19 mm" is to be the same float as 0.00619
     return value if factor == 1.0 else float(f"{value * factor:.15g}")
 

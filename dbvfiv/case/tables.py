@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import math
 import re
+from collections.abc import Callable
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -63,29 +64,37 @@ def cells_of(line: str, head: str = "") -> list[str]:
     return [cell if mark == "," else _DECIMAL_COMMA.sub(r"\1.\2", cell) for cell in cells]
 
 
-def existing_file(path: Path, info: ValidationInfo) -> Path:
-    """Full name of a file that a key names; as it is where files are not to be looked for.
-
-    Raises
-    ------
-    ValueError
-        With a clause that completes "key is given as FILE, ...".
-    """
-    context = info.context or {}
-    if not context.get("check_files", True):
-        return path
-    path = Path(context.get("folder", ".")) / path
+def _require_file(path: Path) -> None:
     try:
         found = path.is_file()
     except (OSError, ValueError):  # a name too long, or with a null byte in it
         found = False
     if not found:
         raise ValueError("which does not exist" if not str(path).endswith("/") else "which is not a file")
-    return path.resolve()
+
+
+def readable_file(read: Callable[[Path], object] = _require_file) -> AfterValidator:
+    """Validator of a key that names a file: it is tried, and gets its full name, but where files are not looked for.
+
+    Parameters
+    ----------
+    read : callable
+        Raises ValueError with a clause that completes "key is given as FILE, ...".
+    """
+
+    def check(path: Path, info: ValidationInfo) -> Path:
+        context = info.context or {}
+        if not context.get("check_files", True):
+            return path
+        path = Path(context.get("folder", ".")) / path
+        read(path)
+        return path.resolve()
+
+    return AfterValidator(check)
 
 
 #: A key that names a file, which is looked for.
-ExistingFile = Annotated[Path, AfterValidator(existing_file)]
+ExistingFile = Annotated[Path, readable_file()]
 
 _TIME, _PRESSURE = Quantity("s", "s"), Quantity("Pa", "kPa", head=True)
 _UNIT = re.compile(r"[\[(]\s*([^\])]+?)\s*[\])]")

@@ -7,12 +7,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import PrivateAttr, ValidationInfo, field_validator, model_validator
+from pydantic import PrivateAttr, model_validator
 
 from .key_points import is_whole, read_key_points, readable_key_points
 from .parameters import PARAMETERS
 from .quantity import Length, LineForce, Number, Pressure, Quantity
 from .section import BrokenRule, FollowingSection, key
+from .tables import readable_file
 from .wall import WallPatch, WallStep, edges_of, multiplied
 
 #: Turns of a bow, rad, below which it is straight, and below which its area is taken from the series.
@@ -425,7 +426,7 @@ class Valve(FollowingSection):
         ge=0,
         le=10,
     )
-    key_points: Path | None = key(
+    key_points: Annotated[Path, readable_file(read_key_points)] | None = key(
         None,
         "File of mid-surface key points, any number of profiles and points, used instead of lip_half_width, lip_rise, "
         "lip_radius, cuff_radius, flange_radius and saddle: a table of x, y and z with units (profile, x [mm], y [mm], "
@@ -522,16 +523,6 @@ class Valve(FollowingSection):
         has_cuff = self.key_points is None and self.cuff_length + self.flare_length > 0
         cuff = 2 * self.cuff_radius + self.thickness_at(self.length) if has_cuff else 0
         return max(flange, cuff, self.bill_width)
-
-    @field_validator("key_points", mode="after")
-    @classmethod
-    def _find_key_points(cls, path: Path | None, info: ValidationInfo) -> Path | None:
-        context = info.context or {}
-        if path is None or not context.get("check_files", True):
-            return path
-        path = Path(context.get("folder", ".")) / path
-        read_key_points(path)
-        return path.resolve()
 
     def _follow_wall_and_shape(self) -> None:
         """Numbers for the keys that were not given."""

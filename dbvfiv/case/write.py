@@ -5,6 +5,7 @@ from __future__ import annotations
 import textwrap
 import typing
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Any
 
 from .. import __version__
@@ -66,6 +67,12 @@ def case_toml(case: Section, comments: bool = True, about: str = "") -> str:
             if comments:
                 parts.append(OWN_MATERIAL.rstrip("\n"))
     return "\n".join(parts) + "\n"
+
+
+def write_case(case: Section, path: Path) -> None:
+    """Write a case without comments into a file, whose folder is made where there is none."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_text(case_toml(case, comments=False) + "\n")
 
 
 def _defaults_said(case: Section) -> str:

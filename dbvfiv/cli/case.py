@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from ..errors import CaseError
-from .terminal import AsJson, Override, in_units, print_json
+from .terminal import AsJson, Override, in_units, print_either, print_json
 
 
 def case(
@@ -72,10 +72,7 @@ def _print_inputs(case, as_json: bool) -> None:
     from ..studies.inputs import inputs_of
 
     inputs = inputs_of(case)
-    if as_json:
-        print_json({"inputs": [one.summary() for one in inputs]})
-    else:
-        print("\n".join(one.words() for one in inputs))
+    print_either({"inputs": [one.summary() for one in inputs]}, (one.words() for one in inputs), as_json)
 
 
 def _check(case, name: str) -> None:
@@ -144,12 +141,9 @@ def _explain_keys(key: str | None, as_json: bool) -> None:
         return default.model_dump(mode="json") if isinstance(default, Section) else default
 
     found = explain(Case, key)
-    if as_json:
-        names = ("key", "type", "unit", "default", "required", "allowed", "description")
-        rows = [{name: getattr(info, name) for name in names} | {"default": plain(info.default)} for info in found]
-        print_json({"keys": rows})
-    else:
-        print(explanation_text(found))
+    names = ("key", "type", "unit", "default", "required", "allowed", "description")
+    rows = [{name: getattr(info, name) for name in names} | {"default": plain(info.default)} for info in found]
+    print_either({"keys": rows}, [explanation_text(found)], as_json)
 
 
 def _write_new(target: str | None, overrides: list[str] | None, as_json: bool) -> None:
@@ -160,10 +154,7 @@ def _write_new(target: str | None, overrides: list[str] | None, as_json: bool) -
     if target is None:
         raise CaseError("--new needs the name of the file to write, such as my.toml.")
     _write(target, case_toml(load_case(None, overrides or ()), comments=True))
-    if as_json:
-        print_json({"written": target})
-    else:
-        print(f"Wrote {target}; check it with `dbvfiv case {target}`.")
+    print_either({"written": target}, [f"Wrote {target}; check it with `dbvfiv case {target}`."], as_json)
 
 
 def _write_key_points(valve, file: Path, points: int, profiles: int, as_json: bool) -> None:
@@ -173,13 +164,8 @@ def _write_key_points(valve, file: Path, points: int, profiles: int, as_json: bo
     _write(str(file), key_point_table(valve, points, profiles))
     instead = ("lip_half_width", "lip_rise", "lip_radius", "cuff_radius", "flange_radius", "saddle")
     smooth = ', key_point_skin = "smooth"' if valve.saddle == "smooth" else ""
-    if as_json:
-        print_json({"written": str(file)})
-    else:
-        print(
-            f'Wrote {file}; edit it and give key_points = "{file.name}"{smooth} in [valve] in place of '
-            f"{', '.join(instead)}."
-        )
+    told = f'Wrote {file}; edit it and give key_points = "{file.name}"{smooth} in [valve] in place of '
+    print_either({"written": str(file)}, [f"{told}{', '.join(instead)}."], as_json)
 
 
 def _write(target: str, text: str) -> None:
@@ -199,9 +185,6 @@ def doctor(as_json: AsJson = False) -> None:
     from ..doctor import examine
 
     report = examine()
-    if as_json:
-        print_json(report.to_dict())
-    else:
-        print("\n".join(report.lines()))
+    print_either(report.to_dict(), report.lines(), as_json)
     if not report.healthy:
         raise typer.Exit(1)

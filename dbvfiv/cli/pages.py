@@ -11,7 +11,7 @@ import typer
 
 from ..errors import CaseError, SolveError
 from ..observer import Progress
-from .terminal import AsJson, CaseFile, Override, in_units, print_json
+from .terminal import AsJson, CaseFile, Override, in_units, print_either, print_json
 
 
 def report(
@@ -121,10 +121,8 @@ def reproduce(
 
     chosen = choose_entries(figures or ())
     if listing:
-        if as_json:
-            print_json({"entries": [{"name": e.name, "label": e.label, "title": e.title} for e in chosen]})
-        else:
-            print("\n".join(f"{e.name:>5}  {e.label}: {e.title}" for e in chosen))
+        entries = [{"name": e.name, "label": e.label, "title": e.title} for e in chosen]
+        print_either({"entries": entries}, (f"{e.name:>5}  {e.label}: {e.title}" for e in chosen), as_json)
         return
     workshop = Workshop(folder / ("quick" if quick else "full"), quick, Progress(quiet=as_json))
     page = folder / f"thesis{'-quick' if quick else ''}.html"

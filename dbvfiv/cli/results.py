@@ -19,6 +19,7 @@ from .terminal import (
     PlotFolder,
     ResultFile,
     print_answer,
+    print_either,
     print_json,
     print_written,
     save_figures,
@@ -218,11 +219,9 @@ def compare(
             )
     found = find_study(kind).compare(results)
     path = save_figure(found.draw, output)
-    if as_json:
-        runs = [{"file": str(f), "label": n} | r.summary() for f, n, r in zip(files, found.labels, results)]
-        print_json({"runs": runs, **found.document(), "figure": str(path)})
-        return
-    print("\n".join([*found.lines(), f"Wrote {path}."]))
+    told = zip(files, found.labels, results) if as_json else ()  # summaries read whole files
+    runs = [{"file": str(file), "label": name} | result.summary() for file, name, result in told]
+    print_either({"runs": runs, **found.document(), "figure": str(path)}, [*found.lines(), f"Wrote {path}."], as_json)
 
 
 def _recognise(files: list[Path], columns: Sequence[str], within: float) -> Recognition:
@@ -415,8 +414,9 @@ def cfd(
     case = FlowCase(result.header.name, result.mesh, state, density, width, fineness, iterations, viscosity)
     case.write(folder)
     if not run:
-        written = {"written": str(folder), "cells": len(case.cells.cells)}
-        print_json(written) if as_json else print(f"Wrote {folder}: {written['cells']} cells; run Allrun in it.")
+        count = len(case.cells.cells)
+        told = f"Wrote {folder}: {count} cells; run Allrun in it."
+        print_either({"written": str(folder), "cells": count}, [told], as_json)
         return
     run_openfoam(folder, iterations, Progress(quiet=as_json))
     published = is_published(result.case)
@@ -530,13 +530,8 @@ def verdict(
     else:
         judged = judge_file(file, reading, options, closed_below)
     figures = [] if plots is None else save_signals(plots, judged)
-    if as_json:
-        print_json({"signals": [each.summary() for each in judged]})
-        return
-    for each in judged:
-        print("\n".join(each.lines()))
-    for figure in figures:
-        print(f"Wrote {figure}.")
+    lines = [line for each in judged for line in each.lines()] + [f"Wrote {figure}." for figure in figures]
+    print_either({"signals": [each.summary() for each in judged]}, lines, as_json)
 
 
 def _signals_of_run(file: Path, columns: list[str] | None) -> list[Signal]:

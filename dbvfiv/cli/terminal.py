@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import sys
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Annotated, Any
@@ -81,6 +81,14 @@ def print_json(document: Any) -> None:
     sys.stdout.write("\n")
 
 
+def print_either(document: Any, lines: Iterable[str], as_json: bool) -> None:
+    """Print a JSON document, or lines for people."""
+    if as_json:
+        print_json(document)
+    else:
+        print("\n".join(lines))
+
+
 def print_answer(
     document: Mapping[str, Any],
     lines: Callable[[], Sequence[str]],
@@ -121,11 +129,8 @@ def print_figures(figures: Sequence[Path], folder: Path | None) -> None:
 def print_written(written: Path | Sequence[Path], as_json: bool) -> None:
     """Print the names of the files that a command has written."""
     paths = [written] if isinstance(written, Path) else written
-    if as_json:
-        names = [str(path) for path in paths]
-        print_json({"written": names[0] if isinstance(written, Path) else names})
-    else:
-        print("\n".join(f"Wrote {path}." for path in paths))
+    names = str(written) if isinstance(written, Path) else [str(path) for path in paths]
+    print_either({"written": names}, (f"Wrote {path}." for path in paths), as_json)
 
 
 def save_figures(drawers: Mapping[str, Callable[[], Any]], folder: Path | None) -> list[Path]:

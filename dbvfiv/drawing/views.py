@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Any
 
 import matplotlib
@@ -207,10 +207,13 @@ def unrolled(mesh: MeshData) -> tuple[np.ndarray, np.ndarray]:
     return arc - arc[:, middle : middle + 1], points[:, :, 2]
 
 
-def draw_deformed(result: Any, pressure: float | None = None) -> Iterator[tuple[str, Callable[[], Figure]]]:
-    """Figures of a steady result, each with its name; of the highest pressure unless another is chosen."""
+def draw_chosen(
+    result: Any, pressure: float | None, figures: Mapping[str, Callable[[Any], Figure]]
+) -> Iterator[tuple[str, Callable[[], Figure]]]:
+    """Figures of a state of a result, each with its name; of the highest pressure unless another is chosen."""
     state = result.nearest(pressure if pressure is not None else max(s.pressure for s in result.states))
-    yield "deformed", lambda: deformed(state)
+    for name, figure in figures.items():
+        yield name, partial(figure, state)
 
 
 def deformed(state: Any) -> Figure:
@@ -237,12 +240,6 @@ def deformed(state: Any) -> Figure:
         f"at (x, y, z) = ({x:.0f}, ±{abs(y):.0f}, {z:.0f}) mm",
     )
     return figure
-
-
-def draw_layers(result: Any, pressure: float | None = None) -> Iterator[tuple[str, Callable[[], Figure]]]:
-    """Figures of a steady result, each with its name; of the highest pressure unless another is chosen."""
-    state = result.nearest(pressure if pressure is not None else max(s.pressure for s in result.states))
-    yield "layer-stress", lambda: layer_stress(state)
 
 
 def layer_stress(state: Any) -> Figure:

@@ -35,7 +35,7 @@ import numpy as np
 
 from .channel import AroundChannel, Channel
 from .energy import GAS_BOOKS, gas_books, gas_energy, gas_powers
-from .law import FlowParameter, above_floor
+from .law import FlowParameter, above_floor, newton_step
 
 #: Relative error of the frequency of waves that counts as resolved; the box scheme's is (k h)^2/12.
 _RESOLVED = 0.01
@@ -388,8 +388,7 @@ def _left(law: GasChannel, area, parameters, inner, drive=None):
 
 
 def _newton_step(law: GasChannel, area, parameters, inner, drive=None):
-    left = lambda x: _left(law, area, parameters, x, drive)  # noqa: E731
-    return -jnp.linalg.solve(jax.jacfwd(left)(inner), left(inner))
+    return newton_step(lambda x: _left(law, area, parameters, x, drive), inner)
 
 
 def _settling_step(law: GasChannel, area, parameters, inner):

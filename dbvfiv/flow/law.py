@@ -333,7 +333,7 @@ class FlowLaw(Traceable, ABC):
         """Pressures (m,), Pa, of steady flow driven by the inlet pressure, Pa; independent of the density of a fluid
         without viscosity.
         """
-        return np.asarray(_steady(self, area, self._driven(inlet))[0])
+        return np.asarray(call_compiled("steady", self, area, self._driven(inlet))[0])
 
     def steady_operator(self, area: np.ndarray, inlet: float) -> tuple[np.ndarray, np.ndarray]:
         """Steady pressures (m,) and their derivative (m, m) with respect to the areas."""
@@ -356,7 +356,7 @@ class FlowLaw(Traceable, ABC):
 
     def steady_inner(self, area: np.ndarray, given: Mapping[str, float]) -> np.ndarray:
         """Inner unknowns (l,) of the steady flow under given parameters."""
-        return np.asarray(_steady(self, area, self.values(given))[1])
+        return np.asarray(call_compiled("steady", self, area, self.values(given))[1])
 
     def still(self, area: np.ndarray, given: Mapping[str, float]) -> np.ndarray:
         """Inner unknowns of the fluid at rest, (l,), or one velocity where there are none."""
@@ -421,7 +421,7 @@ class FlowLaw(Traceable, ABC):
 
     def evaluate(self, motion: FlowMotion, given: Mapping[str, float]) -> tuple[np.ndarray, np.ndarray]:
         """Pressures (m,) and residuals (l,) of `equations`, as numpy arrays."""
-        pressure, residual = _equations(self, self._shaped(motion), self.values(given))
+        pressure, residual = call_compiled("equations", self, self._shaped(motion), self.values(given))
         return np.array(pressure), np.array(residual)
 
     def linearise(self, motion: FlowMotion, given: Mapping[str, float]) -> FluidOperators:
@@ -451,10 +451,10 @@ def along(function, *directions):
     return function
 
 
-@jax.jit
-def _equations(law, motion, parameters):
-    """Pressures (m,) and residuals (l,)."""
-    return law.equations(motion, parameters)
+@partial(jax.jit, static_argnums=0)
+def call_compiled(method: str, law, *given):
+    """Answer of a method of a law, compiled for each kind of law and number of stations."""
+    return getattr(law, method)(*given)
 
 
 @jax.jit
@@ -462,12 +462,6 @@ def _linearised(law, motion, parameters):
     """A0, A1, A2, B0, B1, R0, R1, R2, S0, S1 of `dbvfiv.flow.law.FluidOperators`."""
     pressure, residual = jax.jacfwd(lambda m: law.equations(m, parameters))(motion)
     return (*pressure, *residual)
-
-
-@jax.jit
-def _steady(law, area, parameters):
-    """Steady pressures (m,) and inner unknowns (l,)."""
-    return law.steady(area, parameters)
 
 
 @jax.jit
@@ -498,9 +492,13 @@ def solve_steady(law, area, parameters):
     return law.at_rest(area, inner, parameters)[0], inner
 
 
+def newton_step(function, at):
+    """Step of Newton's method from a place (l,) towards a zero (l,) of a function; traceable."""
+    return -jnp.linalg.solve(jax.jacfwd(function)(at), function(at))
+
+
 def _newton_step(law, area, parameters, inner):
-    equations = lambda x: law.at_rest(area, x, parameters)[1]  # noqa: E731
-    return -jnp.linalg.solve(jax.jacfwd(equations)(inner), equations(inner))
+    return newton_step(lambda x: law.at_rest(area, x, parameters)[1], inner)
 
 
 def _root(law, area, parameters):

@@ -39,7 +39,7 @@ import numpy as np
 
 from ..errors import SolveError
 from .energy import GAS_BOOKS, LINE_BOOKS, BookStep, Instant
-from .law import FlowLaw, FlowMotion
+from .law import FlowLaw, FlowMotion, call_compiled, newton_step
 
 #: Newton steps within which the flow of a step must be found, and the size of the last one, relative and absolute; what
 #: rounding may leave of it, where steps no longer fall.
@@ -252,7 +252,7 @@ class MovingFluid:
 
     def speeds(self, area, area_rate, inner) -> np.ndarray:
         """Speeds (m,) at the stations, m/s."""
-        return np.array(_speeds(self.traced, self.parameters(0.0), area, area_rate, inner))
+        return np.array(call_compiled("speeds_of", self.traced, area, area_rate, inner, self.parameters(0.0)))
 
     def operators(self, area, area_rate, inner, inlet: float):
         """`sources` (m + l,) and derivatives of `held` by areas, rates (m + l, m) and unknowns (m + l, l), all in Pa
@@ -282,12 +282,12 @@ class MovingFluid:
         """Energies of the fluid by name, J of the part."""
         if not self.law.energy_names:
             return {}
-        found = _energies(self.traced, self.parameters(0.0), area, inner)
+        found = call_compiled("energies", self.traced, area, inner, self.parameters(0.0))
         return dict(zip(self.law.energy_names, map(float, found), strict=True))
 
     def readings(self, area, inner) -> tuple[float, float, float]:
         """Mass flows at outlet and inlet, kg/s of the part, and the largest Mach number, of a compressed fluid."""
-        return tuple(float(x) for x in _readings(self.traced, self.parameters(0.0), area, inner))
+        return tuple(map(float, call_compiled("readings", self.traced, area, inner, self.parameters(0.0))))
 
 
 class FluidStep:
@@ -326,7 +326,7 @@ class FluidStep:
         if fluid.law.book_names:
             end = Instant(flow.area, flow.area_rate, flow.inner, flow.held, rate, old.carried)
             step = BookStep(old.instant, end, self.h, self.theta, self.rate)
-            gained, carried = map(np.asarray, _books(fluid.traced, self.parameters, step))
+            gained, carried = map(np.asarray, call_compiled("step_books", fluid.traced, step, self.parameters))
             books = books + gained
         after = fluid.facing(flow.area, flow.speed, self.inlet)
         if after is fluid:
@@ -457,9 +457,7 @@ def _advanced(law, parameters, mid, new, old, theta, weight, known, start):
 
 def _newton(residual, start):
     """Zero (l,) by Newton's method, a step halved as long as the next one by it is longer."""
-
-    def step_at(inner):
-        return -jnp.linalg.solve(jax.jacfwd(residual)(inner), residual(inner))
+    step_at = partial(newton_step, residual)
 
     def longer(tried):
         fraction, inner, step, _, after = tried
@@ -554,23 +552,3 @@ def _first(law, parameters, motion):
     speed, faster = jax.jvp(speeds, (area, rate, inner), (rate, acceleration, inner_rate))
     held = law.held(area, rate, inner, parameters)
     return held, law.scales(area, parameters), speed, jnp.zeros_like(speed) if law.compressed else faster, carried
-
-
-@jax.jit
-def _speeds(law, parameters, area, area_rate, inner):
-    return law.speeds_of(area, area_rate, inner, parameters)
-
-
-@jax.jit
-def _books(law, parameters, step):
-    return law.step_books(step, parameters)
-
-
-@jax.jit
-def _energies(law, parameters, area, inner):
-    return law.energies(area, inner, parameters)
-
-
-@jax.jit
-def _readings(law, parameters, area, inner):
-    return law.readings(area, inner, parameters)

@@ -46,9 +46,12 @@ class Surface:
         ValueError
             If two profiles lie at one place.
         """
-        i, share = self._piece(z)
-        xy = (1 - share) * self.profiles[i].points(s) + share * self.profiles[i + 1].points(s)
+        xy = self._through(z, s)
         return np.column_stack([xy, np.full(len(xy), z)])
+
+    def _through(self, z: float, s: np.ndarray) -> np.ndarray:
+        i, share = self._piece(z)
+        return (1 - share) * self.profiles[i].points(s) + share * self.profiles[i + 1].points(s)
 
     def _piece(self, z: float) -> tuple[int, float]:
         """Number of the profile before an axial position, and the weight of that after it."""
@@ -96,16 +99,11 @@ class SmoothSurface(Surface):
         """Axial positions of the ends, m; between them the surface has no joints."""
         return np.array([self.profiles[0].z, self.profiles[-1].z])
 
-    def section(self, z: float, s: np.ndarray) -> np.ndarray:
-        """Points (k, 3) of the section at the axial position z, normalised arc lengths s (k,)."""
-        xy = self._through(z, np.asarray(s, float))
-        return np.column_stack([xy, np.full(len(xy), z)])
-
     def _polygon(self, z: float) -> np.ndarray:
         return self._through(z, self._many())
 
     def _through(self, z: float, s: np.ndarray) -> np.ndarray:
-        return self._curve(s.tobytes())(np.clip(z, *self.breaks))
+        return self._curve(np.asarray(s, float).tobytes())(np.clip(z, *self.breaks))
 
     @lru_cache(maxsize=8)  # noqa: B019
     def _curve(self, s: bytes) -> PchipInterpolator:

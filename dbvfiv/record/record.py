@@ -20,6 +20,7 @@ import json
 import os
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Mapping
+from contextlib import AbstractContextManager
 from dataclasses import replace
 from importlib import import_module
 from pathlib import Path
@@ -49,7 +50,7 @@ from .table import MARK, TableSpec, pack_documents, read_column, read_rows
 _SPARE = 384 * 1024
 
 
-class Journal:
+class Journal(AbstractContextManager):
     """A result file open for writing; a context manager.
 
     Parameters
@@ -168,9 +169,6 @@ class Journal:
             self._file = None
             self._lock.release()
 
-    def __enter__(self) -> Journal:
-        return self
-
     def __exit__(self, *error: object) -> None:
         self.close()
 
@@ -219,6 +217,7 @@ class Record(ABC):
     header: Header
     mesh: MeshData | None
     path: Path | None
+    _log: list[dict[str, Any]]
 
     @abstractmethod
     def rows(self, table: str) -> int:
@@ -233,9 +232,9 @@ class Record(ABC):
         """One row of a column."""
 
     @property
-    @abstractmethod
     def log(self) -> list[dict[str, Any]]:
         """All notes in their order; each names its kind as "what"."""
+        return self._log
 
     def notes(self, what: str) -> list[dict[str, Any]]:
         """Notes of one kind."""
@@ -275,7 +274,7 @@ class Record(ABC):
         return [{name: plain(values[i]) for name, values in columns.items()} for i in range(self.rows(spec.name))]
 
 
-class GrowingRecord(Record, Observer):
+class GrowingRecord(Record, Observer, AbstractContextManager):
     """The record of a run that goes on; what it is given it keeps, in its file too if it has one.
 
     It is also the observer of the run: progress, items and warnings go on to whoever watches.
@@ -309,8 +308,10 @@ class GrowingRecord(Record, Observer):
         self.header, self.mesh, self.watcher = header, mesh, watcher or Observer()
         self.path = None if output is None else as_path(output, "A result file")
         self.tables = {table.name: table for table in tables}
-        self._rows = {name: {c.name: [] for c in table.columns} for name, table in self.tables.items()}
-        self._log: list[dict[str, Any]] = []
+        self._rows = {
+            name: {c.name: [table.block(c, ())] for c in table.columns} for name, table in self.tables.items()
+        }
+        self._log = []
         self._journal: Journal | None = None
         if known is not None:
             for name, table in self.tables.items():
@@ -331,17 +332,10 @@ class GrowingRecord(Record, Observer):
         blocks = self._rows[table][name]
         if len(blocks) > 1:
             blocks[:] = [np.concatenate(blocks)]
-        spec = self.tables[table]
-        found = next(c for c in spec.columns if c.name == name)
-        empty = np.empty((0, *spec.shape(found)), object if found.dtype == "text" else found.dtype)
-        return blocks[0] if blocks else empty
+        return blocks[0]
 
     def value(self, table: str, name: str, row: int) -> Any:
         return self.column(table, name)[row]
-
-    @property
-    def log(self) -> list[dict[str, Any]]:
-        return self._log
 
     # -- growing ----
 
@@ -352,10 +346,7 @@ class GrowingRecord(Record, Observer):
     def extend(self, table: str, columns: Mapping[str, Any]) -> None:
         """Keep rows, given column by column."""
         spec = self.tables[table]
-        blocks = {}
-        for c in spec.columns:
-            values = np.asarray(columns[c.name], object if c.dtype == "text" else c.dtype)
-            blocks[c.name] = values.reshape(len(columns[c.name]), *spec.shape(c))
+        blocks = {c.name: spec.block(c, columns[c.name]) for c in spec.columns}
         with DeferredSignals():
             for name, block in blocks.items():
                 self._rows[table][name].append(block)
@@ -384,9 +375,6 @@ class GrowingRecord(Record, Observer):
         if self._journal is not None:
             self._journal.close()
             self._journal = None
-
-    def __enter__(self) -> GrowingRecord:
-        return self
 
     def __exit__(self, *error: object) -> None:
         self.close()
@@ -472,10 +460,6 @@ class StoredRecord(Record):
         column = next(c for c in self.tables[table].columns if c.name == name)
         with reading(self.path) as file:
             return read_column(file["tables"][table], column, rows)
-
-    @property
-    def log(self) -> list[dict[str, Any]]:
-        return self._log
 
     def cut(self, rows: Mapping[str, int]) -> StoredRecord:
         """Leave out the last rows of tables: those beyond so many, by the names of the tables."""

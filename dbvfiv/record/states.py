@@ -15,7 +15,7 @@ from ..model.state import SteadyState
 from ..model.valve import ValveModel
 from ..shell.recovery import LayerFields, layer_fields
 from .mesh import MeshData
-from .record import Record, plain
+from .record import Record
 from .table import TEXT, Column, Shown, TableSpec, document_of
 
 #: Quantities that a user reads off a state under any load.
@@ -150,12 +150,8 @@ def read_layers(record: Record, table: str, row: int) -> LayerFields:
 
 def read_states(record: Record, table: str) -> list[SteadyState]:
     """States that a table of a record holds."""
-    columns = {c.name: record.column(table, c.name) for c in STATE_COLUMNS}
-    states = []
-    for i in range(record.rows(table)):
-        row = {name: plain(values[i]) for name, values in columns.items()}
-        states.append(SteadyState(q=record.mesh.restrict(row["nodal"]), **row))
-    return states
+    rows = record.table_rows(TableSpec(table, STATE_COLUMNS))
+    return [SteadyState(q=record.mesh.restrict(row["nodal"]), **row) for row in rows]
 
 
 def restart_row(path: LoadSteps) -> dict[str, Any]:

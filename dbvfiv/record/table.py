@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from operator import attrgetter
 from typing import Any
@@ -144,6 +144,11 @@ class TableSpec:
     def row_bytes(self) -> int:
         """Bytes of one row in a file."""
         return sum(int(np.prod(self.shape(c))) * self.dtype(c).itemsize for c in self.columns)
+
+    def block(self, column: Column, values: Sequence[Any]) -> np.ndarray:
+        """Values of some rows of a column in memory (rows, ...)."""
+        dtype = object if column.dtype == TEXT else column.dtype
+        return np.asarray(values, dtype).reshape(len(values), *self.shape(column))
 
     def create(self, parent: h5py.Group) -> None:
         """Make the empty columns in a file."""

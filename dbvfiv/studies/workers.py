@@ -7,7 +7,7 @@ import os
 import pickle
 import signal
 import threading
-from collections.abc import Callable, Hashable, Iterable, Iterator
+from collections.abc import Callable, Hashable, Iterable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Executor, ProcessPoolExecutor, wait
 from dataclasses import dataclass
 from pathlib import Path
@@ -17,7 +17,7 @@ from typing import Annotated, Any
 from pydantic import BeforeValidator
 
 from ..case.section import Described
-from ..errors import CaseError
+from ..errors import CaseError, SolveError
 from ..runtime import mpi_size, prepare
 
 #: Times that a task is tried again after a worker died over it.
@@ -334,6 +334,21 @@ def _end_with_parent() -> None:
     """Let no worker stay behind when the process that shares the tasks was killed."""
     multiprocessing.parent_process().join()
     os._exit(1)
+
+
+def share_samples(
+    team: Workers, name: str, work: Work, numbers: Sequence, first: int, size: int, wanted: Callable[[int], bool]
+) -> Iterator[tuple[int, Any]]:
+    """Blocks of samples that hold a wanted one, by their start among the values of all, with what `work` makes of each:
+    its function takes the number of the first sample and the values before its own arguments.
+    """
+    starts = range(0, len(numbers), size)
+    asked = [k for k in starts if any(wanted(first + i) for i in range(k, min(k + size, len(numbers))))]
+    blocks = {k: Work(work.function, (first + k, numbers[k : k + size], *work.arguments)) for k in asked}
+    for k, rows in team.share(asked, blocks.__getitem__):
+        if rows is Lost:
+            raise SolveError(f"{name} {first + k} and on could not be computed: {Lost.sentence}")
+        yield k, rows
 
 
 #: One task at a time in a process, whatever threads a cluster has there; what they share is made once.

@@ -26,7 +26,7 @@ from ...drawing.style import (
     pressure_colours,
     some_of,
 )
-from ...drawing.views import COLOURS, ValveSkin, draw_layers, draw_skin, faces, unrolled
+from ...drawing.views import COLOURS, ValveSkin, draw_chosen, draw_skin, faces, layer_stress, unrolled
 from ..comparing import MEASURED, Compared, draw_curve, draw_runs, draw_shapes, labels
 from ..result import StudyResult
 
@@ -49,7 +49,7 @@ def draw(result: StudyResult, pressure: float | None = None) -> Iterator[tuple[s
     if result.measured.area is not None:
         yield "measured-passage", lambda: measured_passage(result)
     yield from draw_shapes(result.measured.shapes)
-    yield from draw_layers(result, pressure)
+    yield from draw_chosen(result, pressure, {"layer-stress": layer_stress})
 
 
 def side_views(result: StudyResult) -> Figure:

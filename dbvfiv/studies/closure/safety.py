@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -87,7 +88,7 @@ class SafetyFactor:
 
 def find_safety(result: StudyResult) -> SafetyFactor | None:
     """The factor that a result shows; None if no equilibrium was found."""
-    rising = _rising(result)
+    rising = rising_points(result)
     if not rising:
         return None
     closure = result.case.closure
@@ -186,7 +187,7 @@ def rated_sentence(result: StudyResult) -> str | None:
     return f"{begin} {seal}; {buckles}; margin {least}{told['margin']:.0%}."
 
 
-def _rising(result: StudyResult) -> list[Any]:
+def rising_points(result: StudyResult) -> list[Any]:
     """Points of the path as the pressure rises, up to where arclength takes over."""
     rising: list[Any] = []
     for point in result.walk:
@@ -259,16 +260,10 @@ class ClassBuckling:
     @property
     def sentence(self) -> str:
         """Sentence on buckling in the class, or on its least stiffness."""
-        motion = f"class {self.symmetry} ({symmetry_named(self.symmetry).words})"
+        motion = f"in class {self.symmetry} ({symmetry_named(self.symmetry).words})"
         if self.buckling:
-            return f"Buckling in {motion} at {self.critical_pressure / 1e3:.6g} kPa."
-        if self.unstable_from is not None:
-            return f"Unstable in {motion} at {self.unstable_from / 1e3:.6g} kPa; where it buckles was not followed."
-        share = self.lowest[self.softest] / self.lowest[0]
-        return (
-            f"No buckling in {motion} up to {max(self.pressures) / 1e3:.4g} kPa; the stiffness is least at "
-            f"{self.pressures[self.softest] / 1e3:.4g} kPa, {share:.0%} of that at the start."
-        )
+            return f"Buckling {motion} at {self.critical_pressure / 1e3:.6g} kPa."
+        return _unbuckled(motion, self.unstable_from, self.pressures, self.lowest)
 
 
 def read_classes(record: Record) -> tuple[ClassBuckling, ...]:
@@ -316,11 +311,18 @@ def _buckling(result: StudyResult) -> list[str]:
     softest = result.softest
     if softest is None:
         return []
-    if softest.lowest_eigenvalue <= 0:
-        return [f"Unstable {OWN} at {softest.pressure / 1e3:.6g} kPa; where it buckles was not followed."]
-    followed = [point for point in result.walk if np.isfinite(point.lowest_eigenvalue)]
-    share = softest.lowest_eigenvalue / followed[0].lowest_eigenvalue
-    return [
-        f"No buckling {OWN} up to {max(p.pressure for p in followed) / 1e3:.4g} kPa; the "
-        f"stiffness is least at {softest.pressure / 1e3:.4g} kPa, {share:.0%} of that at the start."
-    ]
+    followed = [p for p in result.walk if np.isfinite(p.lowest_eigenvalue)]
+    unstable = softest.pressure if softest.lowest_eigenvalue <= 0 else None
+    pressures, lowest = ([getattr(p, name) for p in followed] for name in ("pressure", "lowest_eigenvalue"))
+    return [_unbuckled(OWN, unstable, pressures, lowest)]
+
+
+def _unbuckled(motion: str, unstable: float | None, pressures: Sequence[float], lowest: Sequence[float]) -> str:
+    """Sentence on the least stiffness to motions whose buckling was not located, unstable from a pressure on."""
+    if unstable is not None:
+        return f"Unstable {motion} at {unstable / 1e3:.6g} kPa; where it buckles was not followed."
+    softest = int(np.argmin(lowest))
+    return (
+        f"No buckling {motion} up to {max(pressures) / 1e3:.4g} kPa; the stiffness is least at "
+        f"{pressures[softest] / 1e3:.4g} kPa, {lowest[softest] / lowest[0]:.0%} of that at the start."
+    )

@@ -46,6 +46,7 @@ from .safety import (
     find_safety,
     rated_verdict,
     read_classes,
+    rising_points,
     sentences,
 )
 from .walk import BUCKLING, MOST_EIGENVALUES, PATH, STATES, ClosureWalk, film_leak, layer_maxima, rows_to_keep
@@ -316,11 +317,7 @@ class ClosureResult(StudyResult):
         """A column of `POINT` at back pressures (k,), Pa: of states where they are, between the load steps by a
         straight line, from the first to the last one before arclength takes over; NaN beyond.
         """
-        known: dict[float, float] = {}
-        for point in self.walk:
-            if point.arclength or point.pressure <= max(known, default=0.0):
-                break
-            known[point.pressure] = getattr(point, name)
+        known = {point.pressure: getattr(point, name) for point in rising_points(self)}
         # of a state that was asked for the contact is renewed until it holds; load steps do with less
         own = {"lowest_eigenvalue": "lowest_stiffness_eigenvalue"}.get(name, name)
         known |= {state.pressure: getattr(state, own) for state in self.states if not state.beyond_limit}

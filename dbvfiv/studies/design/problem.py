@@ -199,7 +199,11 @@ class DesignProblem:
     @property
     def start(self) -> np.ndarray:
         """Shares (n,) of the case itself."""
-        return np.array([(one.start - one.low) / (one.high - one.low) for one in self.variables])
+        return self.shares_of([one.start for one in self.variables])
+
+    def shares_of(self, values: Sequence[float]) -> np.ndarray:
+        """Shares (n,) of values of the variables."""
+        return np.array([(value - one.low) / (one.high - one.low) for one, value in zip(self.variables, values)])
 
     def case_at(self, values: Sequence[float]) -> Case:
         """Case with other values of the variables.
@@ -343,10 +347,6 @@ def margin_spectrum(walk: StabilityWalk, place: Mu, left: bool = False) -> Spect
         count *= 2
 
 
-def _ratios(eigenvalues: np.ndarray) -> np.ndarray:
-    return -eigenvalues.real / np.abs(eigenvalues)
-
-
 def least_ratio(spectrum: Spectrum) -> float:
     """Least damping ratio of the modes that oscillate; NaN of none."""
     ratios = spectrum.damping_ratio[oscillates(spectrum.eigenvalues)]
@@ -359,11 +359,15 @@ def smooth_margin(eigenvalues: np.ndarray) -> tuple[float, np.ndarray]:
     """
     if not len(eigenvalues):
         return 1.0, np.zeros(0)
-    ratios = _ratios(eigenvalues)
-    least = ratios.min()
-    shares = np.exp(-SHARPNESS * (ratios - least))
+    least, shares = _smooth_least(-eigenvalues.real / np.abs(eigenvalues))
     of_ratios = -1j * eigenvalues.imag * eigenvalues.conj() / np.abs(eigenvalues) ** 3
-    return float(least - np.log(shares.sum()) / SHARPNESS), shares / shares.sum() * of_ratios
+    return least, shares / shares.sum() * of_ratios
+
+
+def _smooth_least(values: np.ndarray) -> tuple[float, np.ndarray]:
+    """Smooth least of values (k,), and shares (k,) that its derivatives by them go by."""
+    shares = np.exp(-SHARPNESS * (values - values.min()))
+    return float(values.min() - np.log(shares.sum()) / SHARPNESS), shares
 
 
 def together(statement: Statement, found: Sequence[AtHead], reserves: Sequence[float] = ()) -> tuple[float, np.ndarray]:
@@ -376,6 +380,5 @@ def together(statement: Statement, found: Sequence[AtHead], reserves: Sequence[f
     slopes = np.array([one.slopes[statement.quantity] for one in found])
     if statement.quantity != "margin" or len(values) == 1:
         return float(values.mean()), slopes.mean(axis=0)
-    shares = np.exp(-SHARPNESS * (values - values.min()))
-    value = values.min() - np.log(shares.sum()) / SHARPNESS
-    return float(value), shares @ slopes / shares.sum()
+    value, shares = _smooth_least(values)
+    return value, shares @ slopes / shares.sum()

@@ -105,7 +105,7 @@ class Search:
             best = found
             if not (self._renew_reserves(best) | self._add_worst_heads(best)):
                 return best
-            tried = [self.share(found[4]) for found in self._by_aim()] + [share]
+            tried = [self.problem.shares_of(found[4].values) for found in self._by_aim()] + [share]
         return None if best is None else self._counted(best)
 
     def _counted(self, design: Design) -> Design:
@@ -128,9 +128,6 @@ class Search:
                 return share
         return shares[-1]
 
-    def share(self, design: Design) -> np.ndarray:
-        return np.array([(x - one.low) / (one.high - one.low) for x, one in zip(design.values, self.problem.variables)])
-
     def _held(self, share: np.ndarray, evaluations: int) -> Design | None:
         """As `_optimised`; a search that ends where constraints fail begins again halfway from its start to the case,
         and one that holds from its end, where aim and curvature have another size, until that gains nothing.
@@ -146,7 +143,7 @@ class Search:
             best = found
             if settled or (not best.holds and ends):
                 break
-            share = self.share(best) if best.holds else 0.5 * (share + self.problem.start)
+            share = self.problem.shares_of(best.values) if best.holds else 0.5 * (share + self.problem.start)
         return best
 
     def _optimised(self, share: np.ndarray, evaluations: int, failing: int) -> Design | None:

@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 
 from ...case.parameters import Mu
 from ...case.statement import QUANTITIES, Statement
-from ...case.write import case_toml
+from ...case.write import write_case
 from ...drawing.style import headline, limits, log_axis, new_figure, parameter_label
 from ...errors import SolveError
 from ...model.closed import close_valve
@@ -98,7 +98,7 @@ def run(session: Session, record: GrowingRecord, cases: Path | None = None) -> N
             tried: list[Design | str] = []
             search = Search(problem, aim, asked, partial(_tell, record, tried))
             if i == 0 and best is not None:
-                share = search.share(best)
+                share = problem.shares_of(best.values)
             design = search.from_start(share, case.design.evaluations)
             if design is None:
                 why = next((one for one in reversed(tried) if isinstance(one, str)), "")
@@ -116,7 +116,7 @@ def run(session: Session, record: GrowingRecord, cases: Path | None = None) -> N
                 f"No design holds all constraints{_for(bound, bounds)}: the nearest misses one {_missed(best)}."
             )
         if cases is not None:
-            _write(problem.case_at(best.values), cases / f"design-{number + 1}.toml")
+            write_case(problem.case_at(best.values), cases / f"design-{number + 1}.toml")
     for number, design in [(CASE, None), *result.best.items()]:
         _verify(problem, case, number, design, result.pressures, record)
 
@@ -154,17 +154,10 @@ def _known(record: GrowingRecord) -> dict[tuple, AtHead | str]:
 
 def _keep(record: GrowingRecord, key: tuple, found: AtHead | str) -> None:
     """Keep a state in the record as soon as it is known."""
-    values, pressure, margin = key
-    told = found if isinstance(found, str) else found.values
-    slopes = {} if isinstance(found, str) else {name: list(map(float, s)) for name, s in found.slopes.items()}
-    reserve, band = (0.0, None) if isinstance(found, str) else (found.reserve, found.band)
-    state = {"values": list(values), "pressure": pressure, "margin": margin, "found": told}
-    record.note(_STATE, **state, slopes=slopes, reserve=reserve, band=band)
-
-
-def _write(case: Case, path: Path) -> None:
-    path.parent.mkdir(parents=True, exist_ok=True)
-    path.write_text(case_toml(case, comments=False) + "\n")
+    state, why = dict(zip(("values", "pressure", "margin"), key)), isinstance(found, str)
+    at = AtHead({}, {}) if why else found
+    told = found if why else at.values
+    record.note(_STATE, **state, found=told, slopes=at.slopes, reserve=at.reserve, band=at.band)
 
 
 #: Names of the case files of designs.

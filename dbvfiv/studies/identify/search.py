@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -13,7 +13,7 @@ from ...record.record import GrowingRecord, Record
 from ...record.table import Column, TableSpec
 from ..case import Case
 from ..inputs import Plan, quasi_random
-from ..workers import Lost, Work, Workers
+from ..workers import Work, Workers, share_samples
 from .learning import MORE, SMALL, Learning, coordinates, sample_posterior
 from .valves import MODES, Begins, Modes, Places, Valves
 
@@ -148,29 +148,15 @@ class Search:
             one |= {"input": list(range(scores.shape[1])), "score": scores[sample - first].tolist()}
             self.record.extend(VALVES, one)
         self.written = max(self.written, len(self.scores))
-        tasks = [
-            start
-            for start in range(0, len(scores), OWN)
-            if any(
-                (first + k, place) not in self.modes
-                or (len(places) > len(self.places.first) and first + k not in self.begins)
-                for k in range(start, min(start + OWN, len(scores)))
-                for place in places
-            )
-        ]
-        for rows in self._results(tasks, first, numbers, places):
+
+        def wanted(sample: int) -> bool:
+            onset = len(places) > len(self.places.first) and sample not in self.begins
+            return onset or any((sample, place) not in self.modes for place in places)
+
+        for _, rows in share_samples(self.team, "Valves", Work(Valves.found, (places,)), numbers, first, OWN, wanted):
             for row in rows:
                 self._keep(row)
             self.record.item(rows[-1].sample)
-
-    def _results(self, tasks, first: int, numbers: np.ndarray, places) -> Iterator[list[Modes | Begins]]:
-        def ask(start: int) -> Work:
-            return Work(Valves.found, (first + start, numbers[start : start + OWN], places))
-
-        for start, rows in self.team.share(tasks, ask):
-            if rows is Lost:
-                raise SolveError(f"Valves {first + start} and on could not be computed: {Lost.sentence}")
-            yield rows
 
     def _keep(self, row: Modes | Begins) -> None:
         if isinstance(row, Begins):

@@ -15,7 +15,7 @@ from scipy.special import ndtri
 
 from ...case.distribution import Distribution
 from ...case.parameters import PARAMETERS
-from ...case.write import case_toml
+from ...case.write import write_case
 from ...drawing.style import ACCENT, COMPUTED, REST, headline, new_figure, parameter_label
 from ...errors import CaseError, SolveError
 from ...record.record import GrowingRecord, Record
@@ -136,9 +136,7 @@ def run(
     for sentence in result.doubts:
         record.warn(sentence)
     if posterior is not None:
-        text = case_toml(result.posterior_case(), comments=False)
-        posterior.parent.mkdir(parents=True, exist_ok=True)
-        posterior.write_text(text + "\n")
+        write_case(result.posterior_case(), posterior)
 
 
 def _modes_of_case(plan: Plan, places: Places, walk: StabilityWalk, record: GrowingRecord):

@@ -23,7 +23,7 @@ from ...drawing.style import (
     pressure_name,
     some_of,
 )
-from ...drawing.views import closed_section, draw_deformed, draw_layers, faces, mark_pieces
+from ...drawing.views import closed_section, deformed, draw_chosen, faces, layer_stress, mark_pieces
 from ...flow.terms.pump import from_case as pump_of
 from ..case import Case
 from ..comparing import MEASURED, draw_curve, draw_runs, draw_shapes, labels
@@ -48,8 +48,7 @@ def draw(result: StudyResult, pressure: float | None = None) -> Iterator[tuple[s
     if result.case.drive.kind == "flow":
         yield "passage", lambda: passage(result)
     yield from draw_shapes(result.measured.shapes)
-    yield from draw_deformed(result, pressure)
-    yield from draw_layers(result, pressure)
+    yield from draw_chosen(result, pressure, {"deformed": deformed, "layer-stress": layer_stress})
 
 
 def ordered(result: StudyResult) -> list[Any]:

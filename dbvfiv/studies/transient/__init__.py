@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
 
-from pydantic import StrictBool, StrictInt, ValidationInfo, field_validator, model_validator
+from pydantic import StrictBool, StrictInt, model_validator
 
 from ...case.quantity import Length, Number, Time
 from ...case.section import BrokenRule, Section, key
-from ...case.tables import ExistingFile, read_drive_table
+from ...case.tables import ExistingFile, read_drive_table, readable_file
 from ..request import AnimationOption, Request, require_start_file
 
 ORDER = 40
@@ -65,7 +65,7 @@ class Keys(Section):
     start_file: ExistingFile | None = key(None, "Result file of the state to start from, relative to the case file.")
     start_state: StrictInt = key(-1, "Which state of start_file, from 0; negative ones count from the end.")
     ramp: Time = key(0.0, "Time in which the pressure rises from zero; zero applies it at once.", ge=0, le=1e5)
-    drive_table: Path | None = key(
+    drive_table: Annotated[Path, readable_file(read_drive_table)] | None = key(
         None,
         "CSV of time and pressure used instead of drive.pressure, linear between rows and constant beyond "
         "them; a header may name "
@@ -82,16 +82,6 @@ class Keys(Section):
         "Verdicts that end the run once they are certain: steady, decaying, limit cycle, growing, closed, chatters, "
         "irregular.",
     )
-
-    @field_validator("drive_table", mode="after")
-    @classmethod
-    def _find_table(cls, path: Path | None, info: ValidationInfo) -> Path | None:
-        context = info.context or {}
-        if path is None or not context.get("check_files", True):
-            return path
-        path = Path(context.get("folder", ".")) / path
-        read_drive_table(path)
-        return path.resolve()
 
     @model_validator(mode="after")
     def _fits_together(self) -> Keys:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import cached_property, partial
 from typing import Any
 
@@ -23,7 +23,7 @@ from ..stability.neighbours import CHECKS, NEAR_SEED, TAKEN, Neighbours, find_ne
 from ..stability.place import check_scan, describe_fixed, fixed_conditions
 from ..stability.verdict import DIVERGES, FLUTTERS, NOT_VALID, OUTCOMES, STABLE, UNDECIDED
 from ..stability.walk import StabilityWalk
-from ..workers import Lost, Work, Workers, require_answer
+from ..workers import Lost, Work, Workers, require_answer, share_samples
 from .sampling import Found, Sampler, Shifted, Start, approach, shares, subset, weighted
 
 SAMPLES, NUMBERS = "samples", "numbers"
@@ -236,24 +236,11 @@ class _Sampling:
         self.asked += len(independent)
         numbers, scores = plan.numbers(independent), plan.scores_of(independent)
         size = SHARED if plan.is_surrounding else OWN
-        tasks = [
-            start
-            for start in range(0, len(independent), size)
-            if any(first + k not in self.known for k in range(start, min(start + size, len(independent))))
-        ]
-        for start, rows in self._results(tasks, first, numbers, size):
+        wanted = lambda sample: sample not in self.known  # noqa: E731
+        for start, rows in share_samples(self.team, "Samples", Work(Sampler.found), numbers, first, size, wanted):
             block = slice(start, start + size)
             self._keep(first + start, rows, numbers[block], scores[block], log_weight[block], stage)
         return np.array([self.known[first + k] for k in range(len(independent))])
-
-    def _results(self, tasks, first: int, numbers: np.ndarray, size: int) -> Iterator[tuple[int, list[Found]]]:
-        def ask(start: int) -> Work:
-            return Work(Sampler.found, (first + start, numbers[start : start + size]))
-
-        for start, rows in self.team.share(tasks, ask):
-            if rows is Lost:
-                raise SolveError(f"Samples {first + start} and on could not be computed: {Lost.sentence}")
-            yield start, rows
 
     def _keep(self, first: int, rows: list[Found], numbers, scores, log_weight, stage: int) -> None:
         """Keep whole samples: their inputs before their verdicts, which vouch for them."""
