@@ -25,7 +25,7 @@ from ..stability.samples import SAMPLE_TABLE, Sample, keep_samples, read_samples
 from ..stability.verdict import DIVERGES, FLUTTERS, NOT_VALID, STABLE, UNDECIDED, Verdict, lowered
 from ..stability.walk import StabilityWalk
 from .line import FoundOnsets, Interval, OnsetPoint, joined_stretches
-from .search import FINE, OnsetOptions, run_onset
+from .search import FINE, run_onset
 
 CRITICALITY = {"super": "supercritical", "sub": "subcritical"}
 #: Kinds of notes: on a point, and on a variant that was searched to its end.
@@ -66,8 +66,7 @@ def run(session: Session, record: GrowingRecord) -> None:
             prefix = variant.prefix(asked[0])
             record.progress(f"{prefix}{variant.motion.words}" if prefix else "scan")
             known = [*read_samples(record), *_points(record, variant)]
-            own = walk if variant.motion == walk.symmetry else walk.in_class(variant.motion)
-            found = run_onset(case, OnsetOptions.of(case, variant), _Keeper(record, variant), known, own)
+            found = run_onset(case, variant, _Keeper(record, variant), known, walk.in_class(variant.motion))
             record.note(_DONE, variant=list(variant), failures=list(found.failures), warnings=list(found.warnings))
         for sentence in found.failures:
             record.fail(f"{variant.prefix(asked[0])}{sentence}")
