@@ -21,7 +21,7 @@ prepare()
 import numpy as np  # noqa: E402
 
 from dbvfiv.studies.case import thesis_case  # noqa: E402
-from dbvfiv.studies.onset.search import OnsetOptions, run_onset  # noqa: E402
+from dbvfiv.studies.onset.search import run_onset  # noqa: E402
 from dbvfiv.studies.stability.walk import StabilityWalk  # noqa: E402
 
 MESH = (28, 48)
@@ -41,8 +41,8 @@ def main(path: Path, keys: list[str]) -> None:
         key = f"{parameter} {law} {value:g}"
         if key in done:
             return
-        here = case.replace({fixed: value, "fluid.continuity": law})
-        found = run_onset(here, OnsetOptions(parameter, tuple(map(float, values)), True), walk=walk)
+        over = f"{parameter}={','.join(map(repr, map(float, values)))}:log"
+        found = run_onset(case.replace({fixed: value, "fluid.continuity": law, "onset.over": over}), walk=walk)
         leading = found.growth_rates[:, 0]
         done[key] = {
             "parameter": parameter,

@@ -16,7 +16,7 @@ from dbvfiv.studies.map.column import MapColumn, MapPlan
 from dbvfiv.studies.map.curves import OnsetCurve
 from dbvfiv.studies.map.study import MapResult
 from dbvfiv.studies.onset import study as onset_study
-from dbvfiv.studies.onset.line import known_intervals, uncertain_intervals
+from dbvfiv.studies.onset.line import intervals_of
 from dbvfiv.studies.stability.samples import Sample
 from dbvfiv.studies.stability.verdict import FLUTTERS, NOT_VALID, OUTCOMES, STABLE, UNDECIDED
 from eigen.columns import DIRECT
@@ -110,7 +110,7 @@ def onset_result(values, growth, certified=None):
     points = [point] if len(values) > 1 else []
     certified = np.ones(len(values), bool) if certified is None else np.array(certified)
     states = values, growth > 0, certified, [p["value"] for p in points]
-    stretches = [known_intervals(*states, which) for which in (0, 1)]
+    stretches = [intervals_of(*states, which) for which in (False, True, None)]
     return SimpleNamespace(
         case=case,
         parameter="pressure",
@@ -122,7 +122,7 @@ def onset_result(values, growth, certified=None):
         classes=(),
         stable_intervals=stretches[0],
         unstable_intervals=stretches[1],
-        uncertain_intervals=uncertain_intervals(*states),
+        uncertain_intervals=stretches[2],
     )
 
 

@@ -19,12 +19,12 @@ from dbvfiv.model.equilibria import LoadPath, rest_state
 from dbvfiv.model.residual import ValveResidual
 from dbvfiv.observer import Observer
 from dbvfiv.studies.case import thesis_case
+from dbvfiv.studies.modes import Keys
 from dbvfiv.studies.modes import search as modes_search
-from dbvfiv.studies.modes.search import ModesOptions, critical_damping_factor, run_modes
+from dbvfiv.studies.modes.search import critical_damping_factor, run_modes
 from dbvfiv.studies.stability.line import ParameterLine
 from dbvfiv.studies.stability.verdict import Verdict
 from dbvfiv.studies.stability.walk import StabilityWalk
-from eigen import SearchOptions
 from eigen.pairs import acceptable, all_eigenvalues
 from tests.small_valves import SMALL
 
@@ -33,9 +33,8 @@ WATER = Mu(density=1000.0, alpha=5.0, beta=0.003)
 
 
 def test_the_shift_of_a_case_has_its_frequency_in_hertz():
-    options = ModesOptions.of(thesis_case({"modes.shift": -5.0, "modes.shift_frequency": "20 Hz"}))
-    assert options.search.shifts == (complex(-5.0, 40.0 * np.pi),)
-    assert ModesOptions.of(thesis_case()).search.shifts is None
+    assert Keys(shift=-5.0, shift_frequency="20 Hz").shifts == (complex(-5.0, 40.0 * np.pi),)
+    assert thesis_case().modes.shifts is None
 
 
 @pytest.fixture(scope="module")
@@ -71,7 +70,7 @@ def test_against_all_eigenvalues_of_a_small_valve():
     for continuity in ("quasi-steady", "storage"):
         small = ValveModel(thesis_case({"mesh.around": 4, "mesh.along": 8, "fluid.continuity": continuity}))
         at = LoadPath(small).go_to(4e3)
-        found = run_modes(small, at, LIGHT, ModesOptions(4))
+        found = run_modes(small, at, LIGHT, Keys(count=4))
         every = la.eigvals(*linearise(small, at.q, 4e3).pencil(LIGHT).first_order())
         every = every[np.isfinite(every) & (every.imag >= -1e-9)]
         leading = every[np.argsort(-every.real)][: len(found.eigenvalues)]
@@ -121,14 +120,14 @@ def test_shapes_are_scaled_to_their_largest_displacement(flutter):
 
 @pytest.mark.parametrize("conditions", [LIGHT, WATER])
 def test_the_number_asked_for_changes_nothing(model, state, conditions):
-    few, many = (run_modes(model, state, conditions, ModesOptions(count)).eigenvalues for count in (3, 6))
+    few, many = (run_modes(model, state, conditions, Keys(count=count)).eigenvalues for count in (3, 6))
     assert np.allclose(few, many[: len(few)], rtol=1e-8)
 
 
 def test_another_shift_gives_the_same(model, state, flutter):
-    search = SearchOptions(shifts=(250.0 + 150.0j,))
+    keys = Keys(count=4, shift=250.0, shift_frequency=75.0 / np.pi)
     assert np.allclose(
-        run_modes(model, state, LIGHT, ModesOptions(4, search=search)).eigenvalues[:3],
+        run_modes(model, state, LIGHT, keys).eigenvalues[:3],
         flutter.eigenvalues[:3],
         rtol=1e-8,
     )
@@ -139,13 +138,13 @@ def test_in_vacuo_at_rest(model):
     there.
     """
     rest = rest_state(model)
-    free = run_modes(model, rest, Mu(density=1000.0, alpha=0.0, beta=0.0), ModesOptions(6, in_vacuo=True))
+    free = run_modes(model, rest, Mu(density=1000.0, alpha=0.0, beta=0.0), Keys(count=6, in_vacuo=True))
     omega = free.eigenvalues.imag
     assert (np.diff(omega) > 0).all() and np.abs(free.eigenvalues.real).max() < 1e-6 * omega[0]
     assert 10 < omega[0] / (2 * np.pi) < 18 and free.stable is True
     assert any("stiffness damping" in note for note in free.notes)
     beta = 1e-4
-    damped = run_modes(model, rest, Mu(density=1000.0, alpha=0.0, beta=beta), ModesOptions(3, in_vacuo=True))
+    damped = run_modes(model, rest, Mu(density=1000.0, alpha=0.0, beta=beta), Keys(count=3, in_vacuo=True))
     expected = -beta * omega[:3] ** 2 / 2 + 1j * omega[:3] * np.sqrt(1 - (beta * omega[:3] / 2) ** 2)
     assert np.allclose(damped.eigenvalues, expected, rtol=1e-6)
 
@@ -160,8 +159,8 @@ def test_the_verdict_is_withheld_where_the_counts_disagree(model, state, flutter
         def warn(self, sentence):
             told.append(sentence)
 
-    options = ModesOptions(3, search=SearchOptions(max_frequency=25.0))
-    found = run_modes(model, state, LIGHT, options, Listener())
+    keys = Keys(count=3, max_frequency=25.0)
+    found = run_modes(model, state, LIGHT, keys, Listener())
     assert found.certificate.unstable_count == 0 and found.stable is None
     assert told and found.verdict.outcome == "undecided"
     first = flutter.eigenvalues[0]
@@ -170,7 +169,7 @@ def test_the_verdict_is_withheld_where_the_counts_disagree(model, state, flutter
 
 def test_an_unstable_pair_is_proof(model, state):
     """Without stiffness damping the band holds some of the unstable modes: unstable, though the counts differ."""
-    found = run_modes(model, state, Mu(density=10.0, alpha=5.0, beta=0.0), ModesOptions(3))
+    found = run_modes(model, state, Mu(density=10.0, alpha=5.0, beta=0.0), Keys(count=3))
     assert found.certificate.unstable_count > 0 and found.stable is False
 
 
@@ -298,7 +297,7 @@ def test_extreme_densities(model, state, density):
 
 def test_a_uniform_pressure_has_no_fluid(state):
     shut = ValveModel(thesis_case({"mesh.around": 8, "mesh.along": 16, "drive.kind": "uniform"}))
-    found = run_modes(shut, LoadPath(shut).go_to(500.0), WATER, ModesOptions(2))
+    found = run_modes(shut, LoadPath(shut).go_to(500.0), WATER, Keys(count=2))
     assert np.isnan(found.modes[0].pressure).all() and found.stable is True
 
 

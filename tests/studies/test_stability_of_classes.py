@@ -58,8 +58,8 @@ def test_onsets_come_back_from_a_file(onset, tmp_path):
 
 def test_a_crossing_inside_what_another_class_has_unstable_is_no_edge():
     own = [{"value": 3.0, "edge": True}, {"value": 8.0, "edge": True}]
-    other = {"symmetry": "SA", "points": [{"value": 5.0, "edge": True}], "unstable": [[5.0, 9.0]]}
-    points = merge_points(own, [(0.0, 3.0), (8.0, 9.0)], [other])
+    unstable = {"SS": [(0.0, 3.0), (8.0, 9.0)], "SA": [(5.0, 9.0)]}
+    points = merge_points({"SS": own, "SA": [{"value": 5.0, "edge": True}]}, unstable)
     assert [(p["value"], p["symmetry"], p["edge"]) for p in points] == [
         (3.0, "SS", True),
         (5.0, "SA", True),

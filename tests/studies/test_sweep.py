@@ -13,7 +13,8 @@ from dbvfiv.errors import CaseError, SolveError
 from dbvfiv.model import ValveModel
 from dbvfiv.model.equilibria import LoadPath
 from dbvfiv.studies.case import thesis_case
-from dbvfiv.studies.modes.search import ModesOptions, run_modes
+from dbvfiv.studies.modes import Keys
+from dbvfiv.studies.modes.search import run_modes
 from dbvfiv.studies.session import Session
 from dbvfiv.studies.stability import walk
 from dbvfiv.studies.sweep import study as tracked
@@ -48,7 +49,7 @@ def nearest(found, column, eigenvalue):
 def test_a_band_below_the_flutter_leaves_every_value_open(model, state):
     """Said as by `modes`, with the key that moves the end, and the same when it is read again."""
     found = sweep(model, "density=5:20:4:log", state, **{"modes.max_frequency": 25.0})
-    whole = run_modes(model, state, LIGHT, ModesOptions(3, search=SearchOptions(max_frequency=25.0)))
+    whole = run_modes(model, state, LIGHT, Keys(count=3, max_frequency=25.0))
     assert not found.certified and len(found.samples) == 4
     for sample in found.samples:
         assert sample.verdict.outcome == whole.verdict.outcome == "undecided" and sample.certified is False
@@ -62,7 +63,7 @@ def test_every_value_agrees_with_a_full_solve(model, state, over_density):
     checked = [check["value"] for check in over_density.checks]
     unchecked = [i for i, v in enumerate(over_density.values) if not np.isclose(v, checked, rtol=1e-9).any()]
     for column in (unchecked[1], unchecked[-2]):
-        full = run_modes(model, state, LIGHT.at(density=over_density.values[column]), ModesOptions(3))
+        full = run_modes(model, state, LIGHT.at(density=over_density.values[column]), Keys(count=3))
         assert max(nearest(over_density, column, value) for value in full.eigenvalues) < 1e-5
 
 
@@ -119,7 +120,7 @@ def test_pressure(model):
     assert [state["pressure"] for state in found.points] == list(found.axis.values) and found.certified
     path = LoadPath(model)
     for column in (0, 3):
-        full = run_modes(model, path.go_to(found.values[column]), LIGHT, ModesOptions(3))
+        full = run_modes(model, path.go_to(found.values[column]), LIGHT, Keys(count=3))
         assert max(nearest(found, column, value) for value in full.eigenvalues[:3]) < 1e-6
     first = eigenvalues(found)[0]
     assert first[0].real > 0 > first[-1].real and found.branches[0].confidence.min() > 0.6
@@ -210,5 +211,5 @@ def test_a_wall_that_relaxes_agrees_with_full_solves(over):
     assert found.certified
     for column in (1, 2):
         here = Mu.of(case).at(**{found.parameter: found.values[column]})
-        full = run_modes(model, state, here, ModesOptions(3))
+        full = run_modes(model, state, here, Keys(count=3))
         assert max(nearest(found, column, value) for value in full.eigenvalues) < 1e-5

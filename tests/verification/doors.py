@@ -13,8 +13,8 @@ from dbvfiv.errors import CaseError, NotValidError, SolveError
 from dbvfiv.model.state import SteadyState
 from dbvfiv.observer import Observer
 from dbvfiv.studies.case import Case, load_case
-from dbvfiv.studies.modes.search import ModesOptions, run_modes
-from dbvfiv.studies.onset.search import OnsetOptions, run_onset
+from dbvfiv.studies.modes.search import run_modes
+from dbvfiv.studies.onset.search import run_onset
 from dbvfiv.studies.session import Session
 from dbvfiv.studies.stability.verdict import UNDECIDED, Verdict
 from dbvfiv.studies.stability.walk import StabilityWalk
@@ -131,7 +131,7 @@ def verdicts_of(session: Session, state: SteadyState) -> Iterator[tuple[str, Ver
     """Verdicts on one state by every study."""
     case, model, here = session.case, session.model, Mu.of(session.case)
     try:
-        yield "modes", run_modes(model, state, options=ModesOptions.of(case)).verdict
+        yield "modes", run_modes(model, state, keys=case.modes).verdict
     except NotValidError as error:
         yield "modes", Verdict.not_valid(str(error))
     plain = {"map.curve": False, "map.refine": 0, "map.checks": 0, "map.continuity": "case"}
@@ -140,8 +140,8 @@ def verdicts_of(session: Session, state: SteadyState) -> Iterator[tuple[str, Ver
     found = run_map(case.replace(plain | axes), start=state, workers=1)
     yield "map", found.columns[0].verdict(0, 0)
     around = (rho / (1 + STEP), rho, rho * (1 + STEP))
-    options = OnsetOptions("density", around, normal_form=False, coarse_mesh=0)
-    onset = run_onset(case, options, walk=_walk(case, model, here, state))
+    over = {"onset.over": f"density={','.join(map(repr, around))}", "onset.normal_form": False, "onset.coarse_mesh": 0}
+    onset = run_onset(case.replace(over), walk=_walk(case, model, here, state))
     yield "onset", onset.verdicts[list(onset.values).index(rho)]
     over = {"sweep.over": f"density={rho!r}:{rho * (1 + STEP)!r}:2"}
     yield "sweep", Session(case.replace(over), start=state).perform("sweep").verdicts[0]

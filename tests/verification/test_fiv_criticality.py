@@ -13,7 +13,7 @@ import pytest
 import dbvfiv
 from dbvfiv.model import ValveModel
 from dbvfiv.studies.case import thesis_case
-from dbvfiv.studies.onset.search import OnsetOptions, OnsetSearch, normal_form
+from dbvfiv.studies.onset.search import OnsetSearch, normal_form
 from dbvfiv.studies.transient.run import Runner
 
 #: Relative distance from the onset density.
@@ -24,8 +24,9 @@ pytestmark = pytest.mark.slow
 
 def onset_over(case, parameter: str, values) -> tuple:
     """The search for the one onset among values of a parameter, the onset, its normal form, and its model."""
-    search = OnsetSearch(case, OnsetOptions(parameter, tuple(values), True, normal_form=False, coarse_mesh=0))
-    (crossing,) = search.scan.run(search.options.values)
+    over = f"{parameter}={','.join(map(repr, map(float, values)))}:log"
+    search = OnsetSearch(case.replace({"onset.over": over, "onset.normal_form": False}))
+    (crossing,) = search.scan.run(search.axis.values)
     point = search.point(crossing)
     place = search.place(point.value)
     form = normal_form(case, search.walk, place, search.critical(place, 2j * np.pi * point.frequency), parameter)

@@ -31,15 +31,16 @@ def measured() -> dict:
     """
     from dbvfiv.case.parameters import Mu
     from dbvfiv.studies.case import thesis_case
-    from dbvfiv.studies.onset.search import OnsetOptions, OnsetSearch
+    from dbvfiv.studies.onset.search import OnsetSearch
     from dbvfiv.studies.stability.walk import StabilityWalk
 
     case = thesis_case(MESH)
     walk, base = StabilityWalk(case), Mu.of(case)
 
     def onsets(parameter, values, **fixed):
-        options = OnsetOptions(parameter, tuple(values), True, normal_form=False, coarse_mesh=0)
-        search = OnsetSearch(case, options, walk=walk, place=base.at(**fixed))
+        over = f"{parameter}={','.join(map(repr, map(float, values)))}:log"
+        asked = case.replace({"onset.over": over, "onset.normal_form": False})
+        search = OnsetSearch(asked, walk=walk, place=base.at(**fixed))
         points = [search.point(crossing) for crossing in search.scan.run(values)]
         return [
             {"value": p.value, "frequency": p.frequency, "gains": p.gains, "confirmed": p.confirmed} for p in points

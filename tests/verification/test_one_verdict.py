@@ -9,7 +9,7 @@ import pytest
 
 import dbvfiv
 from dbvfiv.observer import Observer
-from dbvfiv.studies.modes.search import ModesOptions, run_modes
+from dbvfiv.studies.modes.search import run_modes
 from dbvfiv.studies.session import Session
 from tests.verification.doors import Asked, ask_all, random_cases
 from tests.verification.test_transient_modes import rung_in_time
@@ -67,7 +67,7 @@ def check_kicks(number: int, seed: int) -> None:
     for _, case in random_cases(number, seed, each=2, mesh=COARSE):
         session = Session(case)
         state = session.equilibrium(Observer())
-        verdict = run_modes(session.model, state, options=ModesOptions.of(case)).verdict
+        verdict = run_modes(session.model, state, keys=case.modes).verdict
         runs = []
         rung = rung_in_time(dbvfiv.load(case), verdict.frequency, examine=runs.append)[1]
         value = runs[-1].progress.eigenvalue

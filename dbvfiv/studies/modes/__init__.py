@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -36,6 +37,11 @@ class Keys(Section):
         "sideways, A sways them together in y or twists.",
     )
     in_vacuo: StrictBool = key(False, "Leave the fluid out: the stressed structure alone.")
+
+    @property
+    def shifts(self) -> tuple[complex, ...] | None:
+        """The shift to search near, 1/s, as a search takes it; None for automatic ones."""
+        return None if self.shift is None else (complex(self.shift, 2 * math.pi * self.shift_frequency),)
 
 
 def command(

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
@@ -33,6 +32,7 @@ from ..stability.scan import Crossing, Scan
 from ..stability.verdict import FLUTTERS, STABLE, Verdict, lowered, oscillates
 from ..stability.walk import StabilityWalk, ValveFamily, name_state_in_failures
 from ..state import State
+from . import Keys
 
 #: Structural modes in the basis behind the independent count.
 _BASIS = 24
@@ -263,34 +263,6 @@ class Certificate:
 
 
 @dataclass(frozen=True)
-class ModesOptions:
-    """Options of `run_modes`.
-
-    Attributes
-    ----------
-    count : int
-        Modes wanted, a conjugate pair being one; fewer are given where eigenvalues accumulate.
-    in_vacuo : bool
-        Leave the fluid out; the steady pressures stay as follower loads.
-    search : SearchOptions
-        Band and limit point are chosen by the damping where they are not given.
-    """
-
-    count: int = 10
-    in_vacuo: bool = False
-    search: SearchOptions = field(default_factory=SearchOptions)
-
-    @classmethod
-    def of(cls, case) -> ModesOptions:
-        """Options of a case file."""
-        modes = case.modes
-        shift = None if modes.shift is None else (complex(modes.shift, 2 * math.pi * modes.shift_frequency),)
-        return cls(
-            modes.count, modes.in_vacuo, SearchOptions(modes.max_frequency, shifts=shift, tolerance=modes.tolerance)
-        )
-
-
-@dataclass(frozen=True)
 class FoundModes:
     """Leading modes of one state in one variant.
 
@@ -341,7 +313,7 @@ def run_modes(
     model: ValveModel,
     state: SteadyState,
     mu: Mu | None = None,
-    options: ModesOptions | None = None,
+    keys: Keys | None = None,
     observer: Observer | None = None,
     symmetry: Symmetry = SYMMETRIES[EQUILIBRIA],
     walk: StabilityWalk | None = None,
@@ -355,7 +327,8 @@ def run_modes(
         An equilibrium of the model.
     mu : Mu, optional
         Parameter point; that of the case by default.
-    options : ModesOptions, optional
+    keys : Keys, optional
+        Section `modes`; that of the case by default. Band and limit point are chosen by the damping where it has none.
     observer : Observer, optional
     symmetry : Symmetry, optional
         The class; that of the equilibria by default.
@@ -371,10 +344,10 @@ def run_modes(
     SolveError
         If the state is no equilibrium, or no shift was found at which the pencil can be factored.
     """
-    options = ModesOptions.of(model.case) if options is None else options
+    keys = model.case.modes if keys is None else keys
     observer = Observer() if observer is None else observer
     require_equilibrium(model, state)
-    in_vacuo = options.in_vacuo or not model.flow.has_fluid
+    in_vacuo = keys.in_vacuo or not model.flow.has_fluid
     if not in_vacuo and state.pressure <= model.flow.back:
         raise CaseError(
             f"Coupled modes need an inlet pressure greater than {model.flow.back:g}, because without one the velocity "
@@ -391,12 +364,12 @@ def run_modes(
     pencil = linear.pencil(place, not in_vacuo)
     observer.progress("searching")
     with name_state_in_failures(state.pressure):
-        family = ValveFamily(linear, options.search.max_frequency, options.count)
+        family = ValveFamily(linear, keys.max_frequency, keys.count)
         search = family.leading(place, in_vacuo)
-        asked = replace(search.options, shifts=options.search.shifts, tolerance=options.search.tolerance)
+        asked = replace(search.options, shifts=keys.shifts, tolerance=keys.tolerance)
         workspace = Workspace()
-        basis = TransferBasis(pencil, modes=max(_BASIS, options.count), workspace=workspace)
-        certified = certified_spectrum(pencil, options.count, asked, workspace=workspace, basis=basis)
+        basis = TransferBasis(pencil, modes=max(_BASIS, keys.count), workspace=workspace)
+        certified = certified_spectrum(pencil, keys.count, asked, workspace=workspace, basis=basis)
     certified = replace(certified, spectrum=_ties_by_frequency(certified.spectrum))
     notes = (*search.notes, *certified.spectrum.notes)
     if symmetry.of_equilibria and not (model.mesh.part.is_quarter or in_vacuo):
@@ -409,7 +382,7 @@ def run_modes(
         )
         verdict = verdict.open_above(search.left_open(verdict.band, () if beyond is None else beyond.eigenvalues))
     modes = _shapes(model, pencil, linear, certified.spectrum, symmetry, in_vacuo)
-    grazing = _one_sided(model, state, pencil, asked, options.count) if symmetry.of_equilibria else {}
+    grazing = _one_sided(model, state, pencil, asked, keys.count) if symmetry.of_equilibria else {}
     notes = (*notes, *_contact_notes(model, state, linear, modes, symmetry), *_grazing_notes(model, grazing))
     result = FoundModes(modes, Certificate.of(certified), verdict, notes, certified.spectrum, grazing)
     if result.stable is None:

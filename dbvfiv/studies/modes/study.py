@@ -25,7 +25,7 @@ from ..stability.dimensions import Variant, compare_states, own_variant, variant
 from ..stability.verdict import Verdict
 from ..stability.walk import StabilityWalk
 from ..state import State, StateSteps, states_of
-from .search import CURVE, MODE, Certificate, FoundModes, ModeShape, ModesOptions, critical_damping_factor, run_modes
+from .search import CURVE, MODE, Certificate, FoundModes, ModeShape, critical_damping_factor, run_modes
 
 STATE, MODES, COUNT = "state", "modes", "count"
 #: Kinds of notes: on a variant whose rows are all there, and why the constants of the rubber do not hold at the state.
@@ -45,7 +45,7 @@ def tables_of(mesh: MeshData) -> tuple[TableSpec, TableSpec, TableSpec]:
 
 def run(session: Session, record: GrowingRecord) -> None:
     """Leading modes of the steady state at drive.pressure, in every variant asked for."""
-    case, model, options = session.case, session.model, ModesOptions.of(session.case)
+    case, model = session.case, session.model
     kept = read_states(record, STATE)
     state, place = session.equilibrium(record, kept), Mu.of(model.case)
     if record.notes(_REFUSAL):
@@ -63,11 +63,11 @@ def run(session: Session, record: GrowingRecord) -> None:
     for variant in missing:
         here, own = place.at(storage=variant.storage), walk.in_class(variant.motion)
         try:
-            found = run_modes(model, state, here, options, record, variant.motion, own)
+            found = run_modes(model, state, here, case.modes, record, variant.motion, own)
         except NotValidError as error:
             record.note(_REFUSAL, text=str(error))
             return
-        if variant.continuity == own_variant(case).continuity and not options.in_vacuo:
+        if variant.continuity == own_variant(case).continuity and not case.modes.in_vacuo:
             record.progress("critical damping factor")
             try:
                 factor, sought = critical_damping_factor(own, here, found.verdict)

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass, fields
 from functools import cached_property
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -201,17 +202,17 @@ class FoundOnsets:
     @property
     def unstable_intervals(self) -> list[Interval]:
         """Intervals of the scanned range in which the state is known to be unstable."""
-        return known_intervals(*self._states, True)
+        return intervals_of(*self._states, True)
 
     @property
     def stable_intervals(self) -> list[Interval]:
         """Intervals of the scanned range in which the state is known to be stable."""
-        return known_intervals(*self._states, False)
+        return intervals_of(*self._states, False)
 
     @property
     def uncertain_intervals(self) -> list[Interval]:
         """Intervals of the scanned range in which neither stability nor instability is claimed."""
-        return uncertain_intervals(*self._states)
+        return intervals_of(*self._states, None)
 
     def scan(self) -> dict[str, Any]:
         """Plain numbers of the scan for JSON."""
@@ -240,10 +241,10 @@ class FoundOnsets:
         }
 
 
-def known_intervals(
-    values: np.ndarray, grows: np.ndarray, sure: np.ndarray, edges: Iterable[float], unstable: bool
+def intervals_of(
+    values: np.ndarray, grows: np.ndarray, sure: np.ndarray, edges: Iterable[float], unstable: bool | None
 ) -> list[Interval]:
-    """Intervals in which a state is known to be unstable, or stable.
+    """Intervals in which a state is known to be unstable, or stable, or in which neither is claimed.
 
     Parameters
     ----------
@@ -256,36 +257,20 @@ def known_intervals(
     edges : iterable of float
         Onsets at which the state changes between stable and unstable. Nothing is claimed between two values whose
         states these do not make of each other, as where the state jumps.
-    unstable : bool
-        True for the unstable intervals, False for the stable ones.
+    unstable : bool or None
+        True for the unstable intervals, False for the stable ones, None for those without a claim.
     """
-    found = []
-    for marks, state, known in _stretches(values, grows, sure, edges):
-        for number, (a, b) in enumerate(zip(marks[:-1], marks[1:])):
-            if known and (state == unstable) == (number % 2 == 0):
-                found.append((a, b))
-    return joined_stretches([found])
-
-
-def uncertain_intervals(
-    values: np.ndarray, grows: np.ndarray, sure: np.ndarray, edges: Iterable[float]
-) -> list[Interval]:
-    """Intervals in which `known_intervals` claims nothing."""
-    parts = _stretches(values, grows, sure, edges)
-    return joined_stretches([[(marks[0], marks[-1]) for marks, _, known in parts if not known]])
-
-
-def _stretches(values, grows, sure, edges) -> Iterator[tuple[list[float], bool, bool]]:
-    """Neighbours of a scan with the edges between them, whether the state is unstable at the first, and whether it is
-    known all the way.
-    """
-    edges = sorted(edges)
+    edges, found = sorted(edges), []
     # right at an onset the sign of the growth rate is that of rounding
     away = [all(abs(v - e) > BESIDE * abs(e) for e in edges) or v in (values[0], values[-1]) for v in values]
-    rows = list(zip(*(np.asarray(part)[np.array(away, bool)].tolist() for part in (values, grows, sure))))
-    for (a, state, first), (b, other, second) in zip(rows[:-1], rows[1:]):
+    rows = zip(*(np.asarray(part)[np.array(away, bool)].tolist() for part in (values, grows, sure)))
+    for (a, state, first), (b, other, second) in pairwise(rows):
         between = [e for e in edges if a < e < b]
-        yield [a, *between, b], state, first and second and (state != other) == (len(between) % 2 == 1)
+        known = first and second and (state != other) == (len(between) % 2 == 1)
+        for number, part in enumerate(pairwise([a, *between, b] if known else [a, b])):
+            if (state != number % 2 if known else None) is unstable:
+                found.append(part)
+    return joined_stretches([found])
 
 
 def joined_stretches(parts: Sequence[Sequence[Interval]]) -> list[Interval]:

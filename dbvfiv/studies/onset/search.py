@@ -5,7 +5,7 @@ on both sides, kind, and the uncertainty that the mesh leaves, from a second, co
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -43,44 +43,8 @@ SNAPSHOTS = 6
 MISSING = "No normal form:"
 
 
-@dataclass(frozen=True)
-class OnsetOptions:
-    """Options of `run_onset`.
-
-    Attributes
-    ----------
-    parameter : str
-    values : tuple of float
-        Values of the scan; crossings are looked for between the first and the last.
-    log : bool
-        Whether they are spaced logarithmically.
-    tolerance : float
-        Relative accuracy of an onset on its mesh.
-    normal_form : bool
-    coarse_mesh : float
-        Elements of the second mesh over those of the first; 0 for no uncertainty.
-    variant : Variant, optional
-        Flow model and symmetry class; those of the case's equilibria by default.
-    """
-
-    parameter: str
-    values: tuple[float, ...]
-    log: bool = False
-    tolerance: float = 1e-9
-    normal_form: bool = True
-    coarse_mesh: float = 0.5
-    variant: Variant | None = None
-
-    @classmethod
-    def of(cls, case: Case, variant: Variant | None = None) -> OnsetOptions:
-        """Options of a case file; cycles that leave the symmetry have normal forms of their own, not looked for."""
-        keys, axis = case.onset, case.onset.axis
-        form = keys.normal_form and (variant is None or variant.motion.of_equilibria)
-        return cls(axis.parameter, axis.values, axis.log, keys.tolerance, form, keys.coarse_mesh, variant)
-
-
 class OnsetSearch:
-    """Onsets along one parameter.
+    """Onsets along `onset.over` of a case.
 
     The order in which values are asked for follows from their eigenvalues alone, so a search that is given what an
     interrupted one had found repeats its steps without solving anything, and goes on where it ended.
@@ -88,7 +52,9 @@ class OnsetSearch:
     Parameters
     ----------
     case : Case
-    options : OnsetOptions
+    variant : Variant, optional
+        Flow model and symmetry class; those of the case's equilibria by default. Cycles that leave the symmetry have
+        normal forms of their own, not looked for.
     observer : Observer, optional
         `item` is told of every `Sample` and `OnsetPoint`; of a point again when more is known about it.
     walk : StabilityWalk, optional
@@ -104,24 +70,24 @@ class OnsetSearch:
     def __init__(
         self,
         case: Case,
-        options: OnsetOptions,
+        variant: Variant | None = None,
         observer: Observer | None = None,
         walk: StabilityWalk | None = None,
         place: Mu | None = None,
         known: Iterable[Sample | OnsetPoint] = (),
         mesh: int = FINE,
     ):
-        self.case, self.options, self.observer = case, options, observer or Observer()
-        variant = options.variant or own_variant(case)
-        self.walk = walk or StabilityWalk(case, self.observer, symmetry=variant.motion)
+        self.case, self.axis, self.observer = case, case.onset.axis, observer or Observer()
         base, known = place or Mu.of(case), list(known)
-        if options.variant is not None and options.parameter != "storage":
+        if variant is not None and self.axis.parameter != "storage":
             base = base.at(storage=variant.storage)
-        ends = np.array(options.values)
+        self.variant = variant or own_variant(case)
+        self.walk = walk or StabilityWalk(case, self.observer, symmetry=self.variant.motion)
+        ends = np.array(self.axis.values)
         taken = ends[np.unique(np.linspace(0, len(ends) - 1, SNAPSHOTS).astype(int))]
-        key = SampleKey(variant.storage, variant.symmetry, mesh)
+        key = SampleKey(self.variant.storage, self.variant.symmetry, mesh)
         samples = [item for item in known if isinstance(item, Sample)]
-        asked = options.parameter, taken, options.log
+        asked = self.axis.parameter, taken, self.axis.log
         self.line = ParameterLine(
             self.walk, base, *asked, snapshots=len(taken), key=key, known=samples, tell=self._found
         )
@@ -138,13 +104,13 @@ class OnsetSearch:
         if len(sample.eigenvalues):
             said = "" if sample.verdict.certain else ", uncertain"
             rate = sample.eigenvalues[0].real
-            self.observer.progress(f"{self.options.parameter} = {sample.value:.6g}: {rate:.4g} 1/s{said}")
+            self.observer.progress(f"{self.axis.parameter} = {sample.value:.6g}: {rate:.4g} 1/s{said}")
 
     def uncertainties(self) -> list[str]:
         """Sentences about what is not known: stretches of the scan without a certificate, and a band that was searched
         instead of all frequencies.
         """
-        name, said = self.options.parameter, []
+        name, said = self.axis.parameter, []
         for low, high in joined_stretches([self.scan.uncertain]):
             within = [s.left_open or s.failure or s.refusal for s in self._scanned if low <= s.value <= high]
             why = next(filter(None, within), "Spectrum and independent count do not agree everywhere.")
@@ -182,10 +148,11 @@ class OnsetSearch:
             point, mode = self._located(crossing)
             self._keep(point)
         else:
-            self.line.bracket(crossing, self.options.tolerance)  # repeats known samples, which belong to the scan
+            self.line.bracket(crossing, self.case.onset.tolerance)  # repeats known samples, which belong to the scan
             for value in (point.value, point.below.value, point.above.value):
                 self.walk.recall(self.place(value))
-        if self.options.normal_form and point.frequency > 0 and point.criticality is None and MISSING not in point.note:
+        asked = self.case.onset.normal_form and self.variant.motion.of_equilibria
+        if asked and point.frequency > 0 and point.criticality is None and MISSING not in point.note:
             self.observer.progress(f"normal form at {point.value:.6g}")
             self.points[key] = point  # an interruption does not take away what is known
             place = self.place(point.value)
@@ -209,8 +176,8 @@ class OnsetSearch:
         return replace(point, criticality=form.criticality, first_lyapunov_coefficient=form.l1, crossing_speed=speed)
 
     def _located(self, crossing: Crossing):
-        values = self.options.values
-        found = self.line.locate(crossing, self.options.tolerance)
+        values = self.axis.values
+        found = self.line.locate(crossing, self.case.onset.tolerance)
         mode = self.critical(self.place(found.value), found.eigenvalue)
         eigenvalue, value = complex(mode.eigenvalue), found.value
         width = ASIDE * abs(value) if value else ASIDE * (values[-1] - values[0])
@@ -219,7 +186,7 @@ class OnsetSearch:
         certified, line = all(s.certified for s in sides), max(s.line for s in sides)
         confirmed, note = _confirmed(below, above, crossing.gains, certified, line)
         return OnsetPoint(
-            self.options.parameter,
+            self.axis.parameter,
             value,
             abs(eigenvalue.imag) / (2 * np.pi),
             eigenvalue.real,
@@ -249,7 +216,7 @@ class OnsetSearch:
         apart = np.abs(spectrum.eigenvalues - eigenvalue)
         if not len(spectrum) or apart.min() > SAME * abs(eigenvalue):
             raise SolveError(
-                f"At {self.options.parameter} = {place[self.options.parameter]:.6g} the full pencil has no mode "
+                f"At {self.axis.parameter} = {place[self.axis.parameter]:.6g} the full pencil has no mode "
                 f"near {abs(eigenvalue.imag) / (2 * np.pi):.4g} Hz that is neutral, so no onset is claimed there."
             )
         return spectrum.mode(int(np.argmin(apart)))
@@ -311,7 +278,7 @@ def coarse_case(case: Case, share: float) -> tuple[Case, float]:
 
 
 def with_uncertainty(
-    case: Case, options: OnsetOptions, points: list[OnsetPoint], observer: Observer, warnings: list[str], known=()
+    case: Case, variant: Variant | None, points: list[OnsetPoint], observer: Observer, warnings: list[str], known=()
 ) -> list[OnsetPoint]:
     """Onsets again on a coarser mesh, matched by frequency and direction; Richardson's rule with the order of the
     element.
@@ -323,15 +290,15 @@ def with_uncertainty(
     known : iterable of Sample and OnsetPoint
         Of an interrupted run.
     """
-    coarse, ratio = coarse_case(case, options.coarse_mesh)
+    coarse, ratio = coarse_case(case, case.onset.coarse_mesh)
     if ratio < LEAST_RATIO:
         warnings.append("The mesh is too coarse for a second one, so onsets carry no uncertainty.")
         return points
     size = f"{coarse.mesh.around} x {coarse.mesh.along}"
     observer.progress(f"second mesh, {size}")
-    search = OnsetSearch(coarse, replace(options, normal_form=False), observer, known=known, mesh=COARSE)
+    search = OnsetSearch(coarse, variant, observer, known=known, mesh=COARSE)
     found, lost = [], set()
-    for crossing in search.scan.run(options.values):
+    for crossing in search.scan.run(search.axis.values):
         try:
             value, expected = search.line.bracket(crossing, LOCATED)
             eigenvalue = search.critical(search.place(value), expected).eigenvalue
@@ -359,18 +326,18 @@ def with_uncertainty(
 
 def run_onset(
     case: Case,
-    options: OnsetOptions | None = None,
+    variant: Variant | None = None,
     observer: Observer | None = None,
     known: Iterable[Sample | OnsetPoint] = (),
     walk: StabilityWalk | None = None,
 ) -> FoundOnsets:
-    """All onsets of a case along one parameter.
+    """All onsets of a case along `onset.over`.
 
     Parameters
     ----------
     case : Case
-    options : OnsetOptions, optional
-        Those of the case by default.
+    variant : Variant, optional
+        Flow model and symmetry class; those of the case's equilibria by default.
     observer : Observer, optional
         `item` is told of every `Sample` and `OnsetPoint` as it is found, and of a point again when more is known about
         it.
@@ -384,17 +351,15 @@ def run_onset(
     SolveError
         If no state of the scan was found.
     """
-    options = options or OnsetOptions.of(case)
-    observer, known = observer or Observer(), list(known)
-    search = OnsetSearch(case, options, observer, walk, known=known)
-    crossings = search.scan.run(options.values)
+    observer, known, parameter = observer or Observer(), list(known), case.onset.axis.parameter
+    search = OnsetSearch(case, variant, observer, walk, known=known)
+    crossings = search.scan.run(search.axis.values)
     unsound = {s.value: s.refusal for s in search.asked if s.refusal}
     failures = [why for value, why in search.scan.failures.items() if value not in unsound]
-    warnings = [not_valid_at(options.parameter, unsound)] if unsound else []
+    warnings = [not_valid_at(parameter, unsound)] if unsound else []
     if not (search.scan.samples or unsound):
         raise SolveError(
-            f"No state of the scan over {options.parameter} was found: "
-            f"{failures[0] if failures else 'the range is empty.'}"
+            f"No state of the scan over {parameter} was found: {failures[0] if failures else 'the range is empty.'}"
         )
     for crossing in crossings:
         observer.progress(f"onset between {crossing.low.value:.6g} and {crossing.high.value:.6g}")
@@ -404,15 +369,15 @@ def run_onset(
             failures.append(str(error))
     warnings += search.uncertainties()
     points = list(search.points.values())
-    if points and options.coarse_mesh > 0:
-        points = with_uncertainty(case, options, points, observer, warnings, known)
+    if points and case.onset.coarse_mesh > 0:
+        points = with_uncertainty(case, variant, points, observer, warnings, known)
     for p in points:
         if not p.confirmed:
-            warnings.append(f"The onset at {options.parameter} = {p.value:.6g} is not confirmed: {p.note}")
+            warnings.append(f"The onset at {parameter} = {p.value:.6g} is not confirmed: {p.note}")
     warnings += filter(None, [outside_band(case, [p.frequency for p in points])])
     points = tuple(sorted(points, key=lambda p: p.value))
-    variant = options.variant or own_variant(case)
-    return FoundOnsets(variant, tuple(search.asked), points, tuple(failures), tuple(warnings), tuple(search.missed))
+    samples, said = tuple(search.asked), (tuple(failures), tuple(warnings))
+    return FoundOnsets(search.variant, samples, points, *said, tuple(search.missed))
 
 
 def normal_form(case: Case, walk: StabilityWalk, place: Mu, mode, parameter: str | None = None):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import cached_property
 from typing import Any
 
@@ -12,7 +12,6 @@ from matplotlib.figure import Figure
 
 from ...case.parameters import PARAMETERS, Parameter
 from ...drawing.style import ACCENT, COMPUTED, HALO, PUBLISHED, REST, limits, log_axis, new_figure, parameter_label
-from ...model.symmetry import EQUILIBRIA
 from ...observer import Observer
 from ...record.record import GrowingRecord, Record
 from ...texts import digits
@@ -25,7 +24,7 @@ from ..stability.samples import SAMPLE_TABLE, Sample, keep_samples, read_samples
 from ..stability.verdict import DIVERGES, FLUTTERS, NOT_VALID, STABLE, UNDECIDED, Verdict, lowered
 from ..stability.walk import StabilityWalk
 from .line import FoundOnsets, Interval, OnsetPoint, joined_stretches
-from .search import FINE, OnsetOptions, run_onset
+from .search import FINE, run_onset
 
 CRITICALITY = {"super": "supercritical", "sub": "subcritical"}
 #: Kinds of notes: on a point, and on a variant that was searched to its end.
@@ -66,8 +65,7 @@ def run(session: Session, record: GrowingRecord) -> None:
             prefix = variant.prefix(asked[0])
             record.progress(f"{prefix}{variant.motion.words}" if prefix else "scan")
             known = [*read_samples(record), *_points(record, variant)]
-            own = walk if variant.motion == walk.symmetry else walk.in_class(variant.motion)
-            found = run_onset(case, OnsetOptions.of(case, variant), _Keeper(record, variant), known, own)
+            found = run_onset(case, variant, _Keeper(record, variant), known, walk.in_class(variant.motion))
             record.note(_DONE, variant=list(variant), failures=list(found.failures), warnings=list(found.warnings))
         for sentence in found.failures:
             record.fail(f"{variant.prefix(asked[0])}{sentence}")
@@ -146,8 +144,9 @@ class OnsetResult(StudyResult):
 
     @cached_property
     def points(self) -> tuple[dict[str, Any], ...]:
-        own, points = self.own, [point.summary() for point in self.own.points]
-        return tuple(merge_points(points, own.unstable_intervals, self.classes, self._own))
+        parts = (self.own, *self._classes)
+        points = {part.variant.symmetry: [point.summary() for point in part.points] for part in parts}
+        return tuple(merge_points(points, {part.variant.symmetry: part.unstable_intervals for part in parts}))
 
     @property
     def values(self) -> np.ndarray:
@@ -353,24 +352,15 @@ def disagreements(
 
 
 def merge_points(
-    own: Iterable[dict[str, Any]], unstable: Sequence[Interval], classes, name: str = EQUILIBRIA
+    points: Mapping[str, Sequence[dict[str, Any]]], unstable: Mapping[str, Sequence[Interval]]
 ) -> list[dict[str, Any]]:
-    """Points of all classes in ascending order. Where another class is unstable a crossing is no edge of stability.
-
-    Parameters
-    ----------
-    own : iterable of dict
-        Points of the class of the equilibria, with the stretches `unstable` in which that is unstable.
-    classes : sequence of dict
-        Summaries of the others, see `FoundOnsets.summary`.
-    name : str
-        Of the class of the equilibria.
+    """Points of all classes, by their names, in ascending order. Where another class is unstable, in the stretches that
+    it has, a crossing is no edge of stability.
     """
-    parts = {name: (list(own), unstable)} | {c["symmetry"]: (c["points"], c["unstable"]) for c in classes}
     merged = []
-    for name, (points, _) in parts.items():
-        elsewhere = [stretch for other, (_, found) in parts.items() if other != name for stretch in found]
-        for point in points:
+    for name, own in points.items():
+        elsewhere = [stretch for other, found in unstable.items() if other != name for stretch in found]
+        for point in own:
             covered = any(low <= point["value"] <= high for low, high in elsewhere)
             merged.append(point | {"symmetry": name, "edge": point["edge"] and not covered})
     return sorted(merged, key=lambda point: point["value"])
@@ -415,15 +405,11 @@ def onset(result: StudyResult) -> Figure:
 def _shade(result: StudyResult, scale: float, *panels) -> None:
     """Unstable ranges in a tint; hatched where nothing is certified, and so nothing claimed."""
     unsure = {"facecolor": "#ececec", "edgecolor": "#9a9a9a", "hatch": "////"}
-    _span(result.unstable_intervals, scale, panels, "unstable", facecolor=_UNSTABLE)
-    _span(result.uncertain_intervals, scale, panels, "uncertain", **unsure)
-
-
-def _span(intervals: list[Interval], scale: float, panels, label: str, **look) -> None:
-    for number, (a, b) in enumerate(intervals):
-        for axes in panels:
-            named = label if axes is panels[0] and not number else None
-            axes.axvspan(a / scale, b / scale, lw=0, zorder=0, label=named, **look)
+    for label, look in (("unstable", {"facecolor": _UNSTABLE}), ("uncertain", unsure)):
+        for number, (a, b) in enumerate(getattr(result, f"{label}_intervals")):
+            for axes in panels:
+                named = label if axes is panels[0] and not number else None
+                axes.axvspan(a / scale, b / scale, lw=0, zorder=0, label=named, **look)
 
 
 def _draw_scan(result: StudyResult, values: np.ndarray, top, bottom) -> float:

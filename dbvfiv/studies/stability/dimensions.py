@@ -119,30 +119,20 @@ def _require_two_laws(case: Case, study: str) -> None:
         without = "drive.kind is 'uniform'" if case.drive.kind != "flow" else "fluid.unsteady is false"
     if getattr(keys, "in_vacuo", False):
         without = "modes.in_vacuo leaves the fluid out"
-    if without:
-        raise CaseError(
-            f"{study}.continuity is given as 'both', but {without}, so that no flow model is at work; it must be "
-            "'case' then.",
-            key=f"{study}.continuity",
-        )
-    if case.is_compressed:
-        raise CaseError(
-            f"{study}.continuity is given as 'both', but a fluid that is compressed (fluid.sound_speed) stores mass, "
-            "and the quasi-steady model does not; it must be 'case' then.",
-            key=f"{study}.continuity",
-        )
+    why = f"{without}, so that no flow model is at work" if without else ""
+    if not why and case.is_compressed:
+        why = "a fluid that is compressed (fluid.sound_speed) stores mass, and the quasi-steady model does not"
+    if not why and getattr(getattr(keys, "axis", None), "parameter", "") == "storage":
+        why = f"{study}.over moves the flow model itself"
+    if why:
+        said = f"{study}.continuity is given as 'both', but {why}; it must be 'case' then."
+        raise CaseError(said, key=f"{study}.continuity")
     if study == "modes" and not asks_for_equilibria(keys.symmetry):
         own = equilibria_of(case.part).name
         raise CaseError(
             f"modes.continuity is given as 'both' with modes.symmetry = {keys.symmetry!r}, but the laws differ in "
             f"class {own} alone, since no other motion changes areas; modes.symmetry must be {own!r} then.",
             key="modes.continuity",
-        )
-    if getattr(getattr(keys, "axis", None), "parameter", "") == "storage":
-        raise CaseError(
-            f"{study}.continuity is given as 'both', but {study}.over moves the flow model itself; it must be 'case' "
-            "then.",
-            key=f"{study}.continuity",
         )
 
 

@@ -113,15 +113,11 @@ class OnsetCorrection:
 
     def _by_solving(self, value: float, near: complex) -> complex | None:
         try:
-            nearest = _nearest(self.direct(value), near)
+            values = self.direct(value)
         except SolveError:
             return None
-        return None if nearest is None or abs(nearest - near) > SAME * max(abs(near), 1.0) else nearest
-
-
-def _nearest(values: np.ndarray, near: complex) -> complex | None:
-    """The eigenvalue next to a place, None if there is none at all."""
-    return complex(values[int(np.argmin(np.abs(values - near)))]) if len(values) else None
+        beside = values[np.abs(values - near) <= SAME * max(abs(near), 1.0)]
+        return complex(beside[int(np.argmin(np.abs(beside - near)))]) if len(beside) else None
 
 
 # -- the line
@@ -295,24 +291,21 @@ class ParameterLine:
         """
         return np.asarray(self.walk.spectrum(self.place(value)).eigenvalues)
 
-    def _scanned(self, value: float) -> Sample:
-        if value in self.samples or self.counts == "all":
+    def _scanned(self, value: float, counted: bool = True) -> Sample:
+        """A sample where its count is asked for or costs nothing besides, else leading eigenvalues alone."""
+        if value in self.samples or (self.counts == "all" and (counted or not self.is_reduced)):
             sample = self.sample(value)
             if sample.is_missing:
                 raise SolveError(sample.failure or sample.refusal)
             return sample
-        if self.is_reduced:
-            return Sample(value, self.column.model.eigenvalues(self.place(value)))
-        return Sample(value, self.spectrum(value))
+        known = self.column.model.eigenvalues(self.place(value)) if self.is_reduced else self.spectrum(value)
+        return Sample(value, known)
 
     def _inside(self, value: float) -> Sample:
         """A sample on the way to a crossing. Where the wall relaxes the count costs most by far, and next to a neutral
         mode it is of no use, so it is left out there and the sample is not kept.
         """
-        counted = value in self.samples or (self.counts == "all" and not self.place(value).loss_factor)
-        if counted or not self.is_reduced:
-            return self._scanned(value)
-        return Sample(value, self.column.model.eigenvalues(self.place(value)))
+        return self._scanned(value, counted=not self.place(value).loss_factor)
 
     def bracket(self, crossing: Crossing, tolerance: float) -> tuple[float, complex]:
         """Value and eigenvalue of a crossing as samples have it, without a correction.

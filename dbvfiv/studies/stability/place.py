@@ -127,42 +127,26 @@ def require_parameter(case: Case, name: str) -> None:
             "give a line of one pipe, or set the pieces one by one.",
             key="upstream.pieces",
         )
-    if name == "pipe_length" and not case.has_line:
-        raise CaseError(
-            "There is no pipe_length to change: the valve has no line in front; give upstream.length (drive.pressure "
-            "is then that at its far end, see drive.at).",
-            key=PARAMETERS[name].key,
-        )
-    if name == "tail_length" and not case.has_tail:
-        raise CaseError(
-            "There is no tail_length to change: no pipe follows the valve; give downstream.pipe_diameter.",
-            key=PARAMETERS[name].key,
-        )
-    if name == "storage" and case.is_compressed:
-        raise CaseError(
-            "There is no flow model to change: a fluid that is compressed (fluid.sound_speed) stores mass.",
-            key=PARAMETERS[name].key,
-        )
-    if name == "density" and case.has_pump:
-        raise CaseError(
-            "Over the density a pump has no steady state to keep: its head is another pressure in another fluid; set "
-            "fluid.density for each, or give drive.pressure and no upstream.pump.",
-            key=PARAMETERS[name].key,
-        )
-    if name == "wave_speed" and not case.has_waves:
-        raise CaseError(
-            "There is no wave_speed to change: the valve has no elastic line in front; give upstream.length and "
-            "upstream.wave_speed.",
-            key=PARAMETERS[name].key,
-        )
-    if name == "sealing" and not (case.valve.sealing_pressure or case.valve.cracking_head):
-        raise CaseError(
-            "There is no sealing pressure to change: the bill is not moulded shut; give valve.sealing_pressure.",
-            key=PARAMETERS[name].key,
-        )
-    lacking = case.damping.lacks(name)
-    if lacking:
-        raise CaseError(f"There is no {name} to change: {lacking}.", key=PARAMETERS[name].key)
+    lacks = {
+        "pipe_length": not case.has_line
+        and "There is no pipe_length to change: the valve has no line in front; give upstream.length (drive.pressure "
+        "is then that at its far end, see drive.at).",
+        "tail_length": not case.has_tail
+        and "There is no tail_length to change: no pipe follows the valve; give downstream.pipe_diameter.",
+        "storage": case.is_compressed
+        and "There is no flow model to change: a fluid that is compressed (fluid.sound_speed) stores mass.",
+        "density": case.has_pump
+        and "Over the density a pump has no steady state to keep: its head is another pressure in another fluid; set "
+        "fluid.density for each, or give drive.pressure and no upstream.pump.",
+        "wave_speed": not case.has_waves
+        and "There is no wave_speed to change: the valve has no elastic line in front; give upstream.length and "
+        "upstream.wave_speed.",
+        "sealing": not (case.valve.sealing_pressure or case.valve.cracking_head)
+        and "There is no sealing pressure to change: the bill is not moulded shut; give valve.sealing_pressure.",
+    }
+    unknown = case.damping.lacks(name)
+    if said := lacks.get(name) or (unknown and f"There is no {name} to change: {unknown}."):
+        raise CaseError(said, key=PARAMETERS[name].key)
     used = {layer.material for layer in case.layers}
     if name == "strain" and not case.seeks_levels and not case.materials.levels(used):
         raise CaseError(

@@ -10,7 +10,7 @@ from dbvfiv.errors import CaseError, SolveError
 from dbvfiv.studies import session
 from dbvfiv.studies.case import Case, thesis_case
 from dbvfiv.studies.onset import search
-from dbvfiv.studies.onset.search import OnsetOptions, run_onset
+from dbvfiv.studies.onset.search import run_onset
 from dbvfiv.studies.session import Session
 from dbvfiv.studies.stability.walk import StabilityWalk
 from tests.small_valves import FORMER
@@ -23,10 +23,15 @@ def coarse_case(coarse_case):
     return coarse_case.replace(FORMER)
 
 
+def asked(case, over, **keys):
+    """A case whose onsets over a range are located, and nothing more."""
+    more = {f"onset.{name}": value for name, value in keys.items()}
+    return case.replace({"onset.over": over, "onset.normal_form": False, "onset.coarse_mesh": 0} | more)
+
+
 @pytest.fixture(scope="module")
 def over_density(coarse_case):
-    options = OnsetOptions("density", tuple(np.geomspace(1, 1000, 21)), True, normal_form=False, coarse_mesh=0)
-    return run_onset(coarse_case, options)
+    return run_onset(asked(coarse_case, "density=1:1000:21:log"))
 
 
 def test_the_onset_is_neutral_and_confirmed_on_both_sides(over_density):
@@ -41,8 +46,7 @@ def test_the_onset_is_neutral_and_confirmed_on_both_sides(over_density):
 def test_onset_over_pressure_meets_onset_over_density(over_density, coarse_case):
     (point,) = over_density.points
     case = coarse_case.replace({"fluid.density": point.value})
-    options = OnsetOptions("pressure", (5500.0, 6200.0, 7000.0), False, normal_form=False, coarse_mesh=0)
-    (other,) = run_onset(case, options).points
+    (other,) = run_onset(asked(case, "pressure=5500,6200,7000")).points
     assert other.value == pytest.approx(6000.0, rel=1e-6)
     assert other.frequency == pytest.approx(point.frequency, rel=1e-6)
 
@@ -57,20 +61,16 @@ def test_no_flow_no_onset(coarse_case):
         Session(coarse_case.replace({"drive.kind": "uniform"})).perform("onset")
 
 
-@pytest.mark.parametrize(
-    "parameter, values", [("alpha", (0.0, 40.0, 120.0)), ("beta", (0.002, 0.004, 0.008)), ("storage", (0.0, 0.5, 1.0))]
-)
-def test_onset_over_other_parameters(coarse_case, parameter, values):
-    options = OnsetOptions(parameter, values, normal_form=False, coarse_mesh=0)
-    result = run_onset(coarse_case.replace({"fluid.density": 20}), options)
+@pytest.mark.parametrize("over", ["alpha=0,40,120", "beta=0.002,0.004,0.008", "storage=0,0.5,1"])
+def test_onset_over_other_parameters(coarse_case, over):
+    result = run_onset(asked(coarse_case.replace({"fluid.density": 20}), over))
     (point,) = result.points
     assert point.confirmed and point.edge and not point.gains
     assert result.growth_rates[0, 0] > 0 > result.growth_rates[-1, 0]
 
 
 def test_onset_over_wall_thickness(coarse_case):
-    options = OnsetOptions("thickness", (0.8, 0.9, 1.1), normal_form=False, coarse_mesh=0, tolerance=1e-5)
-    result = run_onset(coarse_case, options)
+    result = run_onset(asked(coarse_case, "thickness=0.8,0.9,1.1", tolerance=1e-5))
     assert len(result.values) >= 3 and not result.failures
     (point,) = result.points
     assert point.confirmed and point.edge and point.gains and 0.8 < point.value < 0.9
@@ -79,8 +79,7 @@ def test_onset_over_wall_thickness(coarse_case):
 @pytest.mark.slow
 def test_criticality_and_uncertainty(coarse_case):
     case = coarse_case.replace({"mesh.around": 12, "mesh.along": 24})
-    options = OnsetOptions("density", tuple(np.geomspace(1, 1000, 21)), True, coarse_mesh=0.5)
-    (point,) = run_onset(case, options).points
+    (point,) = run_onset(asked(case, "density=1:1000:21:log", normal_form=True, coarse_mesh=0.5)).points
     assert point.criticality == "super" and point.first_lyapunov_coefficient < 0
     width = point.above.value - point.below.value
     speed = (point.above.eigenvalue.real - point.below.eigenvalue.real) / width
@@ -109,24 +108,23 @@ def _undamped(coarse_case, **more):
 
 def test_without_damping_growth_above_80_hz_is_no_stable_valve(coarse_case):
     # all that grows there does so above 100 Hz
-    options = OnsetOptions("density", (900.0, 1000.0, 1100.0), True, normal_form=False, coarse_mesh=0)
-    result = run_onset(_undamped(coarse_case, **{"fluid.continuity": "storage"}), options)
+    case = _undamped(coarse_case, **{"fluid.continuity": "storage"})
+    result = run_onset(asked(case, "density=900,1000,1100:log"))
     assert (result.growth_rates[:, 0] > 0.5).all() and (result.frequencies[:, 0] > 100.0).all()
     assert not result.stable_intervals and result.unstable_intervals
     assert any("hold for modes up to" in sentence for sentence in result.warnings)
 
 
 def test_a_band_that_is_asked_for_is_kept(coarse_case):
-    options = OnsetOptions("density", (100.0, 200.0, 400.0), True, normal_form=False, coarse_mesh=0)
-    result = run_onset(_undamped(coarse_case, **{"modes.max_frequency": 60.0}), options)
+    case = _undamped(coarse_case, **{"modes.max_frequency": 60.0})
+    result = run_onset(asked(case, "density=100,200,400:log"))
     assert np.nanmax(result.frequencies) <= 60.0
 
 
 @pytest.mark.slow
 def test_each_onset_over_alpha_is_listed_once_and_shown_by_its_sides(coarse_case):
-    options = OnsetOptions("alpha", tuple(np.linspace(0, 100, 6)), normal_form=False, coarse_mesh=0)
     case = coarse_case.replace({"damping.beta": 0, "fluid.density": 4, "mesh.along": 14})
-    points = run_onset(case, options).points
+    points = run_onset(asked(case, "alpha=0:100:6")).points
     assert len({round(p.value, 6) for p in points}) == len(points) >= 2
     for p in points:
         assert p.below.eigenvalue.real > 0 > p.above.eigenvalue.real and p.confirmed
@@ -140,8 +138,7 @@ def test_nothing_is_claimed_beside_a_value_without_a_certificate(coarse_case, mo
         return replace(sample, certain=sample.certain and abs(value - 100.0) > 1e-6)
 
     monkeypatch.setattr(StabilityWalk, "sample", doubtful)
-    options = OnsetOptions("density", (1.0, 10.0, 100.0, 1000.0), True, normal_form=False, coarse_mesh=0)
-    result = run_onset(coarse_case, options)
+    result = run_onset(asked(coarse_case, "density=1,10,100,1000:log"))
     assert not result.points
     assert result.certified.tolist() == [abs(v - 100.0) > 1e-6 for v in result.values]
     assert all(high <= 10.0 + 1e-9 for _, high in result.unstable_intervals) and not result.stable_intervals

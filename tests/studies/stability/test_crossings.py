@@ -8,9 +8,10 @@ import pytest
 
 from dbvfiv.case.axis import Level
 from dbvfiv.errors import JumpError, SolveError
+from dbvfiv.studies.case import Case
 from dbvfiv.studies.map.column import _crossings
 from dbvfiv.studies.onset.line import FoundOnsets
-from dbvfiv.studies.onset.search import OnsetOptions, OnsetSearch
+from dbvfiv.studies.onset.search import OnsetSearch
 from dbvfiv.studies.stability.dimensions import Variant
 from dbvfiv.studies.stability.line import LineOnset
 from dbvfiv.studies.stability.samples import Sample
@@ -117,7 +118,8 @@ class ClosedSearch(OnsetSearch):
     """Onsets over the pressure on a spectrum in closed form; there is no state at some values."""
 
     def __init__(self, spectrum, values, missing=()):
-        self.options, self.spectrum, self.missing = OnsetOptions("pressure", values), spectrum, missing
+        self.case = Case().replace({"onset.over": f"pressure={','.join(map(repr, values))}"})
+        self.axis, self.spectrum, self.missing = self.case.onset.axis, spectrum, missing
         self.scan = Scan(self._beside)
         self.line = SimpleNamespace(locate=lambda crossing, rel: LineOnset(*locate(self.scan, crossing, rel), 0.0))
 
@@ -136,7 +138,7 @@ class ClosedSearch(OnsetSearch):
 
     def found(self) -> FoundOnsets:
         points = []
-        for crossing in self.scan.run(self.options.values):
+        for crossing in self.scan.run(self.axis.values):
             try:
                 points.append(self._located(crossing)[0])
             except SolveError:
