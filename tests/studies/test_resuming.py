@@ -2,16 +2,10 @@
 was never interrupted.
 """
 
-import os
-import signal
-import subprocess
-import sys
-import time
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 
-import h5py
 import pytest
 
 from dbvfiv import resume
@@ -21,7 +15,7 @@ from dbvfiv.model.equilibria import LoadPath
 from dbvfiv.observer import Observer
 from dbvfiv.record.mesh import MeshData
 from dbvfiv.studies import session as sessions
-from dbvfiv.studies.case import THESIS, load_case
+from dbvfiv.studies.case import load_case
 from dbvfiv.studies.map.column import MapColumn
 from dbvfiv.studies.modes.search import FoundModes
 from dbvfiv.studies.session import Session, find_study, kept_run, load_result
@@ -291,37 +285,3 @@ def test_the_command_resumes(coarse_case, tmp_path, capsys):
     assert run(["resume", str(path)]) == 0
     assert "stable above" in capsys.readouterr().out
     assert run(["resume", str(path)]) == 2
-
-
-_RUN = """
-import sys
-from dbvfiv.cli import run
-if __name__ == "__main__":
-    sys.exit(run(sys.argv[1:]))
-"""
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("kind, table, rows", [("onset", "samples", 4), ("map", "columns", 2)])
-def test_a_killed_run_goes_on(wholes, tmp_path, kind, table, rows):
-    path, script = tmp_path / "run.h5", tmp_path / "go.py"
-    script.write_text(_RUN)
-    keys = THESIS | {"mesh.around": 8, "mesh.along": 16, "damping.alpha": 0, "damping.beta": 0.003}
-    keys |= {"fluid.density": 10, "drive.pressure": 6000} | RUNS[kind]
-    settings = [f"--set={k}={str(v).lower() if isinstance(v, bool) else v}" for k, v in keys.items()]
-    process = subprocess.Popen([sys.executable, str(script), kind, *settings, "-o", str(path)], cwd=os.getcwd())
-    deadline = time.time() + 240
-    while time.time() < deadline and process.poll() is None:
-        time.sleep(0.02)
-        try:
-            with h5py.File(path, "r", swmr=True, locking=False) as file:
-                if len(file[f"tables/{table}/#"]) >= rows:
-                    break
-        except (OSError, KeyError, RuntimeError):
-            continue
-    process.send_signal(signal.SIGKILL)
-    process.wait()
-    kept, watch = load_result(path), Watch()
-    assert not kept.complete and kept.record.rows(table) >= rows
-    same(resume(path, observer=watch), wholes(kind)[0])
-    assert len(watch.solved) <= len(wholes(kind)[1].solved) - rows
