@@ -1,4 +1,4 @@
-"""The valve behind a pipe: its modes against a pencil made by hand, three routes to one number, balances."""
+"""The valve behind a pipe: its modes against a pencil made by hand, balances."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from dbvfiv.studies.case import thesis_case
 from dbvfiv.studies.transient.run import Runner
 from eigen import leading_modes
 from tests.small_valves import FORMER
-from tests.verification.test_transient_modes import QUASI, STORAGE, check_three_routes, three_routes
+from tests.verification.test_transient_modes import LINE, QUASI, STORAGE
 
 SMALL = {"mesh.around": 8, "mesh.along": 12, **FORMER}
 WATER = {"drive.pressure": 500.0, "damping.alpha": 0.0, "damping.beta": 4e-4}
@@ -89,17 +89,6 @@ def test_water_flutters_behind_a_long_pipe_under_the_quasi_steady_law():
             print(f"{at} {length:g} m: {mode.real:+.3f} 1/s at {mode.imag / 2 / np.pi:.3f} Hz")
             assert mode.real == pytest.approx(growth, rel=0.1)
             assert frequency is None or mode.imag / (2 * np.pi) == pytest.approx(frequency, rel=0.1)
-
-
-LINE = {"upstream.length": 10.0, "upstream.friction": 0.02, "upstream.loss": 1.5, "upstream.diameter": "300 mm"}
-
-
-@pytest.mark.parametrize(
-    "law, pressure, density, further",
-    [(QUASI, 2e3, 10.0, LINE), (STORAGE, 6e3, 1.2, LINE | {"upstream.length": 2.0, "drive.at": "line"})],
-)
-def test_three_routes_behind_a_pipe(law, pressure, density, further):
-    check_three_routes(three_routes(law, pressure, density, further=further), law)
 
 
 @pytest.mark.slow
