@@ -154,14 +154,9 @@ def test_the_verdict_is_withheld_where_the_counts_disagree(model, state, flutter
     """A band that leaves the flutter out: nothing unstable is listed, the independent count sees it, and the mode that
     it sees is named as the whole search has it.
     """
-    told = []
-
-    class Listener(Observer):
-        def warn(self, sentence):
-            told.append(sentence)
-
-    options = ModesOptions(3, search=SearchOptions(max_frequency=25.0))
-    found = run_modes(model, state, LIGHT, options, Listener())
+    told, listener = [], Observer()
+    listener.warn = told.append
+    found = run_modes(model, state, LIGHT, ModesOptions(3, search=SearchOptions(max_frequency=25.0)), listener)
     assert found.certificate.unstable_count == 0 and found.stable is None
     assert told and found.verdict.outcome == "undecided"
     first = flutter.eigenvalues[0]
