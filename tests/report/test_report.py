@@ -558,10 +558,8 @@ def test_who_made_a_report_and_when():
         (("-o", "my.toml"), "such as my.html"),
     ],
 )
-def test_bad_arguments(command_line, one_sentence, arguments, words):
-    keys = [word for key in KEYS for word in ("--set", key)]
-    outcome = command_line("report", *keys, *arguments)
-    assert outcome.status == 2 and one_sentence(outcome.err) and words in outcome.err
+def test_bad_arguments(misused, arguments, words):
+    misused(words, "report", *(f"--set={key}" for key in KEYS), *arguments)
 
 
 @pytest.mark.slow

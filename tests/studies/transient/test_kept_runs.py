@@ -258,7 +258,7 @@ def test_a_run_that_fails_keeps_everything_and_says_where(tmp_path, valve, monke
 
 
 def test_a_run_that_fails_or_is_interrupted_at_once_can_be_read_and_resumed(
-    tmp_path, valve, monkeypatch, command_line, one_sentence
+    tmp_path, valve, monkeypatch, command_line, misused
 ):
     path = tmp_path / "run.h5"
 
@@ -277,8 +277,7 @@ def test_a_run_that_fails_or_is_interrupted_at_once_can_be_read_and_resumed(
         assert result.summary()["verdict"] == "undecided" and not result.drawable
         assert command_line("info", path).status == 0
         for arguments in (["plot", path, "--animate", 1], ["compare", path], ["verdict", path]):
-            outcome = command_line(*arguments)
-            assert outcome.status == 2 and one_sentence(outcome.err), outcome.err
+            misused("", *arguments)
         resumed = dbvfiv.resume(path)
         assert resumed.complete and np.array_equal(resumed.history["mass_flow"], whole.history["mass_flow"])
 
