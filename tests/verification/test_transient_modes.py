@@ -172,14 +172,8 @@ INSTALLED = {
     "downwards": (STORAGE, 4e3, 1000.0, {"gravity.direction": "-z"}, (6, 8)),
     "upwards in water": (STORAGE, 14e3, 1000.0, {"gravity.direction": "+z", "outside.fluid": "same"}, (6, 8)),
     "thick fluid": (QUASI, 1000.0, 1000.0, {"fluid.viscosity": 0.02}, (6, 8)),
-    "water": (STORAGE, 600.0, 1000.0, {"fluid.viscosity": "water"}, (6, 8)),
-    "water, pipe": (
-        STORAGE,
-        2e3,
-        1e3,
-        {"fluid.viscosity": "water", "upstream.length": 2, "upstream.loss": 0.5},
-        (6, 8),
-    ),
+    "water": (STORAGE, 600.0, 1000.0, VISCOUS, (6, 8)),
+    "water, pipe": (STORAGE, 2e3, 1e3, VISCOUS | {"upstream.length": 2, "upstream.loss": 0.5}, (6, 8)),
 }
 QUICK = ("short pipe", "pipe behind, storage")
 
