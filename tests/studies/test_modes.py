@@ -243,6 +243,7 @@ def sought_of(monkeypatch, rates, outcome, own, reduced, forces=3, holds=None):
     return critical_damping_factor(walk, place, Verdict(outcome, ""))
 
 
+@pytest.mark.slow
 def test_the_critical_damping_of_a_mode_beyond_the_list():
     """With less damping the first to flutter is a mode at 250 Hz, which the reduced operator of the lower ones has by
     0.6 % and no search up to their frequencies meets: neutral among all eigenvalues.

@@ -227,7 +227,7 @@ AIR = {"fluid.density": 1.2, "fluid.sound_speed": 340.0, "upstream.length": 3.0,
     [
         (QUASI, {}, 0),
         pytest.param(STORAGE, {}, 0, marks=pytest.mark.slow),
-        (STORAGE, SOFT_LINE, 1),
+        pytest.param(STORAGE, SOFT_LINE, 1, marks=pytest.mark.slow),
         pytest.param(STORAGE, AIR, 0, marks=pytest.mark.slow),
     ],
 )

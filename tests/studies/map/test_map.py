@@ -219,6 +219,7 @@ def _refuse(*_arguments, **_options):
     raise SingularShiftError("nothing to count")
 
 
+@pytest.mark.slow
 def test_cells_of_light_damping_are_those_of_the_full_matrices():
     """At beta = 1e-4 s quick modes lead, to 500 Hz, which a space made for slow ones knows to 10 % alone."""
     keys = SMALL | {"map.x": "pressure=450:1820:2", "map.y": "beta=1e-4:1e-2:4:log", "map.curve": False}

@@ -63,6 +63,7 @@ def test_outcomes_are_those_of_modes(valve, found):
         assert modes.state.outlet_area == pytest.approx(samples["opening"][i], rel=1e-6)
 
 
+@pytest.mark.slow
 def test_undecided_samples_say_why():
     """In a band below the flutter, with the key that moves its end."""
     light = {"damping.beta": 1e-4}
