@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from contextlib import contextmanager
 from dataclasses import dataclass
 
@@ -68,6 +69,18 @@ def refused():
         assert is_one_sentence(str(caught.value)), caught.value
 
     return block
+
+
+@pytest.fixture
+def misused(command_line):
+    """Command line that is refused in one sentence, which has these words or matches, before anything is printed."""
+
+    def call(words: str, *arguments: object) -> None:
+        outcome = command_line(*arguments)
+        assert outcome.status == 2 and outcome.out == "" and is_one_sentence(outcome.err), outcome
+        assert words in outcome.err or re.search(words, outcome.err), outcome.err
+
+    return call
 
 
 COARSE = {"mesh.around": 8, "mesh.along": 16}

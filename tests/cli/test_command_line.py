@@ -47,15 +47,6 @@ def test_version(command_line):
 
 
 @pytest.mark.parametrize(
-    "arguments", [["cas"], ["case", "--nonsense"], ["case", "a", "b"], ["case", "--set"], ["doctor", "x"]]
-)
-def test_a_wrong_command_line_is_one_sentence(command_line, one_sentence, arguments):
-    outcome = command_line(*arguments)
-    assert outcome.status == 2 and outcome.out == ""
-    assert one_sentence(outcome.err), outcome.err
-
-
-@pytest.mark.parametrize(
     "failure, status",
     [
         (CaseError("drive.pressure is wrong."), 2),
@@ -126,7 +117,7 @@ def test_case_printed_can_be_used_again(command_line, tmp_path):
     assert command_line("case", tmp_path / "a.toml", "--all").out == first.out
 
 
-def test_a_new_case_is_commented_valid_and_never_overwrites(command_line, one_sentence, tmp_path):
+def test_a_new_case_is_commented_valid_and_never_overwrites(command_line, misused, tmp_path):
     file = tmp_path / "new.toml"
     assert command_line("case", "--new", file, "--set", "fluid.density=1.2").status == 0
     text = file.read_text()
@@ -134,10 +125,9 @@ def test_a_new_case_is_commented_valid_and_never_overwrites(command_line, one_se
     assert command_line("case", file).status == 0
     assert '\ncontinuity = "storage"' in text and "inline valve, but for fluid.density." in text.replace("\n# ", " ")
     assert load_case(file) == load_case(None, ["fluid.density=1.2"])
-    again = command_line("case", "--new", file)
-    assert again.status == 2 and one_sentence(again.err) and file.read_text() == text
-    nowhere = command_line("case", "--new", tmp_path / "no" / "folder.toml")
-    assert nowhere.status == 2 and one_sentence(nowhere.err)
+    misused("", "case", "--new", file)
+    misused("", "case", "--new", tmp_path / "no" / "folder.toml")
+    assert file.read_text() == text
     assert command_line("case", "--new").status == 2
 
 
@@ -155,11 +145,6 @@ def test_explain(command_line, key, words):
     outcome = command_line("case", "--explain", key)
     assert outcome.status == 0
     assert all(word in outcome.out for word in words), outcome.out
-
-
-def test_explain_names_the_nearest_key(command_line, one_sentence):
-    outcome = command_line("case", "--explain", "drive.presure")
-    assert outcome.status == 2 and one_sentence(outcome.err) and "drive.pressure" in outcome.err
 
 
 def test_explain_everything_as_json(command_line):
@@ -254,16 +239,14 @@ def test_a_result_that_cannot_be_written_is_refused_before_the_work(tmp_path, ca
         (("design", "--cases", "{}/mine.toml"), "cannot be written"),
     ],
 )
-def test_a_case_file_that_cannot_be_written_is_refused_before_the_work(tmp_path, command_line, command, words):
+def test_a_case_file_that_cannot_be_written_is_refused_before_the_work(tmp_path, misused, command, words):
     for path in (tmp_path / "mine.toml", tmp_path / "designs" / "design-1.toml"):
         path.parent.mkdir(exist_ok=True)
         path.write_text("# of one's own\n")
-    told = command_line(*(part.format(tmp_path) for part in command))
-    assert told.status == 2 and re.search(words, told.err) and not told.out
+    misused(words, *(part.format(tmp_path) for part in command))
 
 
-def test_a_folder_for_figures_that_cannot_be_made_is_refused_first(command_line, one_sentence, tmp_path, monkeypatch):
+def test_a_folder_for_figures_that_cannot_be_made_is_refused_first(misused, tmp_path, monkeypatch):
     monkeypatch.setattr(Session, "perform", lambda *_, **__: pytest.fail("something was computed"))
     (tmp_path / "file").write_text("")
-    done = command_line("steady", "-p", "6 kPa", "--plots", tmp_path / "file" / "figures")
-    assert done.status == 2 and "--plots" in done.err and one_sentence(done.err)
+    misused("--plots", "steady", "-p", "6 kPa", "--plots", tmp_path / "file" / "figures")

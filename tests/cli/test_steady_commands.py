@@ -78,24 +78,6 @@ def test_which_pressures(monkeypatch, tmp_path, command_line, toml, arguments, e
     assert asked == pytest.approx(expected)
 
 
-@pytest.mark.parametrize(
-    "pressure",
-    ["nan", "inf", "-3", "-36 kPa", "0", "1e9", "5 mm", "2000 m", "much", "", "1:2", "5:1:3", "1:2:0", "a:b:c"],
-)
-def test_impossible_pressures(command_line, one_sentence, tmp_path, pressure):
-    outcome = command_line("steady", "--pressure", pressure, "-o", tmp_path / "r.h5")
-    assert outcome.status == 2 and outcome.out == "" and one_sentence(outcome.err), outcome.err
-    assert not (tmp_path / "r.h5").exists()
-
-
-@pytest.mark.parametrize(
-    "overrides", [["mesh.around=nine"], ["steady.pressures=[-1]"], ["shell.metric=true"], ["drive.pressure=-1"]]
-)
-def test_impossible_cases(command_line, one_sentence, overrides):
-    outcome = command_line("steady", *(x for o in overrides for x in ("--set", o)), "-p", "6 kPa")
-    assert outcome.status == 2 and outcome.out == "" and one_sentence(outcome.err), outcome.err
-
-
 def test_a_pressure_that_is_not_reached(command_line, one_sentence, tmp_path):
     hard = ("--set", "steady.max_iterations=4", "--set", "steady.min_step=1")
     outcome = command_line("steady", *COARSE, *hard, "-p", "50 Pa", "-p", "50 kPa", "-o", tmp_path / "r.h5", "--json")
@@ -133,11 +115,10 @@ def test_plot_and_export(command_line, coarse_run, tmp_path):
 
 
 @pytest.mark.parametrize("command", ["info", "plot", "export"])
-def test_files_that_are_no_results(command_line, one_sentence, tmp_path, command):
+def test_files_that_are_no_results(misused, tmp_path, command):
     (tmp_path / "a.h5").write_text("no")
     for path in (tmp_path / "a.h5", tmp_path / "none.h5", tmp_path):
-        outcome = command_line(command, path)
-        assert outcome.status == 2 and outcome.out == "" and one_sentence(outcome.err), outcome.err
+        misused("", command, path)
 
 
 @pytest.mark.parametrize(
@@ -159,7 +140,7 @@ def test_stopped_from_outside(tmp_path, one_sentence, kill, status):
     shown += rows[: next((i for i, line in enumerate(rows) if "total head" in line), None)]
     assert run.returncode == status
     if status > 0:
-        assert one_sentence(err.strip().splitlines()[-1].replace("; ", ", ")) and "has been kept" in err
+        assert one_sentence(err.strip().splitlines()[-1]) and "has been kept" in err
     assert "Traceback" not in err and "MPI" not in err and "PETSC ERROR" not in err
     kept = dbvfiv.load_result(path)
     assert len(kept.states) >= 3 and not kept.complete
@@ -180,12 +161,6 @@ def test_a_reader_that_leaves(tmp_path):
 def test_no_bar_without_a_terminal(command_line):
     outcome = command_line("steady", *COARSE, "-p", "500 Pa", "--json")
     assert "\r" not in outcome.err and "%|" not in outcome.err
-
-
-@pytest.mark.parametrize("given", ["2", "2e3", "2:50:12", "2 kPa:50:12", "-3"])
-def test_a_pressure_without_a_unit_is_refused(command_line, one_sentence, given):
-    outcome = command_line("steady", *COARSE, "-p", given)
-    assert outcome.status == 2 and "Pa or m?" in outcome.err and one_sentence(outcome.err)
 
 
 def test_heads_are_pressures_of_the_fluid(command_line):

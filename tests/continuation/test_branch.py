@@ -18,14 +18,13 @@ from continuation import (
     Event,
     NewtonOptions,
     NotConverged,
-    Observer,
     OutOfDomain,
     Reason,
     continue_branch,
     resume,
 )
 from continuation.jax_system import JaxSystem
-from tests.systems.following import follow
+from tests.systems.following import Stop, follow
 from tests.systems.normal_forms import cusp, stuart_landau
 
 MU = {"a": -2.0, "b": 1.0}
@@ -149,24 +148,6 @@ def test_a_model_may_say_that_it_ends():
     )
     assert branch.reason.endswith("outside the domain of the model: the lips would cross")
     assert 1.0 - 1e-6 < branch.values()[-1] <= 1.0
-
-
-class Stop(Observer):
-    def __init__(self, after):
-        self.after, self.refusals, self.finds, self.end = after, [], [], 0
-
-    def accepted(self, branch):
-        if len(branch) == self.after:
-            raise KeyboardInterrupt
-
-    def refused(self, branch, reason, step):
-        self.refusals.append((reason, step))
-
-    def found(self, branch, special):
-        self.finds.append(special.kind)
-
-    def ended(self, branch):
-        self.end += 1
 
 
 def test_interruption_keeps_points_and_resuming_gives_the_same_branch(tmp_path):

@@ -14,7 +14,6 @@ from continuation import (
     JaxSystem,
     NotABifurcation,
     NotConverged,
-    Observer,
     OrbitOptions,
     Reason,
     continue_orbits,
@@ -33,7 +32,7 @@ from continuation.normal_form import SystemForms
 from continuation.orbit_branches import OrbitSolver
 from continuation.periodic import PeriodicMotion
 from tests.systems.brusselator import brusselator, brusselator_1d
-from tests.systems.following import follow, hopf_of, normal_form_of
+from tests.systems.following import Stop, follow, hopf_of, normal_form_of
 from tests.systems.literature import fitzhugh_nagumo
 from tests.systems.lorenz import lorenz
 from tests.systems.normal_forms import bautin, stuart_landau, warped_stuart_landau
@@ -206,21 +205,6 @@ def test_fold_of_cycles_of_the_bautin_system(tmp_path):
     again = orbit_at(system, Branch.load(tmp_path / "cycles.h5"), -1)
     r2 = 0.5 + np.sqrt(0.25 + 0.3)
     assert np.allclose(again.amplitude(), np.sqrt(r2), rtol=1e-6)
-
-
-class Stop(Observer):
-    """Interrupt a run when it finds a special point, or at a number of points."""
-
-    def __init__(self, after: int = 0):
-        self.after = after
-
-    def accepted(self, branch):
-        if len(branch) == self.after:
-            raise KeyboardInterrupt
-
-    def found(self, branch, special):
-        if not self.after:
-            raise KeyboardInterrupt
 
 
 def test_a_fold_of_cycles_that_an_interruption_follows_is_listed_once():

@@ -93,6 +93,7 @@ def test_steady_flow_meets_the_equations():
         assert np.ptp(inner[: 1 + law.line.size // 2]) == 0.0
 
 
+@pytest.mark.slow
 def test_water_hammer():
     """A flow that is stopped raises the pressure by rho c dU at the flange, for 2 L/c, and lowers it as much for the
     next 2 L/c (Joukowsky 1898).
@@ -148,6 +149,7 @@ def characteristics(length, speed, loss, velocity, supply, nodes, count):
     return np.array(out), dt
 
 
+@pytest.mark.slow
 def test_friction_wears_a_blow_down_as_by_characteristics():
     """A line that loses much: mean pressures over each half period at the shut flange within 0.1 % of the blow."""
     length, speed, velocity, loss = 20.0, 1000.0, 1.0, 400.0

@@ -18,7 +18,6 @@ from eigen import leading_modes
 from tests.differences import difference
 from tests.flow.test_channel import FLOOR, passage
 from tests.flow.test_plug import swaying
-from tests.verification.test_transient_modes import check_three_routes, three_routes
 
 #: Parallel faces: width, height, length, m; 21 stations.
 WIDTH, HEIGHT, LENGTH = 0.2, 1e-3, 0.3
@@ -148,7 +147,7 @@ def test_wide_openings_lose_little_and_gaps_nearly_all():
     assert thin[1] == pytest.approx(plain[1], rel=1e-3)
 
 
-@pytest.mark.parametrize("law", ["quasi-steady", "storage"])
+@pytest.mark.parametrize("law", [pytest.param("quasi-steady", marks=pytest.mark.slow), "storage"])
 def test_cells_of_a_column_are_those_of_the_full_pencil(law):
     """Columns know fluids of unit density only. The density moves the steady state, so no study keeps it for others."""
     case = thesis_case(COARSE | {"fluid.viscosity": "water", "fluid.continuity": law, "drive.pressure": 600.0})
@@ -175,17 +174,3 @@ def test_a_thick_fluid_of_unit_density_sways_as_the_own_one():
     for power, name in enumerate(("A0", "A1", "A2")):
         size = np.abs(own[name]).max()
         assert np.sqrt(1000.0) ** power * unit[name] == pytest.approx(own[name], rel=1e-9, abs=1e-9 * size)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(
-    "law, pressure, fluid",
-    [
-        ("quasi-steady", 1000.0, {"fluid.viscosity": 0.02}),
-        ("storage", 600.0, {"fluid.viscosity": "water"}),
-        ("storage", 2000.0, {"fluid.viscosity": "water", "upstream.length": 2.0, "upstream.loss": 0.5}),
-    ],
-)
-def test_three_routes_through_a_gap(law, pressure, fluid):
-    """Eigenvalue, its reduction and the ringing of a valve whose gap takes a good part of the head."""
-    check_three_routes(three_routes(law, pressure, 1000.0, mesh=(6, 8), further=fluid), f"{law} {fluid}")

@@ -152,6 +152,7 @@ def test_derivatives_of_the_steady_flow():
     assert np.abs(law.steady_operator(area, 40e3)[1] @ a - expected).max() < 1e-7 * np.abs(expected).max()
 
 
+@pytest.mark.slow
 def test_pressures_at_rest_rise_as_those_of_a_slow_flow():
     """Equilibria of a wall begin there; without the derivative their curve turned at its first step."""
     z, area = passage()

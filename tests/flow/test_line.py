@@ -7,9 +7,8 @@ import pytest
 
 from dbvfiv.flow import Channel, Stream
 from dbvfiv.flow.terms.line import Line
-from eigen import CoupledPencil, certified_spectrum, leading_modes
+from eigen import CoupledPencil, leading_modes
 from tests.flow.test_channel import FLOOR, passage
-from tests.verification.critical import hopf
 
 DENSITY, SUPPLY = 998.0, 18e3
 
@@ -125,13 +124,3 @@ def test_a_valve_of_one_degree_has_the_roots_of_its_cubic(loss):
     found = leading_modes(pencil, 3).eigenvalues
     for root in roots[roots.imag >= 0]:
         assert np.abs(found - root).min() < 1e-8 * abs(root)
-
-
-def test_onset_of_a_valve_of_one_degree():
-    m, c, k = MASS, DAMPING, STIFFNESS
-    _, unit, r, _ = plug(1.0)
-    strength, omega = hopf(lambda s: plug(s / unit)[0], 0.1 * k, 2.0 * k)
-    assert strength == pytest.approx(k + c * r - m * k * r / (c + m * r), rel=1e-8)
-    assert omega**2 == pytest.approx(k * r / (c + m * r), rel=1e-8)
-    assert certified_spectrum(plug(1.01 * strength / unit)[0], 2).unstable_count == 2
-    assert certified_spectrum(plug(0.99 * strength / unit)[0], 2).unstable_count == 0

@@ -107,7 +107,8 @@ def test_a_steep_pump_changes_the_onset_as_the_closed_form_says(steep):
     omega2 = (k * r - onset * lost) / (c + m * r)
     if omega2 > 0:
         strength, omega = hopf(lambda s: plug(s / unit, steep)[0], 0.1 * onset, 3.0 * onset)
-        assert strength == pytest.approx(onset, rel=1e-7) and omega**2 == pytest.approx(omega2, rel=1e-7)
+        near = 1e-7 if steep else 1e-8
+        assert strength == pytest.approx(onset, rel=near) and omega**2 == pytest.approx(omega2, rel=near)
         if not steep:
             assert onset == pytest.approx(k + c * r - m * k * r / (c + m * r), rel=1e-9)
         assert certified_spectrum(plug(1.01 * onset / unit, steep)[0], 2).unstable_count == 2

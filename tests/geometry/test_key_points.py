@@ -126,6 +126,7 @@ def test_a_smooth_skin_goes_through_its_profiles_and_needs_no_row_on_them(tmp_pa
         valve_mesh(ruled.valve, ruled.mesh)
 
 
+@pytest.mark.slow
 def test_coarser_meshes_have_a_row_for_every_piece(tmp_path, monkeypatch, refused):
     """Levels of rubbers settle on fewer elements, and an onset is found again on a second mesh."""
     asked = []

@@ -117,7 +117,7 @@ def test_matrices_fall_into_two_classes_of_the_quarter(quarter, half, state, nam
     assert np.abs(slope[still]).max() < 1e-12 * abs(whole.slope).max()
 
 
-@pytest.mark.parametrize("name", list(UNION))
+@pytest.mark.parametrize("name", [pytest.param("S", marks=pytest.mark.slow), "A"])
 def test_the_spectrum_is_the_union_of_two_classes_of_the_quarter(quarter, half, state, name):
     """With the fluid; sideways in x a half has no plug that sways, so that class of the quarter is taken without."""
     q, h = find_open_state(), None

@@ -281,6 +281,7 @@ def test_moving_fluid_in_front_of_a_seal_keeps_its_energy():
     assert work == pytest.approx(entering - gained, rel=1e-6)
 
 
+@pytest.mark.slow
 def test_a_fluid_that_hardly_yields_is_one_that_does_not_in_front_of_a_seal():
     """Waves of 100 km/s: eigenvalues to 1e-8."""
     found = []

@@ -164,26 +164,25 @@ def test_key_points_that_are_gone_still_give_their_valve(tmp_path, monkeypatch):
     assert kept.case == case and _read(tmp_path).case.valve.inlet_radius == pytest.approx(0.06)
 
 
-def test_a_file_that_has_changed_is_not_taken_for_the_one_that_was_kept(tmp_path, monkeypatch, one_sentence):
+def test_a_file_that_has_changed_is_not_taken_for_the_one_that_was_kept(tmp_path, monkeypatch, refused):
     """A changed file is refused where the copy cannot be written; one that has gone is missed where it is read."""
     (tmp_path / "taken").write_text("a file where the cache should be")
     monkeypatch.setenv("DBVFIV_CACHE", str(tmp_path / "taken"))
     own = Attachment(str(tmp_path / "own.csv"), LATIN)
     assert own.place() == own.path
     Path(own.path).write_bytes(b"other")
-    with pytest.raises(CaseError, match="has changed since the result was made") as told:
+    with refused(CaseError, match="has changed since the result was made"):
         own.place()
-    assert one_sentence(str(told.value))
     Path(own.path).write_bytes(LATIN)
     assert own.place() == own.path
 
 
-def test_a_result_takes_the_place_of_a_result_alone(tmp_path, one_sentence):
+def test_a_result_takes_the_place_of_a_result_alone(tmp_path, refused):
     """Not of a device; where a link leads to one, that file."""
     os.mkfifo(tmp_path / "pipe.h5")
-    with pytest.raises(CaseError, match="no file that can hold a result") as told:
+    with refused(CaseError, match="no file that can hold a result"):
         refuse_foreign(tmp_path / "pipe.h5")
-    assert one_sentence(str(told.value)) and (tmp_path / "pipe.h5").is_fifo()
+    assert (tmp_path / "pipe.h5").is_fifo()
     (tmp_path / "link.h5").symlink_to(tmp_path / "run.h5")
     with Journal(tmp_path / "link.h5", Header.of("steady", Case()), None, ()):
         pass

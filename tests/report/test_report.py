@@ -286,6 +286,7 @@ def test_the_multiple_of_the_damping_is_that_of_all_classes(classes, factor, sou
     assert ("damping_sought" in joined.summary()) == np.isfinite(sought)  # as in results that know of none
 
 
+@pytest.mark.slow
 def test_heads_at_which_a_verdict_is_one_on_the_fit_of_the_rubber_are_named(tmp_path):
     case = load_case(None, [*KEYS, 'report.heads=["2 kPa", "36 kPa"]'])
     found = gather(case, "valve", tmp_path, (*LEFT_OUT, "closure", "law"), quiet=True)
@@ -558,10 +559,8 @@ def test_who_made_a_report_and_when():
         (("-o", "my.toml"), "such as my.html"),
     ],
 )
-def test_bad_arguments(command_line, one_sentence, arguments, words):
-    keys = [word for key in KEYS for word in ("--set", key)]
-    outcome = command_line("report", *keys, *arguments)
-    assert outcome.status == 2 and one_sentence(outcome.err) and words in outcome.err
+def test_bad_arguments(misused, arguments, words):
+    misused(words, "report", *(f"--set={key}" for key in KEYS), *arguments)
 
 
 @pytest.mark.slow

@@ -131,6 +131,7 @@ def test_changes_that_are_none(changes, words, refused):
     assert words in str(caught.value)
 
 
+@pytest.mark.slow
 def test_no_damping_and_no_pressure(valve, tmp_path, command_line):
     found = valve.replace({"map.refine": 1}).map("density=1:100:2:log", "pressure=1000:3000:2", alpha=0, beta=0)
     assert found.complete and found.lines()

@@ -80,12 +80,6 @@ def test_where_no_law_is_at_work_there_are_not_two(study, keys, words):
         getattr(load_small(STATE, keys, {f"{study}.continuity": "both"}), study)()
 
 
-def test_a_law_that_is_none(command_line, one_sentence):
-    for study in ("modes", "onset"):
-        outcome = command_line(study, "--law=volume")
-        assert outcome.status == 2 and one_sentence(outcome.err) and "quasi-steady, storage or both" in outcome.err
-
-
 def test_sentences():
     assert compare_states("storage", True, "quasi-steady", True) == "Both flow models find the state stable."
     assert "cannot be compared: undecided under storage" in compare_states("storage", None, "quasi-steady", None)

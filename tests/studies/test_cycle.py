@@ -9,16 +9,13 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from dbvfiv.case.parameters import Mu
 from dbvfiv.errors import CaseError, SolveError
-from dbvfiv.motion.equations import ValveMotion
-from dbvfiv.motion.scheme import scheme
-from dbvfiv.motion.stepper import Stepper, consistent_state
 from dbvfiv.studies.case import thesis_case
 from dbvfiv.studies.life import Life, motion_of
 from dbvfiv.studies.orbits import Orbit
 from dbvfiv.studies.session import Session, load_result, resume_result
 from tests.observers import Stop
+from tests.verification.test_cycles_in_time import run
 
 CASE = {
     "mesh.around": 6,
@@ -55,18 +52,6 @@ def test_life_of_a_cycle(found):
     assert np.allclose([part.release for part in finer.parts], [part.release for part in large.parts], rtol=1e-3)
 
 
-def lip_after(point, steps: int) -> float:
-    """Displacement of the lip after one period in time, from the cycle."""
-    orbit, model = point.orbit, point.orbit.model
-    motion, n = ValveMotion(model, Mu(density=orbit.mu["density"], alpha=0.0, beta=3e-3)), model.size
-    x, v, _ = (part[0] for part in orbit.motion.with_rates([0.0]))
-    state = consistent_state(motion, 0.0, x[:n], v[:n], orbit.mu["inlet"], np.array([x[n]]))
-    stepper = Stepper(motion, scheme("generalised-alpha"), lambda t: orbit.mu["inlet"])
-    for _ in range(steps):
-        state = stepper.step(state, orbit.motion.period / steps).state
-    return float(state.q[model.shell.dofs.index[model.mesh.rows[0, 0], 1]])
-
-
 def test_amplitude_is_the_root_of_the_distance_from_the_onset(found):
     """And the slope at the onset is the same from the first two cycles; frequencies tend to that of the onset."""
     first, second = found.points[:2]
@@ -82,7 +67,7 @@ def test_cycles_are_those_of_runs_in_time(found):
     """Steps come back to where they started but for their error of second order."""
     point = found.points[-1]
     start = point.orbit.lip[0]
-    coarse, fine = (lip_after(point, steps) - start for steps in (60, 120))
+    coarse, fine = (run(point, steps, periods=1)[-1] - start for steps in (60, 120))
     assert 3.0 < coarse / fine < 5.0
     assert abs(4 * fine - coarse) / 3 < 2e-3 * point.amplitude
 

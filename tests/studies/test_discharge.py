@@ -202,12 +202,10 @@ def test_axes_hold_the_widest_of_several_runs(runs):
     assert axes.get_xlim()[0] == 0 and axes.get_xlim()[1] > widest
 
 
-def test_what_cannot_be_compared(runs, command_line, one_sentence, tmp_path):
+def test_what_cannot_be_compared(runs, misused, tmp_path):
     other = load_small({"drive.pressure": "6 kPa"}).modes(count=2, output=tmp_path / "modes.h5").path
     for files, words in (((runs[0], other), "kind 'modes'"), ((other, runs[0]), "transient, steady and closure runs")):
-        outcome = command_line("compare", *files, "-o", tmp_path / "no.png")
-        assert outcome.status == 2 and one_sentence(outcome.err) and words in outcome.err
+        misused(words, "compare", *files, "-o", tmp_path / "no.png")
     still = load_small({"drive.kind": "uniform"}).session.replace({"steady.pressures": ["1 kPa"]})
     path = still.perform("steady", tmp_path / "still.h5").path
-    outcome = command_line("compare", runs[0], path, "-o", tmp_path / "no.png")
-    assert outcome.status == 2 and one_sentence(outcome.err) and "without flow" in outcome.err
+    misused("without flow", "compare", runs[0], path, "-o", tmp_path / "no.png")

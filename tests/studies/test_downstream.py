@@ -15,7 +15,6 @@ from dbvfiv.studies.stability.walk import StabilityWalk
 from eigen import SearchOptions, TransferBasis, certified_spectrum
 from tests.small_valves import FORMER, load_small
 from tests.studies.along import check_neutral
-from tests.verification.test_transient_modes import QUASI, STORAGE, check_three_routes, three_routes
 
 PIPE = {"downstream.pipe_diameter": "305 mm", "downstream.length": 5.0, "downstream.loss": 1.5}
 LIGHT = {"fluid.density": 10.0, "drive.pressure": "6 kPa", "damping.alpha": 0.0}
@@ -91,14 +90,6 @@ def test_onset_with_a_pipe_behind_is_where_modes_cross():
     (point,) = valve.onset("density=10:300:3:log", pressure="6 kPa").points
     assert point["confirmed"]
     check_neutral((LIGHT, PIPE), "fluid.density", point["value"], 1e-4)
-
-
-@pytest.mark.parametrize(
-    "law, pressure, density", [pytest.param(QUASI, 2e3, 10.0, marks=pytest.mark.slow), (STORAGE, 6e3, 1.2)]
-)
-def test_three_routes_with_a_pipe_behind(law, pressure, density):
-    """Eigenvalue, its reduction and a small kick in time."""
-    check_three_routes(three_routes(law, pressure, density, further=PIPE), law)
 
 
 def random_downstream(rng) -> dict:

@@ -18,7 +18,6 @@ from dbvfiv.studies.stability.place import is_surrounding
 from tests.model.test_residual_forms import check, difference
 from tests.small_valves import SMALL, load_small, make_valve, settings
 from tests.studies.along import check_map, check_sensitivity, check_sweep, check_walk
-from tests.verification.test_transient_modes import check_three_routes, three_routes
 
 DOWN, UP = {"gravity.direction": "-z"}, {"gravity.direction": "+z"}
 WET = {"outside.fluid": "same"}
@@ -82,12 +81,6 @@ def test_lips_that_lie_deep_in_water_are_driven_by_the_level_too(kind):
     require_consistent(deep.case, kind)
     with pytest.raises(CaseError, match="4 kPa, which is not above 4.308 kPa, downstream.pressure = 9.8 kPa less the"):
         require_consistent(deep.replace({"drive.pressure": 4e3}).case, kind)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("keys, pressure", [(DOWN, 4e3), (UP | WET, 14e3)], ids=str)
-def test_three_routes(keys, pressure):
-    check_three_routes(three_routes("storage", pressure, 1000.0, mesh=(6, 8), further=keys), str(keys))
 
 
 def test_energies_balance():

@@ -178,7 +178,7 @@ def test_valve_that_opens_some_times_a_day(opened, command_line, tmp_path):
     assert told[0].startswith("Hours to a crack of 2 mm: ") and "10 ways a day from rest to 18 kPa and back" in told[1]
 
 
-def test_run_in_time(command_line, one_sentence, tmp_path):
+def test_run_in_time(command_line, misused, tmp_path):
     """A part of a run without pause is the same as so often a day; full states too far apart are refused."""
     keys = {"transient.start": "rest", "transient.duration": 0.06, "transient.step": 1e-3, "drive.pressure": 6e3}
     keys["fluid.density"] = 60.0
@@ -195,8 +195,7 @@ def test_run_in_time(command_line, one_sentence, tmp_path):
         (("--since=-1",), "the run begins at 0 s"),
         (("--at", 5), "--at does not go with a result of kind 'transient', which takes --since and --per-day"),
     ):
-        outcome = command_line("life", sparse, *options)
-        assert outcome.status == 2 and one_sentence(outcome.err) and said in outcome.err
+        misused(said, "life", sparse, *options)
 
 
 def test_a_cycle_of_the_flow_alone_gives_the_time():
@@ -215,7 +214,7 @@ def test_a_cycle_of_the_flow_alone_gives_the_time():
         _run(result, None, None)
 
 
-def test_results_without_a_motion_are_refused(opened, command_line, one_sentence, tmp_path):
+def test_results_without_a_motion_are_refused(opened, misused, tmp_path):
     path = tmp_path / "run.h5"
     load_small({"transient.duration": 0.02, "transient.step": 1e-3}).transient(output=path)
     for arguments, words in (
@@ -226,8 +225,7 @@ def test_results_without_a_motion_are_refused(opened, command_line, one_sentence
         ([opened, "--per-day", 5, "--set=life.crack=1 um"], "life.crack"),
         ([opened, "--per-day", 5, "--since", 0], "which takes --per-day"),
     ):
-        outcome = command_line("life", *arguments)
-        assert outcome.status == 2 and one_sentence(outcome.err) and words in outcome.err
+        misused(words, "life", *arguments)
     result = load_small().steady([2e3])
     motion = motion_of(result, per_day=1.0)
     with pytest.raises(CaseError, match="does not move"):

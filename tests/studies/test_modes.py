@@ -153,14 +153,9 @@ def test_the_verdict_is_withheld_where_the_counts_disagree(model, state, flutter
     """A band that leaves the flutter out: nothing unstable is listed, the independent count sees it, and the mode that
     it sees is named as the whole search has it.
     """
-    told = []
-
-    class Listener(Observer):
-        def warn(self, sentence):
-            told.append(sentence)
-
-    keys = Keys(count=3, max_frequency=25.0)
-    found = run_modes(model, state, LIGHT, keys, Listener())
+    told, listener = [], Observer()
+    listener.warn = told.append
+    found = run_modes(model, state, LIGHT, Keys(count=3, max_frequency=25.0), listener)
     assert found.certificate.unstable_count == 0 and found.stable is None
     assert told and found.verdict.outcome == "undecided"
     first = flutter.eigenvalues[0]
@@ -247,6 +242,7 @@ def sought_of(monkeypatch, rates, outcome, own, reduced, forces=3, holds=None):
     return critical_damping_factor(walk, place, Verdict(outcome, ""))
 
 
+@pytest.mark.slow
 def test_the_critical_damping_of_a_mode_beyond_the_list():
     """With less damping the first to flutter is a mode at 250 Hz, which the reduced operator of the lower ones has by
     0.6 % and no search up to their frequencies meets: neutral among all eigenvalues.

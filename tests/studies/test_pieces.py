@@ -10,19 +10,12 @@ from dbvfiv.case import CaseError
 from dbvfiv.studies.stability.derivatives import parameters_of
 from tests.small_valves import load_small
 from tests.studies.along import check_sweep
-from tests.verification.test_transient_modes import check_three_routes, three_routes
+from tests.verification.test_transient_modes import MIXED
 
 STATE = {"drive.pressure": 6e3, "damping.alpha": 0.0, "fluid.density": 100.0}
 PIPE = {"diameter": "250 mm", "friction": 0.02}
 ONE = {f"upstream.{name}": value for name, value in PIPE.items()} | {"upstream.length": 12.0, "upstream.loss": 2.0}
 TWO = {"upstream.pieces": [{"length": 6.0, "loss": 1.0, **PIPE}] * 2}
-MIXED = {
-    "upstream.pieces": [
-        {"length": 4.0, "diameter": "300 mm", "loss": 0.5},
-        {"length": 8.0, "diameter": "250 mm", "wave_speed": 600.0, "elements": 3},
-        {"length": 2.0, "diameter": "200 mm", "friction": 0.02, "wave_speed": 900.0, "elements": 2},
-    ]
-}
 
 
 def with_waves(keys):
@@ -48,11 +41,6 @@ def test_two_equal_pieces_are_one_pipe(elastic):
     first, second = (load_small(STATE, keys, run).transient().history["lip_displacement"] for keys in lines)
     swing = np.ptp(first)
     assert swing > 0 and np.abs(second - first).max() < 1e-8 * np.abs(first).max()
-
-
-@pytest.mark.slow
-def test_three_routes_behind_pipes_of_each_kind():
-    check_three_routes(three_routes("storage", 6e3, 100.0, mesh=(6, 8), further=MIXED), "three pipes")
 
 
 @pytest.mark.slow

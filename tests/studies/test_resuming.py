@@ -2,16 +2,10 @@
 was never interrupted.
 """
 
-import os
-import signal
-import subprocess
-import sys
-import time
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 
-import h5py
 import pytest
 
 from dbvfiv import resume
@@ -21,7 +15,7 @@ from dbvfiv.model.equilibria import LoadPath
 from dbvfiv.observer import Observer
 from dbvfiv.record.mesh import MeshData
 from dbvfiv.studies import session as sessions
-from dbvfiv.studies.case import THESIS, load_case
+from dbvfiv.studies.case import load_case
 from dbvfiv.studies.map.column import MapColumn
 from dbvfiv.studies.modes.search import FoundModes
 from dbvfiv.studies.session import Session, find_study, kept_run, load_result
@@ -192,18 +186,22 @@ def test_steady_pressures_that_come_back_are_found_again_and_missed_ones_are_not
 
 @pytest.fixture
 def attempts(monkeypatch):
-    """Cases of steady runs, of which the first misses a pressure and is interrupted, and none finds a state."""
-    cases = []
+    """Cases and choices of runs that find nothing, of which the first misses a pressure and is interrupted."""
+    made = []
 
-    def run(_session, record):
-        cases.append(record.header.case)
-        record.begin("steady", 2)
-        if len(cases) == 1:
+    def run(_session, record, **choices):
+        made.append((record.header.case, choices))
+        record.begin(record.header.kind, 2)
+        if len(made) == 1:
             record.fail("At 2 kPa: no state.")
             raise KeyboardInterrupt
 
-    monkeypatch.setattr(sessions, "find_study", lambda kind: replace(find_study(kind), run=run))
-    return cases
+    def of(kind):
+        anew = {} if kind == "steady" else {"check": lambda _case: None, "rows_to_keep": None}
+        return replace(find_study(kind), run=run, **anew)
+
+    monkeypatch.setattr(sessions, "find_study", of)
+    return made
 
 
 def test_a_kept_run_that_missed_a_pressure_and_was_interrupted_goes_on(coarse_case, tmp_path, attempts):
@@ -224,35 +222,17 @@ def test_what_settled_levels_said_is_said_again(coarse_case, tmp_path, attempts)
 
 
 @pytest.mark.parametrize(("kind", "name"), [("design", "cases"), ("identify", "posterior")])
-def test_a_run_that_goes_on_writes_the_files_that_were_asked_for(coarse_case, tmp_path, monkeypatch, kind, name):
-    asked = []
-
-    def run(_session, record, **choices):
-        asked.append(choices)
-        record.begin(kind, 1)
-        if len(asked) == 1:
-            raise KeyboardInterrupt
-
-    other = replace(find_study(kind), run=run, check=lambda _case: None, rows_to_keep=None)
-    monkeypatch.setattr(sessions, "find_study", lambda _kind: other)
+def test_a_run_that_goes_on_writes_the_files_that_were_asked_for(
+    coarse_case, tmp_path, monkeypatch, attempts, kind, name
+):
     monkeypatch.chdir(tmp_path)
     Session(coarse_case).perform(kind, tmp_path / "run.h5", **{name: Path("written")})
     monkeypatch.chdir("/")
-    assert resume(tmp_path / "run.h5").complete and asked[1] == {name: tmp_path / "written"}
+    assert resume(tmp_path / "run.h5").complete and attempts[1][1] == {name: tmp_path / "written"}
 
 
 @pytest.mark.parametrize("lost", ["is there by now", "cannot be written any more"])
-def test_a_run_that_goes_on_ends_without_a_file_that_it_may_not_write(coarse_case, tmp_path, monkeypatch, lost):
-    asked = []
-
-    def run(_session, record, **choices):
-        asked.append(choices)
-        record.begin("identify", 1)
-        if len(asked) == 1:
-            raise KeyboardInterrupt
-
-    other = replace(find_study("identify"), run=run, check=lambda _case: None, rows_to_keep=None)
-    monkeypatch.setattr(sessions, "find_study", lambda _kind: other)
+def test_a_run_that_goes_on_ends_without_a_file_that_it_may_not_write(coarse_case, tmp_path, attempts, lost):
     folder = tmp_path / "folder"
     folder.mkdir()
     Session(coarse_case).perform("identify", tmp_path / "run.h5", posterior=folder / "known.toml")
@@ -262,7 +242,7 @@ def test_a_run_that_goes_on_ends_without_a_file_that_it_may_not_write(coarse_cas
         folder.rmdir()
         folder.write_text("no folder")
     result = resume(tmp_path / "run.h5")
-    assert result.complete and asked[1] == {} and lost in result.warnings[-1]
+    assert result.complete and attempts[1][1] == {} and lost in result.warnings[-1]
 
 
 def test_kept_runs_are_those_of_the_pressures_that_were_found(coarse_case, tmp_path, attempts, monkeypatch):
@@ -279,7 +259,7 @@ def test_kept_runs_are_those_of_the_pressures_that_were_found(coarse_case, tmp_p
         path = tmp_path / f"{key}.h5"
         for _ in range(2):  # each time by a session that knows nothing
             kept = kept_run("steady", Session(case), path)
-        assert value in (kept.case.drive.pressure, kept.case.valve.sealing_pressure) and attempts.pop() == kept.case
+        assert value in (kept.case.drive.pressure, kept.case.valve.sealing_pressure) and attempts.pop()[0] == kept.case
         assert len(attempts) == 1
 
 
@@ -291,37 +271,3 @@ def test_the_command_resumes(coarse_case, tmp_path, capsys):
     assert run(["resume", str(path)]) == 0
     assert "stable above" in capsys.readouterr().out
     assert run(["resume", str(path)]) == 2
-
-
-_RUN = """
-import sys
-from dbvfiv.cli import run
-if __name__ == "__main__":
-    sys.exit(run(sys.argv[1:]))
-"""
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("kind, table, rows", [("onset", "samples", 4), ("map", "columns", 2)])
-def test_a_killed_run_goes_on(wholes, tmp_path, kind, table, rows):
-    path, script = tmp_path / "run.h5", tmp_path / "go.py"
-    script.write_text(_RUN)
-    keys = THESIS | {"mesh.around": 8, "mesh.along": 16, "damping.alpha": 0, "damping.beta": 0.003}
-    keys |= {"fluid.density": 10, "drive.pressure": 6000} | RUNS[kind]
-    settings = [f"--set={k}={str(v).lower() if isinstance(v, bool) else v}" for k, v in keys.items()]
-    process = subprocess.Popen([sys.executable, str(script), kind, *settings, "-o", str(path)], cwd=os.getcwd())
-    deadline = time.time() + 240
-    while time.time() < deadline and process.poll() is None:
-        time.sleep(0.02)
-        try:
-            with h5py.File(path, "r", swmr=True, locking=False) as file:
-                if len(file[f"tables/{table}/#"]) >= rows:
-                    break
-        except (OSError, KeyError, RuntimeError):
-            continue
-    process.send_signal(signal.SIGKILL)
-    process.wait()
-    kept, watch = load_result(path), Watch()
-    assert not kept.complete and kept.record.rows(table) >= rows
-    same(resume(path, observer=watch), wholes(kind)[0])
-    assert len(watch.solved) <= len(wholes(kind)[1].solved) - rows

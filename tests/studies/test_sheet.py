@@ -77,26 +77,8 @@ def test_a_later_size_of_a_sheet_that_falls_short_is_told(command_line, tmp_path
     assert outcome.status == 1 and len(told) == 2 and len(rows_of(path)) == 2, outcome.err
 
 
-def test_a_sheet_does_not_take_the_name_of_measured_data(command_line, one_sentence, tmp_path):
+def test_a_sheet_does_not_take_the_name_of_measured_data(misused, tmp_path):
     path = tmp_path / "tap.csv"
     path.write_text(text := "pressure [kPa], flow [L/s]\n2, 3\n3, 9\n")
-    done = command_line("steady", *OPTIONS, "--set", f'steady.measured=["{path}"]', "-o", path)
-    assert done.status == 2 and one_sentence(done.err) and "a file that the case reads" in done.err
+    misused("a file that the case reads", "steady", *OPTIONS, "--set", f'steady.measured=["{path}"]', "-o", path)
     assert path.read_text() == text
-
-
-@pytest.mark.parametrize(
-    "arguments, part",
-    [
-        (("steady", "-o", "s.csv", "--units", "furlong"), "no unit to choose"),
-        (("steady", "-o", "s.csv", "--units", "m, ft"), "second unit"),
-        (("steady", "-o", "no/such/folder/s.csv"), "cannot be written"),
-        (("steady", "--scale", "2", "-o", "s.h5"), "goes with a sheet"),
-        (("steady", "--scale", "4 kPa", "-o", "s.csv"), "not a length"),
-        (("modes", "-o", "s.csv"), "names a sheet"),
-        (("modes", "-o", "m.json"), "would be an HDF5 file"),
-    ],
-)
-def test_what_is_no_sheet(command_line, one_sentence, arguments, part):
-    outcome = command_line(*arguments)
-    assert outcome.status == 2 and part in outcome.err and one_sentence(outcome.err.replace("; ", ", ")), outcome.err

@@ -141,13 +141,11 @@ def one_iteration(model) -> SteadyOptions:
     return SteadyOptions(NewtonOptions(tolerance=1e-12, max_iterations=1), min_step=0.3)
 
 
-def test_failure_is_one_sentence(model, one_sentence):
+def test_failure_is_one_sentence(model, refused):
     path = LoadPath(model, one_iteration(model))
-    with pytest.raises(SolveError) as caught:
+    with refused(SolveError, match="18000 Pa") as caught:
         path.go_to(18e3)
-    message = str(caught.value)
-    assert one_sentence(message)
-    assert "18000 Pa" in message and "iterations ran out" in message
+    assert "iterations ran out" in str(caught.value)
     assert path.pressure == 0.0 and np.all(path.q == 0.0)
 
 

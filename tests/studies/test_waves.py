@@ -26,6 +26,7 @@ def test_modes_along_a_parameter_are_those_of_each_value(over):
     check_sweep((BASE, {"sweep.checks": 2, "sweep.count": 4}), over, name[over.split("=")[0]], (1,))
 
 
+@pytest.mark.slow
 def test_no_door_calls_a_valve_stable_whose_line_is_too_coarse_for_its_modes():
     """Two elements resolve waves up to 3 Hz; the wall flutters at 46 Hz, as with sixty."""
     line = {"upstream.length": 120.0, "upstream.diameter": 0.3, "upstream.wave_speed": 400.0, "upstream.elements": 2}

@@ -1,8 +1,38 @@
-"""Branches of equilibria with all of their eigenvalues, and the Hopf points on them."""
+"""Branches of equilibria with all of their eigenvalues, the Hopf points on them, and runs that are interrupted."""
 
 from __future__ import annotations
 
-from continuation import Branch, ContinuationOptions, HopfNormalForm, SpecialPoint, continue_branch, hopf_normal_form
+from continuation import (
+    Branch,
+    ContinuationOptions,
+    HopfNormalForm,
+    Observer,
+    SpecialPoint,
+    continue_branch,
+    hopf_normal_form,
+)
+
+
+class Stop(Observer):
+    """Interrupt a run at a number of points, or without one at a special point, and keep what was told."""
+
+    def __init__(self, after: int = 0):
+        self.after, self.refusals, self.finds, self.end = after, [], [], 0
+
+    def accepted(self, branch):
+        if len(branch) == self.after:
+            raise KeyboardInterrupt
+
+    def refused(self, branch, reason, step):
+        self.refusals.append((reason, step))
+
+    def found(self, branch, special):
+        self.finds.append(special.kind)
+        if not self.after:
+            raise KeyboardInterrupt
+
+    def ended(self, branch):
+        self.end += 1
 
 
 def follow(system, start, mu, parameter: str, limits, **options) -> Branch:

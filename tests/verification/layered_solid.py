@@ -64,6 +64,38 @@ def parameters_of(layer) -> np.ndarray:
     return out
 
 
+def body_of(field: fem.FieldContainer, parameters: np.ndarray) -> fem.SolidBody:
+    """A body with constants (k, 49), quadrature point first, as FElupe orders its fields."""
+    parameters = jnp.asarray(parameters)
+
+    def flat(f):
+        return jnp.asarray(np.moveaxis(f, (2, 3), (0, 1)).reshape(-1, 3, 3))
+
+    def stress(x):
+        p = np.asarray(_stress(parameters, flat(x[0]))).reshape(*x[0].shape[2:], 3, 3)
+        return [np.ascontiguousarray(np.moveaxis(p, (0, 1), (2, 3))), x[-1]]
+
+    def tangent(x):
+        a = np.asarray(_tangent(parameters, flat(x[0]))).reshape(*x[0].shape[2:], 3, 3, 3, 3)
+        return [np.ascontiguousarray(np.moveaxis(a, (0, 1), (4, 5)))]
+
+    return fem.SolidBody(fem.Material(stress, tangent), field)
+
+
+class Solver:
+    """Solutions of systems, one after another, most of which have the pattern of the one before."""
+
+    factor: DirectFactor | None = None
+
+    def __call__(self, matrix: sp.csr_matrix, right: np.ndarray) -> np.ndarray:
+        matrix.sort_indices()
+        if self.factor is None or len(self.factor.values) != matrix.nnz:
+            self.factor = DirectFactor(matrix.indptr.astype(np.int32), matrix.indices.astype(np.int32))
+        self.factor.values[:] = matrix.data
+        self.factor.refactor()
+        return self.factor.solve(right)
+
+
 @dataclass
 class LayeredSolid:
     """Box of layers, bottom to top.
@@ -102,24 +134,8 @@ class LayeredSolid:
         layer = np.searchsorted(faces, middle) - 1
         count = quadrature.npoints
         table = np.array([parameters_of(item) for item in self.layers])
-        self._parameters = jnp.asarray(
-            np.tile(table[layer], (count, 1))
-        )  # quadrature point first, as FElupe orders its fields
-        self.body = fem.SolidBody(fem.Material(self._evaluate_stress, self._evaluate_tangent), self.field)
-        self._solver = None
-
-    def _flat(self, f):
-        return jnp.asarray(np.moveaxis(f, (2, 3), (0, 1)).reshape(-1, 3, 3))
-
-    def _evaluate_stress(self, x):
-        f, state = x[0], x[-1]
-        p = np.asarray(_stress(self._parameters, self._flat(f))).reshape(*f.shape[2:], 3, 3)
-        return [np.ascontiguousarray(np.moveaxis(p, (0, 1), (2, 3))), state]
-
-    def _evaluate_tangent(self, x):
-        f = x[0]
-        a = np.asarray(_tangent(self._parameters, self._flat(f))).reshape(*f.shape[2:], 3, 3, 3, 3)
-        return [np.ascontiguousarray(np.moveaxis(a, (0, 1), (4, 5)))]
+        self.body = body_of(self.field, np.tile(table[layer], (count, 1)))
+        self._solved = Solver()
 
     def column_weights(self, x: float) -> np.ndarray:
         """Weights (points,), summing to one, that spread a force evenly over the section at x."""
@@ -147,12 +163,7 @@ class LayeredSolid:
             if norm < tolerance * np.linalg.norm(force):
                 return u.copy()
             matrix = sp.csr_matrix(self.body.assemble.matrix(self.field))[free][:, free]
-            matrix.sort_indices()
-            if self._solver is None:
-                self._solver = DirectFactor(matrix.indptr.astype(np.int32), matrix.indices.astype(np.int32))
-            self._solver.values[:] = matrix.data
-            self._solver.refactor()
             step = np.zeros(u.size)
-            step[free] = self._solver.solve(residual[free])
+            step[free] = self._solved(matrix, residual[free])
             u -= step.reshape(u.shape)
         raise RuntimeError("the layered solid found no equilibrium")

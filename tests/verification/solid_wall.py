@@ -22,7 +22,6 @@ from dbvfiv.geometry.divisions import grading
 from dbvfiv.materials import IsotropicElastic
 from dbvfiv.model import ValveModel
 from dbvfiv.studies.case import thesis_case
-from eigen.factor import DirectFactor
 from tests.verification import layered_solid
 from tests.verification.test_modal_valve import ISOTROPIC
 
@@ -97,10 +96,9 @@ class SolidWall:
         self.field = fem.FieldContainer([fem.Field(self.region, dim=3)])
         self.cells = cells
         layer = base[:, 2] // (2 * self.through)
-        self._law = jnp.asarray(np.tile(self._parameters(layer, base), (8, 1)))
         self.density = np.array([item.law.density for item in section.layers])[layer]
-        self.body = fem.SolidBody(fem.Material(self._stress, self._tangent), self.field)
-        self._solver = None
+        self.body = layered_solid.body_of(self.field, np.tile(self._parameters(layer, base), (8, 1)))
+        self._solved = layered_solid.Solver()
 
     def _parameters(self, layer, base):
         """(ne, 49) constants; material axes follow the surface."""
@@ -113,16 +111,6 @@ class SolidWall:
         axes = np.stack([along, np.cross(normal, along), normal], axis=1)
         turn = np.einsum("eij,ejk->eik", table[:, 40:].reshape(-1, 3, 3), axes)
         return np.concatenate([table[:, :40], turn.reshape(-1, 9)], axis=1)
-
-    def _stress(self, x):
-        f = jnp.asarray(np.moveaxis(x[0], (2, 3), (0, 1)).reshape(-1, 3, 3))
-        p = np.asarray(layered_solid._stress(self._law, f)).reshape(*x[0].shape[2:], 3, 3)
-        return [np.ascontiguousarray(np.moveaxis(p, (0, 1), (2, 3))), x[-1]]
-
-    def _tangent(self, x):
-        f = jnp.asarray(np.moveaxis(x[0], (2, 3), (0, 1)).reshape(-1, 3, 3))
-        a = np.asarray(layered_solid._tangent(self._law, f)).reshape(*x[0].shape[2:], 3, 3, 3, 3)
-        return [np.ascontiguousarray(np.moveaxis(a, (0, 1), (4, 5)))]
 
     @cached_property
     def free(self) -> np.ndarray:
@@ -215,14 +203,6 @@ class SolidWall:
             u -= step.reshape(u.shape)
         return False
 
-    def _solved(self, matrix, right):
-        matrix.sort_indices()
-        if self._solver is None or len(self._solver.values) != matrix.nnz:
-            self._solver = DirectFactor(matrix.indptr.astype(np.int32), matrix.indices.astype(np.int32))
-        self._solver.values[:] = matrix.data
-        self._solver.refactor()
-        return self._solver.solve(right)
-
     def _pressed(self, faces, z, pressure, u):
         """Forces (n,) of the pressures and their stiffness (n, n)."""
         force, size = np.zeros(u.size), u.size
@@ -240,16 +220,6 @@ class SolidWall:
             values.append(slope.ravel())
         entries = np.concatenate(values), (np.concatenate(rows), np.concatenate(columns))
         return force, sp.coo_matrix(entries, shape=(size, size)).tocsr()
-
-    def stresses(self) -> np.ndarray:
-        """(cells, 8, 6) second Piola-Kirchhoff stresses 11, 22, 33, 23, 13, 12 in the axes of the material."""
-        f = np.moveaxis(self.field.extract()[0], (2, 3), (0, 1))  # (points, cells, 3, 3)
-        p = np.asarray(layered_solid._stress(self._law, jnp.asarray(f.reshape(-1, 3, 3))))
-        s = np.linalg.solve(f.reshape(-1, 3, 3), p)
-        turn = np.asarray(self._law[:, 40:]).reshape(-1, 3, 3)
-        local = turn @ s @ np.swapaxes(turn, 1, 2)
-        voigt = np.stack([local[:, i, j] for i, j in ((0, 0), (1, 1), (2, 2), (1, 2), (0, 2), (0, 1))], axis=-1)
-        return voigt.reshape(8, -1, 6).swapaxes(0, 1)
 
 
 def _normals(model: ValveModel) -> np.ndarray:
@@ -300,10 +270,7 @@ def _constants(layer) -> np.ndarray:
     """`layered_solid.parameters_of`, and those of an isotropic St Venant-Kirchhoff material."""
     law = layer.law
     if not isinstance(law, IsotropicElastic):
-        found = layered_solid.parameters_of(layer)
-        if not found[40:].any():  # rubber has no axes: stresses are told in those of the wall
-            found[40:] = np.eye(3).ravel()
-        return found
+        return layered_solid.parameters_of(layer)
     e, nu, out = law.youngs_modulus, law.poisson_ratio, np.zeros(49)
     s = np.diag([1 / e] * 3 + [2 * (1 + nu) / e] * 3)
     s[:3, :3] -= nu / e * (1 - np.eye(3))

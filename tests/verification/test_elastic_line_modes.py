@@ -1,42 +1,19 @@
-"""The valve behind an elastic line: three routes to one number, balances of line and valve, restart, the rigid limit,
-random installations.
-"""
+"""The valve behind an elastic line: balances of line and valve, counts in the band of resolved waves, random lines."""
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
-from scipy.integrate import trapezoid
-from scipy.interpolate import CubicSpline
 
 from dbvfiv.case.parameters import Mu
 from dbvfiv.model import ValveModel, linearise, select_search
 from dbvfiv.model.equilibria import LoadPath
-from dbvfiv.motion.control import RunOptions
-from dbvfiv.motion.stepper import StepOptions
 from dbvfiv.studies.case import thesis_case
-from dbvfiv.studies.transient.run import Runner
 from eigen import SearchOptions, TransferBasis, certified_spectrum
-from tests.verification.test_transient_modes import QUASI, STORAGE, check_three_routes, three_routes
+from tests.verification.test_line_modes import kicked
+from tests.verification.test_transient_modes import LINE, QUASI, STORAGE, WAVES
 
 SMALL = {"mesh.around": 8, "mesh.along": 12}
-LINE = {"upstream.length": 10.0, "upstream.friction": 0.02, "upstream.loss": 1.5, "upstream.diameter": "300 mm"}
-WAVES = LINE | {"upstream.wave_speed": 300.0}
-
-
-@pytest.mark.parametrize(
-    "law, pressure, density, further",
-    [
-        pytest.param(QUASI, 2e3, 10.0, WAVES, marks=pytest.mark.slow),
-        pytest.param(
-            STORAGE, 6e3, 100.0, WAVES | {"upstream.wave_speed": 400.0, "drive.at": "line"}, marks=pytest.mark.slow
-        ),
-    ],
-)
-def test_three_routes_behind_an_elastic_line(law, pressure, density, further):
-    check_three_routes(three_routes(law, pressure, density, further=further), law)
 
 
 @pytest.mark.slow
@@ -46,20 +23,9 @@ def test_balances_of_line_and_valve(law, speed):
     total pressure; and the wall's own balance.
     """
     step, density = 1e-4, 100.0
-    keys = {
-        "fluid.continuity": law,
-        "fluid.density": density,
-        "drive.pressure": 6e3,
-        "transient.start": "kick",
-        "transient.kick_opening": 1e-4,
-        "transient.step": step,
-        "transient.duration": 400 * step,  # areas are kept in single precision: what enters has to be much
-        "upstream.wave_speed": speed,
-    }
-    model = ValveModel(thesis_case(SMALL | WAVES | keys))
-    run = Runner(model, replace(RunOptions.of(model.case), step=StepOptions(tolerance=1e-9, floor=1e-13))).start()
-    assert not run.failures
-    h = run.history
+    # areas are kept in single precision: what enters in the time has to be much
+    keys = SMALL | WAVES | {"transient.kick_opening": 1e-4, "upstream.wave_speed": speed}
+    _, h, mass, own = kicked(law, density, step, keys)
     stored = h["line_kinetic_energy"] + h["line_elastic_energy"]
     missing = stored - stored[0] - (h["line_supply"] - h["line_dissipation"] - h["line_work"])
     moved = np.abs(np.diff(stored)).sum()
@@ -67,12 +33,6 @@ def test_balances_of_line_and_valve(law, speed):
     mean, middle = 0.5 * (flow[1:] + flow[:-1]), 0.5 * (velocity[1:] + velocity[:-1])
     handed = np.cumsum(step * mean * (h["station_pressure"][1:, -1] + 0.5 * density * middle**2))
     passed = np.abs(handed - h["line_work"][1:]).max() / np.abs(h["line_work"]).max()
-    entered, left = (CubicSpline(h["time"], h[name]).antiderivative() for name in ("inlet_mass_flow", "mass_flow"))
-    gained = entered(h["time"]) - left(h["time"])
-    volume = 4 * trapezoid(h["station_area"].astype(float), model.mesh.z, axis=1)
-    held = density * (volume - volume[0]) if law == STORAGE else 0.0
-    mass = np.abs(gained - held).max() / entered(h["time"])[-1]
-    own = np.abs(h["balance"]).max() / np.abs(np.diff(h["pressure_work"])).sum()
     off = np.abs(missing).max() / moved, passed, mass, own
     print(f"\n{law}: line {off[0]:.1e}, flange {off[1]:.1e}, mass {off[2]:.1e}, wall {off[3]:.1e}")
     assert max(off) < 1e-6

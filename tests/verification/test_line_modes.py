@@ -1,4 +1,4 @@
-"""The valve behind a pipe: its modes against a pencil made by hand, three routes to one number, balances."""
+"""The valve behind a pipe: its modes against a pencil made by hand, balances."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from dbvfiv.studies.case import thesis_case
 from dbvfiv.studies.transient.run import Runner
 from eigen import leading_modes
 from tests.small_valves import FORMER
-from tests.verification.test_transient_modes import QUASI, STORAGE, check_three_routes, three_routes
+from tests.verification.test_transient_modes import LINE, QUASI, STORAGE
 
 SMALL = {"mesh.around": 8, "mesh.along": 12, **FORMER}
 WATER = {"drive.pressure": 500.0, "damping.alpha": 0.0, "damping.beta": 4e-4}
@@ -91,15 +91,19 @@ def test_water_flutters_behind_a_long_pipe_under_the_quasi_steady_law():
             assert frequency is None or mode.imag / (2 * np.pi) == pytest.approx(frequency, rel=0.1)
 
 
-LINE = {"upstream.length": 10.0, "upstream.friction": 0.02, "upstream.loss": 1.5, "upstream.diameter": "300 mm"}
-
-
-@pytest.mark.parametrize(
-    "law, pressure, density, further",
-    [(QUASI, 2e3, 10.0, LINE), (STORAGE, 6e3, 1.2, LINE | {"upstream.length": 2.0, "drive.at": "line"})],
-)
-def test_three_routes_behind_a_pipe(law, pressure, density, further):
-    check_three_routes(three_routes(law, pressure, density, further=further), law)
+def kicked(law: str, density: float, step: float, keys) -> tuple[ValveModel, dict, float, float]:
+    """Model and record of a kicked run of 400 steps, and what the mass of fluid and the wall's own balance miss."""
+    keys = keys | {"fluid.continuity": law, "fluid.density": density, "drive.pressure": 6e3, "transient.start": "kick"}
+    model = ValveModel(thesis_case(keys | {"transient.step": step, "transient.duration": 400 * step}))
+    run = Runner(model, replace(RunOptions.of(model.case), step=StepOptions(tolerance=1e-9, floor=1e-13))).start()
+    assert not run.failures
+    h = run.history
+    entered, left = (CubicSpline(h["time"], h[name]).antiderivative() for name in ("inlet_mass_flow", "mass_flow"))
+    gained = entered(h["time"]) - left(h["time"])
+    volume = QUARTER.copies * trapezoid(h["station_area"].astype(float), model.mesh.z, axis=1)
+    held = density * (volume - volume[0]) if law == STORAGE else 0.0
+    mass = np.abs(gained - held).max() / entered(h["time"])[-1]
+    return model, h, mass, np.abs(h["balance"]).max() / np.abs(np.diff(h["pressure_work"])).sum()
 
 
 @pytest.mark.slow
@@ -109,20 +113,7 @@ def test_balances_of_line_and_valve(law):
     it or stays in it; and the wall's own balance.
     """
     step, density, length = 1.25e-4, 100.0, 10.0
-    keys = {
-        "fluid.continuity": law,
-        "fluid.density": density,
-        "drive.pressure": 6e3,
-        "transient.start": "kick",
-        "transient.kick_opening": 1e-3,
-        "transient.step": step,
-        "transient.duration": 400 * step,
-    }
-    case = thesis_case(SMALL | LINE | keys)
-    model = ValveModel(case)
-    run = Runner(model, replace(RunOptions.of(case), step=StepOptions(tolerance=1e-9, floor=1e-13))).start()
-    assert not run.failures
-    h = run.history
+    model, h, mass, own = kicked(law, density, step, SMALL | LINE | {"transient.kick_opening": 1e-3})
     section = QUARTER.copies * float(model.mesh.rest_area[-1] - model.mesh.wall_deduction[-1])
     pipe = 0.25 * np.pi * 0.3**2
     velocity = h["inlet_velocity"]
@@ -133,16 +124,9 @@ def test_balances_of_line_and_valve(law):
     column = 0.5 * density * length * pipe * (velocity * section / pipe) ** 2
     handed = np.cumsum(taken * (h["station_pressure"][1:, -1] + 0.5 * density * mean**2))
     missing = supplied - lost - handed - (column[1:] - column[0])
-    moved = np.abs(np.diff(column)).sum()
-    entered, left = (CubicSpline(h["time"], h[name]).antiderivative() for name in ("inlet_mass_flow", "mass_flow"))
-    gained = entered(h["time"]) - left(h["time"])
-    areas = h["station_area"].astype(float)
-    volume = QUARTER.copies * trapezoid(areas, model.mesh.z, axis=1)
-    held = density * (volume - volume[0]) if law == STORAGE else 0.0
-    own = np.abs(h["balance"]).max() / np.abs(np.diff(h["pressure_work"])).sum()
-    off = np.abs(missing).max() / moved, np.abs(gained - held).max() / entered(h["time"])[-1]
-    print(f"\n{law}: energy of the line {off[0]:.1e}, mass {off[1]:.1e}, wall {own:.1e}")
-    assert max(*off, own) < 1e-6
+    line = np.abs(missing).max() / np.abs(np.diff(column)).sum()
+    print(f"\n{law}: energy of the line {line:.1e}, mass {mass:.1e}, wall {own:.1e}")
+    assert max(line, mass, own) < 1e-6
 
 
 def test_a_line_without_length_is_none():

@@ -1,5 +1,5 @@
-"""The wall of the 12-inch valve as shell and as solid: frequencies, displacements, stresses, at full, half and a tenth
-of the thickness.
+"""The wall of the 12-inch valve as shell and as solid: frequencies and displacements at full, half and a tenth of the
+thickness.
 
 Wall of a uniform thickness, 14.38 mm times a factor. At the full one half the wall exceeds the smallest radius of the
 mid-surface, 6.19 mm, and no solid has that shape; 0.85 of it is about the thickest that one can have.

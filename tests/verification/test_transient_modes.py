@@ -147,6 +147,43 @@ def test_three_routes(law, pressure, density, sign):
     assert off[1] < 0.3 * off[0]
 
 
+LINE = {"upstream.length": 10.0, "upstream.friction": 0.02, "upstream.loss": 1.5, "upstream.diameter": "300 mm"}
+WAVES = LINE | {"upstream.wave_speed": 300.0}
+#: A rigid pipe before two elastic ones.
+MIXED = {
+    "upstream.pieces": [
+        {"length": 4.0, "diameter": "300 mm", "loss": 0.5},
+        {"length": 8.0, "diameter": "250 mm", "wave_speed": 600.0, "elements": 3},
+        {"length": 2.0, "diameter": "200 mm", "friction": 0.02, "wave_speed": 900.0, "elements": 2},
+    ]
+}
+VISCOUS = {"fluid.viscosity": "water"}
+TAIL = {"downstream.pipe_diameter": "305 mm", "downstream.length": 5.0, "downstream.loss": 1.5}
+#: Installations and fluids by name: continuity law, pressure, density, keys, and mesh where it is not (8, 12); the last
+#: three are gaps that take a good part of the head.
+INSTALLED = {
+    "pipe": (QUASI, 2e3, 10.0, LINE),
+    "short pipe": (STORAGE, 6e3, 1.2, LINE | {"upstream.length": 2.0, "drive.at": "line"}),
+    "elastic line": (QUASI, 2e3, 10.0, WAVES),
+    "elastic line from a gauge": (STORAGE, 6e3, 100.0, WAVES | {"upstream.wave_speed": 400.0, "drive.at": "line"}),
+    "three pipes": (STORAGE, 6e3, 100.0, MIXED, (6, 8)),
+    "pipe behind": (QUASI, 2e3, 10.0, TAIL),
+    "pipe behind, storage": (STORAGE, 6e3, 1.2, TAIL),
+    "downwards": (STORAGE, 4e3, 1000.0, {"gravity.direction": "-z"}, (6, 8)),
+    "upwards in water": (STORAGE, 14e3, 1000.0, {"gravity.direction": "+z", "outside.fluid": "same"}, (6, 8)),
+    "thick fluid": (QUASI, 1000.0, 1000.0, {"fluid.viscosity": 0.02}, (6, 8)),
+    "water": (STORAGE, 600.0, 1000.0, VISCOUS, (6, 8)),
+    "water, pipe": (STORAGE, 2e3, 1e3, VISCOUS | {"upstream.length": 2, "upstream.loss": 0.5}, (6, 8)),
+}
+QUICK = ("short pipe", "pipe behind, storage")
+
+
+@pytest.mark.parametrize("name", [n if n in QUICK else pytest.param(n, marks=pytest.mark.slow) for n in INSTALLED])
+def test_three_routes_of_installations(name):
+    law, pressure, density, further, *mesh = INSTALLED[name]
+    check_three_routes(three_routes(law, pressure, density, *mesh, further=further), name)
+
+
 def test_three_routes_with_the_default_mesh():
     """Mass and inertia of the fluid are the same in spectra and in time; they move the eigenvalue by more than these
     differ.
@@ -190,7 +227,7 @@ AIR = {"fluid.density": 1.2, "fluid.sound_speed": 340.0, "upstream.length": 3.0,
     [
         (QUASI, {}, 0),
         pytest.param(STORAGE, {}, 0, marks=pytest.mark.slow),
-        (STORAGE, SOFT_LINE, 1),
+        pytest.param(STORAGE, SOFT_LINE, 1, marks=pytest.mark.slow),
         pytest.param(STORAGE, AIR, 0, marks=pytest.mark.slow),
     ],
 )

@@ -41,8 +41,3 @@ def test_a_wall_that_snaps_is_told_in_a_sentence(command_line, one_sentence):
     assert done.status == 1
     last = done.err.strip().splitlines()[-1]
     assert one_sentence(last) and "were reached" in last
-
-
-def test_an_impossible_pressure(command_line, one_sentence):
-    done = command_line("closure", "-p", "-3 kPa")
-    assert done.status == 2 and one_sentence(done.err)

@@ -40,13 +40,6 @@ def test_a_file_reads_back_as_the_result(run):
     assert again.case.closure.pressures == (2e3, 9e3)
 
 
-def test_the_keys_that_scripts_rely_on(run):
-    point = run[0].summary()["points"][-1]
-    keys = {"pressure", "closed", "sealed_length", "contact_force", "max_displacement", "lowest_stiffness_eigenvalue"}
-    assert keys <= set(point)
-    assert point["closed"] is True and point["contact_force"] > 0
-
-
 def test_a_copy_saves_the_same(run, tmp_path):
     result, path = run
     copy = load_result(path).save(tmp_path / "copy.h5")

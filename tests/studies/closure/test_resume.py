@@ -3,11 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
-import signal
-import subprocess
-import sys
-import time
 from types import SimpleNamespace
 
 import numpy as np
@@ -15,7 +10,7 @@ import pytest
 
 from dbvfiv.api import load, resume
 from dbvfiv.errors import CaseError
-from dbvfiv.studies.case import THESIS, thesis_case
+from dbvfiv.studies.case import thesis_case
 from dbvfiv.studies.closure.walk import BUCKLED_CLASS, ClosureWalk
 from dbvfiv.studies.session import load_result
 from tests.observers import Stop
@@ -81,30 +76,3 @@ def test_what_buckles_in_another_class_is_said_again(whole):
     walk.record = SimpleNamespace(rows=lambda _: 0, notes=notes.get, warn=said.append)
     walk._warn_of_states()
     assert len(said) == 1 and said[0].startswith("The wall buckles at 7000 Pa in class SA: ")
-
-
-@pytest.mark.slow
-def test_a_killed_run_has_lost_no_finished_state(whole, tmp_path):
-    path = tmp_path / "run.h5"
-    words = [f"--set={key}={value}" for key, value in (THESIS | COARSE).items()]
-    command = [
-        sys.executable,
-        "-m",
-        "dbvfiv",
-        "closure",
-        *words,
-        *(f"--pressure={p / 1e3:g} kPa" for p in PRESSURES),
-        "-o",
-        str(path),
-    ]
-    run = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True)
-    for line in run.stdout:
-        if line.split()[:1] == ["4"]:
-            break
-    time.sleep(0.05)
-    os.kill(run.pid, signal.SIGKILL)
-    run.wait()
-    kept = load_result(path)
-    assert not kept.complete and len(kept.states) >= 1
-    assert np.array_equal(kept.states[0].nodal, whole.states[0].nodal)
-    agree(resume(path), whole)

@@ -18,7 +18,6 @@ from dbvfiv.studies.inputs import Plan, quasi_random
 from dbvfiv.studies.stability.place import key_of, redesigned
 from dbvfiv.studies.stability.verdict import OUTCOMES
 from dbvfiv.studies.stability.walk import StabilityWalk
-from tests.observers import Stop
 from tests.small_valves import load_small
 
 KEYS = {"fluid.density": 20.0, "damping.beta": 3e-3, "design.evaluations": 4, "design.finer": 1}
@@ -151,15 +150,6 @@ def test_five_starts_have_one_optimum():
     values = np.array([note["values"] for note in result.found])
     assert values == pytest.approx(np.array([result.best[0].values] * 5), rel=0.02)
     assert [starts for _, starts in result.optima()] == [5]
-
-
-@pytest.mark.slow
-def test_an_interrupted_run_goes_on(valve, found, tmp_path):
-    path = tmp_path / "d.h5"
-    part = valve.design(VARIABLES, aim=AIM, constraints=CONSTRAINTS, output=path, observer=Stop(2))
-    assert not part.complete and not part.best
-    again = dbvfiv.resume(path)
-    assert again.complete and again.best[0].values == pytest.approx(found.best[0].values, rel=1e-6)
 
 
 @pytest.mark.slow

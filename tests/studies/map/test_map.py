@@ -1,8 +1,7 @@
 """Stability maps on a coarse mesh: order of columns, certificates, gaps, resume, lost workers."""
 
 import json
-import os
-import signal
+import multiprocessing
 from dataclasses import replace
 from types import SimpleNamespace
 
@@ -166,7 +165,7 @@ def test_json_and_figures(command_line, tmp_path):
     assert {p.name for p in (tmp_path / "figures").iterdir()} == {"stability-map.png", "leading-frequency.png"}
 
 
-def test_the_command_says_what_is_fixed(command_line, one_sentence, tmp_path):
+def test_the_command_says_what_is_fixed(command_line, misused, tmp_path):
     mesh = settings({"mesh.around": 6, "mesh.along": 10, "map.checks": 0, "map.curve": False})
     axes = ["--x", "density=1:100:3:log", "--y", "beta=0.001:0.004:3"]
     path = tmp_path / "map.h5"
@@ -175,27 +174,20 @@ def test_the_command_says_what_is_fixed(command_line, one_sentence, tmp_path):
     assert outcome.out.startswith("At 4 kPa static, quasi-steady, α = ")
     fixed = load_result(path).summary()["fixed"]
     assert fixed["pressure"] == 4e3 and not {"density", "beta"} & set(fixed)
-    outcome = command_line("map", *mesh, *axes, "--density", 10)
-    assert outcome.status == 2 and "map.x" in outcome.err and one_sentence(outcome.err)
+    misused("map.x", "map", *mesh, *axes, "--density", 10)
     assert command_line("resume", path, "--workers", 2).status == 2  # complete
 
 
 @pytest.mark.slow
 def test_a_killed_worker_costs_only_the_columns_in_flight(case, whole):
-    killed = []
+    killed, said, observer = [], [], Observer()
 
-    class Killer(Observer):
-        def item(self, result):
-            if not killed:
-                import multiprocessing
+    def kill(_result):
+        if not killed:
+            killed.append(multiprocessing.active_children()[0])
+            killed[0].kill()
 
-                victim = multiprocessing.active_children()[0]
-                os.kill(victim.pid, signal.SIGKILL)
-                killed.append(victim.pid)
-
-    said = []
-    observer = Killer()
-    observer.warn = said.append
+    observer.item, observer.warn = kill, said.append
     result = run_map(case, observer, workers=2)
     assert killed and any("worker was lost" in sentence for sentence in said)
     assert not any(column.failure for column in result.columns)
@@ -227,6 +219,7 @@ def _refuse(*_arguments, **_options):
     raise SingularShiftError("nothing to count")
 
 
+@pytest.mark.slow
 def test_cells_of_light_damping_are_those_of_the_full_matrices():
     """At beta = 1e-4 s quick modes lead, to 500 Hz, which a space made for slow ones knows to 10 % alone."""
     keys = SMALL | {"map.x": "pressure=450:1820:2", "map.y": "beta=1e-4:1e-2:4:log", "map.curve": False}

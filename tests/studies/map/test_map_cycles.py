@@ -7,17 +7,13 @@ import json
 import numpy as np
 import pytest
 
-from dbvfiv.studies.case import thesis_case
 from dbvfiv.studies.map.cycles import CELLS
 from dbvfiv.studies.orbits import Follower
-from dbvfiv.studies.session import Session, load_result, resume_result
+from dbvfiv.studies.session import load_result, resume_result
 from tests.observers import Stop
+from tests.studies.test_cycle import session_of as branch_of
 
-CASE = {
-    "mesh.around": 6,
-    "mesh.along": 8,
-    "damping.alpha": 0.0,
-    "damping.beta": 3e-3,
+MAP = {
     "map.x": "pressure=5.5 kPa:6 kPa:2",
     "map.y": "density=225:255:3",
     "map.curve": False,
@@ -28,7 +24,7 @@ CASE = {
 
 
 def session_of(**changes):
-    return Session(thesis_case(CASE | {key.replace("__", "."): v for key, v in changes.items()}))
+    return branch_of(**MAP | {key.replace("__", "."): v for key, v in changes.items()})
 
 
 @pytest.fixture(scope="module")

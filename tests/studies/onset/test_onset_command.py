@@ -57,7 +57,7 @@ def test_figure(outcome):
     assert (outcome[2].parent / "onset.png").stat().st_size > 10_000
 
 
-def test_the_command_says_what_is_fixed(command_line, one_sentence, outcome):
+def test_the_command_says_what_is_fixed(command_line, misused, outcome):
     options = settings({"mesh.around": 6, "mesh.along": 10} | PLAIN)
     done = command_line("onset", "--over", "alpha=0:40:3", *options, "-p", "4 kPa", "--density", 10)
     assert done.status == 0, done.err
@@ -66,14 +66,5 @@ def test_the_command_says_what_is_fixed(command_line, one_sentence, outcome):
     assert document["fixed"]["pressure"] == 6e3 and "density" not in document["fixed"]
     (figure,) = load_result(path).figures().values()
     assert "6 kPa static" in figure.axes[0].get_title("left")
-    done = command_line("onset", "--over", "density", "--density", 10)
-    assert done.status == 2 and "onset.over" in done.err and one_sentence(done.err)
-    done = command_line("resume", path, "--workers", 2)
-    assert done.status == 2 and "Workers belong to maps" in done.err and one_sentence(done.err)
-
-
-def test_words_for_a_bad_range(capsys):
-    assert run(["onset", "--over", "angle=20:140:5", *SETTINGS]) == 2
-    assert "not within 0 to 90" in capsys.readouterr().err
-    assert run(["onset", "--over", "colour", *SETTINGS]) == 2
-    assert "onset.over" in capsys.readouterr().err
+    misused("onset.over", "onset", "--over", "density", "--density", 10)
+    misused("Workers belong to maps", "resume", path, "--workers", 2)

@@ -78,7 +78,9 @@ def test_an_elastic_wall_is_one_without_loss_factors(lossy_case, lossy_walk):
 
 
 @LAWS
-@pytest.mark.parametrize("second", ["density=1:1000:4:log", "loss_factor=0.3:3:4:log"])
+@pytest.mark.parametrize(
+    "second", ["density=1:1000:4:log", pytest.param("loss_factor=0.3:3:4:log", marks=pytest.mark.slow)]
+)
 def test_maps_against_certified_spectra(lossy_case, lossy_walk, continuity, second):
     case = lossy_case.replace({"fluid.continuity": continuity, "map.x": "pressure=2000:20000:2", "map.y": second})
     result = run_map(case)

@@ -61,7 +61,7 @@ def test_figures_of_runs_say_clear_opening_and_static_pressure(run):
 
 
 @pytest.mark.slow
-def test_films_of_a_run_take_cycles_and_of_modes_a_mode(run, coarse_run, command_line, tmp_path, one_sentence):
+def test_films_of_a_run_take_cycles_and_of_modes_a_mode(run, coarse_run, command_line, tmp_path, misused):
     file, modes = run.path, coarse_run.states[0].modes(count=4, density=10, alpha=0)
     outcome = command_line("plot", file, "-o", tmp_path, "--only", "history", "--animate", 1)
     assert outcome.status == 0, outcome.err
@@ -76,8 +76,7 @@ def test_films_of_a_run_take_cycles_and_of_modes_a_mode(run, coarse_run, command
         (shapes, 40, "40"),
         (coarse_run.path, 1, "does not move"),
     ):
-        outcome = command_line("plot", path, "-o", tmp_path / "new", "--animate", number)
-        assert outcome.status == 2 and words in outcome.err and one_sentence(outcome.err), outcome.err
+        misused(words, "plot", path, "-o", tmp_path / "new", "--animate", number)
         assert not (tmp_path / "new").exists()  # misuse shows before anything is drawn
     with pytest.raises(CaseError, match="at least 2 frames"):
         run.animate(tmp_path / "one.gif", frames=1)

@@ -178,7 +178,7 @@ def test_a_stiff_valve_that_stands_at_its_gap_is_open(valve, start, density):
     assert run.history["mass_flow"][-1] == pytest.approx(area * np.sqrt(2 * density * 500.0), rel=1e-3)
 
 
-@pytest.mark.parametrize("back", [0.0, 1e3])
+@pytest.mark.parametrize("back", [0.0, pytest.param(1e3, marks=pytest.mark.slow)])
 def test_a_valve_whose_drive_turns_around_closes_and_without_one_stands_at_its_gap(tmp_path, valve, back):
     """Lips that are pressed on their stops are shut; those that nothing presses let fluid pass."""
     table = tmp_path / "drive.csv"

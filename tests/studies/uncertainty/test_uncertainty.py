@@ -3,7 +3,6 @@ run is interrupted; what cannot be used is answered by a sentence.
 """
 
 import json
-import re
 from types import SimpleNamespace
 
 import numpy as np
@@ -24,7 +23,7 @@ from dbvfiv.studies.stability.verdict import OUTCOMES
 from dbvfiv.studies.uncertainty.figures import tornado
 from dbvfiv.studies.uncertainty.study import UncertaintyResult
 from tests.observers import Stop
-from tests.small_valves import SMALL, load_small
+from tests.small_valves import SMALL, load_small, settings
 
 LINE = "cases/dbv12-in-line.toml"
 KEYS = {"uncertainty.samples": 16, "drive.pressure": 4e3, "fluid.density": 20.0, "damping.alpha": 0.0}
@@ -64,6 +63,7 @@ def test_outcomes_are_those_of_modes(valve, found):
         assert modes.state.outlet_area == pytest.approx(samples["opening"][i], rel=1e-6)
 
 
+@pytest.mark.slow
 def test_undecided_samples_say_why():
     """In a band below the flutter, with the key that moves its end."""
     light = {"damping.beta": 1e-4}
@@ -342,26 +342,19 @@ MALFORMED = [
 
 
 @pytest.mark.parametrize(("section", "clause"), MALFORMED, ids=[f"{i}" for i in range(len(MALFORMED))])
-def test_what_cannot_be_used_is_answered_by_a_sentence(tmp_path, command_line, one_sentence, section, clause):
+def test_what_cannot_be_used_is_answered_by_a_sentence(tmp_path, misused, section, clause):
     path, keys = tmp_path / "bad.toml", SMALL | {"materials.strain_level": "10 %"}
     path.write_text(f"[uncertainty]\n{section}\n")
-    outcome = command_line("uncertainty", path, *(f"--set={key}={value}" for key, value in keys.items()))
-    assert outcome.status == 2 and not outcome.out
-    assert one_sentence(outcome.err), outcome.err
-    assert re.search(clause, outcome.err), outcome.err
+    misused(clause, "uncertainty", path, *settings(keys, {}))
 
 
 def test_a_dead_scheduler_is_said_before_anything_is_computed(monkeypatch):
     pytest.importorskip("distributed")
     monkeypatch.setattr(workers, "PATIENCE", 1)
-    seen = []
-
-    class Watch(Observer):
-        def progress(self, text):
-            seen.append(text)
-
+    seen, watch = [], Observer()
+    watch.progress = seen.append
     with pytest.raises(CaseError, match="no Dask scheduler answers within 1 s"):
-        load().uncertainty(workers="tcp://127.0.0.1:9", observer=Watch())
+        load().uncertainty(workers="tcp://127.0.0.1:9", observer=watch)
     assert not seen
 
 
