@@ -97,7 +97,8 @@ def relaxing_states(states: list[LinearisedState], number: int, seed: int) -> It
 
     Densities, alpha and laws as in `random_states`, without beta. Of the materials some are elastic, most have a
     constant loss factor up to 0.5, fitted over a common random band of 1 to 3 decades by 2 to 6 branches, and some
-    have times of their own. The factor on all of them is 0, 1 or any up to 3, as far as no loss factor exceeds 2.
+    have times of their own. The factor on all of them is 0, 1 or any up to 3, as far as no loss factor exceeds 2
+    and all series meet it.
     """
     rng = np.random.default_rng([seed, 3])
     for state in random_states(states, number, seed):
@@ -109,8 +110,10 @@ def relaxing_states(states: list[LinearisedState], number: int, seed: int) -> It
         wanted = 0.0 if kind < 0.05 else 1.0 if kind < 0.35 else factor
         at = np.geomspace(1e-4, 1e6, 400)
         highest = max(group.series.loss_factor(at).max() for group in groups)
-        factor = min(wanted, LARGEST_LOSS / highest) if highest > 0 else wanted
-        relaxation = WallRelaxation(groups).stiffness(factor, lambda: state.linear.relaxing)
+        wanted = min(wanted, LARGEST_LOSS / highest) if highest > 0 else wanted
+        wall = WallRelaxation(groups)
+        factor = wall.highest(0.0, wanted)
+        relaxation = wall.stiffness(factor, lambda: state.linear.relaxing)
         mu = state.mu.at(beta=0.0, loss_factor=factor)
         yield replace(state, mu=mu, relaxation=relaxation)
 
