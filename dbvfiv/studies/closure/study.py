@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from ...case.measured import AREA, SHAPE
+from ...drawing.views import faces
 from ...model.closed import ClosedValve, Passage
 from ...model.symmetry import equilibria_of
 from ...record.mesh import MeshData, WholeValve
@@ -208,7 +209,7 @@ class PressedState(SimpleNamespace):
     def leak(self) -> float:
         """Leak of the whole valve through the gaps that are left, m3/s; 0 where a section is shut all over."""
         mesh, fluid = self.results.mesh, self.results.case.fluid
-        x = (mesh.nodes[:, 0] + self.nodal[:, 0])[mesh.rows]
+        x = faces(mesh, self.nodal)[0][mesh.rows, 0]
         gap = np.where(self.opening[:, None] > 0.0, self.gap[mesh.rows], 0.0)
         return film_leak(self.pressure, mesh.z, x, gap, mesh.part.copies, fluid.density, fluid.dynamic_viscosity)
 

@@ -8,12 +8,15 @@ import numpy as np
 import pytest
 
 import dbvfiv
+from dbvfiv.model.closed import ClosedValve
+from dbvfiv.record.mesh import MeshData
 from dbvfiv.report.answers import _collapse, _margin
 from dbvfiv.studies.case import thesis_case
 from dbvfiv.studies.closure.safety import ClassBuckling, _buckling, find_safety, rated_sentence, rated_verdict
-from dbvfiv.studies.closure.walk import film_leak
+from dbvfiv.studies.closure.study import PressedState
+from dbvfiv.studies.closure.walk import Pressed, film_leak
 from dbvfiv.studies.session import load_result
-from tests.small_valves import FORMER
+from tests.small_valves import FORMER, SMALL
 
 
 def result(pressures, sealed, overlap=None, buckling=(), supports="contact", failure=None, classes=(), **changes):
@@ -113,6 +116,18 @@ def test_leak_is_that_of_a_laminar_film_and_of_a_jet_at_its_ends():
     assert film_leak(pressure, z, x, gap, 4, 1000.0, viscosity) < min(film, jet)
     gap[2] = -1e-6
     assert film_leak(pressure, z, x, gap, 4, 1000.0, viscosity) == 0.0
+
+
+def test_the_leak_of_a_state_goes_through_its_least_opening():
+    """Of the inner face: round the side edge of the lip it has less width than the middle of the wall."""
+    case = thesis_case(dict(SMALL))
+    model = ClosedValve(case)
+    pressed = Pressed(model, 2e-5 * np.random.default_rng(0).standard_normal(model.size), 2e3)
+    own = {name: getattr(pressed, name) for name in ("pressure", "nodal", "opening")}
+    results = SimpleNamespace(case=case, mesh=MeshData.of(model))
+    state = PressedState(results=results, gap=model.gaps(pressed.nodal), **own)
+    jet = pressed.least_opening * np.sqrt(2 * 2e3 / case.fluid.density)
+    assert state.leak == pytest.approx(jet, rel=1e-9)
 
 
 @pytest.mark.slow
