@@ -10,7 +10,7 @@ falls jumps back at the lower limit point.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeVar
 from weakref import WeakKeyDictionary, proxy
 
 import numpy as np
@@ -125,6 +125,9 @@ class LimitPoint(NamedTuple):
     highest: bool
 
 
+_Limit = TypeVar("_Limit", LimitState, LimitPoint)
+
+
 @dataclass
 class LoadCurve:
     """The curve of equilibria of one model.
@@ -200,13 +203,13 @@ class LoadCurve:
         return [limit for limit in _without_noise(self._limits(slice(None))) if limit.pressure <= highest]
 
     def limit_states(self) -> list[LimitState]:
-        """Limit points along the curve, solved for."""
+        """Limit points along the curve, solved for; pairs that `limits` puts down to the mesh are left out."""
         points, tracer, found = self._branch.points, self._tracer(), []
         for i in self._turns(self._slopes(slice(None))):
             at = tracer.root(points[i], points[i + 1], lambda point: point.tangent[-1], 1e-12)
             at = min(points[i : i + 2], key=lambda point: abs(point.tangent[-1])) if at is None else at
             found.append(LimitState(float(at.z[-1]), at.z[:-1], at.tangent[:-1]))
-        return found
+        return _without_noise(found)
 
     def _slopes(self, part: slice) -> np.ndarray:
         return np.array([point.tangent[-1] for point in self._branch.points[part]])
@@ -384,9 +387,9 @@ def _turn(pressure: np.ndarray, slope: np.ndarray) -> float:
     return float(pressure[0] + 0.5 * slope[0] ** 2 / change * length) if length > 0 else float(outer)
 
 
-def _without_noise(limits: list[LimitPoint]) -> list[LimitPoint]:
+def _without_noise(limits: list[_Limit]) -> list[_Limit]:
     """Limit points without pairs between which the pressure hardly changes."""
-    kept: list[LimitPoint] = []
+    kept: list[_Limit] = []
     for limit in limits:
         if kept and abs(kept[-1].pressure - limit.pressure) <= _NOISE * abs(limit.pressure):
             kept.pop()
