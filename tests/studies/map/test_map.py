@@ -63,6 +63,10 @@ def test_cells_whose_mode_grows_too_slowly_to_be_counted_are_uncertain(case):
     assert [text.split(" cells are")[0] for text in said] == [
         f"In class {name}: {number}" for name in ("SA", "AS", "AA")
     ]
+    place = {"x": 1e3, "y": 2.0, "unstable": 2, "agrees": False}
+    other, far = (_doubts(plan, columns, [place | {"error": error}])[-1] for error in (3e-9, 2e-4))
+    assert other.endswith("the full pencil has 2 unstable eigenvalues and the cell another number.")
+    assert far.endswith("the full pencil differs by 2.0e-04.")
     result = SimpleNamespace(plan=plan, columns=columns)
     note = {"symmetry": "SA", "motion": "sway", "certified": np.ones((10, 6), bool)}
     assert MapResult._class_line(result, 1, note) == "class SA (sway): 0 cells unstable, 0 stable, 60 of 60 certified."
