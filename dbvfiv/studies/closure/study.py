@@ -310,8 +310,13 @@ class ClosureResult(StudyResult):
 
     @property
     def closing_pressure(self) -> float | None:
-        """Lowest pressure on the path, Pa, at which some section was shut; None if none was."""
-        return min((point.pressure for point in self.walk if point.sealed_length > 0), default=None)
+        """Pressure on the path, Pa, up to which the load had to rise for some section to be shut; None if none was."""
+        highest = 0.0
+        for point in self.walk:
+            if point.sealed_length > 0:
+                return max(highest, point.pressure)
+            highest = max(highest, point.pressure)
+        return None
 
     def at(self, pressure: np.ndarray, name: str) -> np.ndarray:
         """A column of `POINT` at back pressures (k,), Pa: of states where they are, between the load steps by a

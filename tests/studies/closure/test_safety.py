@@ -13,7 +13,7 @@ from dbvfiv.record.mesh import MeshData
 from dbvfiv.report.answers import _collapse, _margin
 from dbvfiv.studies.case import thesis_case
 from dbvfiv.studies.closure.safety import ClassBuckling, _buckling, find_safety, rated_sentence, rated_verdict
-from dbvfiv.studies.closure.study import PressedState
+from dbvfiv.studies.closure.study import ClosureResult, PressedState
 from dbvfiv.studies.closure.walk import Pressed, film_leak
 from dbvfiv.studies.session import load_result
 from tests.small_valves import FORMER, SMALL
@@ -104,6 +104,19 @@ def test_where_equilibria_end_is_a_limit():
     found = find_safety(result([1e3, 1.8e3], [0.1, 0.1], failure="No equilibrium was found.", rated_pressure=3e3))
     assert (found.limit, found.factor) == ("end of the path", pytest.approx(0.6))
     assert find_safety(SimpleNamespace(walk=[])) is None
+
+
+@pytest.mark.parametrize(
+    ("points", "closing"),
+    [
+        ([(1e3, 0.0), (2e3, 0.1), (1.5e3, 0.1)], 2e3),  # opens less readily than it shuts
+        ([(1e3, 0.0), (3e3, 0.0), (2e3, 0.1), (1e3, 0.1), (4e3, 0.1)], 3e3),  # snaps at 3 kPa
+        ([(1e3, 0.0)], None),
+    ],
+)
+def test_the_closing_pressure_is_one_that_rises_up_to_it(points, closing):
+    walk = [SimpleNamespace(pressure=pressure, sealed_length=sealed) for pressure, sealed in points]
+    assert ClosureResult.closing_pressure.fget(SimpleNamespace(walk=walk)) == closing
 
 
 def test_leak_is_that_of_a_laminar_film_and_of_a_jet_at_its_ends():
