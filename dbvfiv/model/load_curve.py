@@ -318,25 +318,26 @@ class LoadCurve:
         return Tracer(problem, options, [FoldMonitor()] if self.stops_at_limit else [], _Told(self.observer))
 
     def extend(self, target: float) -> None:
-        """Follow the curve on to a pressure, anew with other steps where it comes back to its start.
+        """Follow the curve on to a pressure, towards which it leaves its start, anew with other steps where it
+        comes back to that.
 
         Raises
         ------
         SolveError
             If no curve leaves the start.
         """
-        start, back = self._start, self.model.flow.back
+        start, back, way = self._start, self.model.flow.back, np.copysign(1.0, target - self._start)
         for angle in dict.fromkeys((self._angle, *_ANGLES)):
             if angle != self._angle:
                 self._angle, self._branch = angle, None
             if self._branch is None:
                 self._unit = max(1e-3 * abs(target - start), 1e-3 * abs(start - back), self.model.load_unit)
-            tracer = self._tracer((back - self._unit, target))
+            tracer = self._tracer((back - self._unit, target) if way > 0 else (target, np.inf))
             try:
                 if self._branch is None:
                     z = np.append(self._rest(), start)
                     direction = np.zeros(len(z))
-                    direction[-1] = 1.0
+                    direction[-1] = way
                     point = tracer.start(z, direction)
                     branch = Branch("equilibria", len(z) - 1, (LOAD,), (), {LOAD: start}, [point.record()])
                     self._branch = tracer.run(branch, point, _STEP)
@@ -348,7 +349,7 @@ class LoadCurve:
                 self._branch = None
                 raise KeyboardInterrupt
             ended = self._branch.reason.kind in (Reason.STOPPED, Reason.POINTS)
-            if ended or self.pressures[-1] >= target * (1 - 1e-12):
+            if ended or way * (self.pressures[-1] - target) >= -1e-12 * abs(target):
                 return
 
 

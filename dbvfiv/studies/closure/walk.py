@@ -354,13 +354,14 @@ class ClosureWalk:
         SolveError
         """
         steps, goes_on = self.steps, self.model.case.closure.arclength
-        start, q = steps.pressure, steps.q
+        start, q, falls = steps.pressure, steps.q, target < steps.pressure
         self.record.progress(f"arclength from {start:.6g} Pa")
         curve = LoadCurve(self.model, steps.options.newton, self.record, (start, q), not goes_on)
         try:
             path = follow_past_limits(curve, target)
         except SolveError as reason:
-            self._keep_before_limit(start, q)
+            if not falls:
+                self._keep_before_limit(start, q)
             raise SolveError(f"{error} Arclength did not get under way either: {reason}") from reason
         rising = path.limits and not goes_on
         for pressure, place in path.points[1:-1] if rising else path.points[1:]:
@@ -372,7 +373,7 @@ class ClosureWalk:
             self.energy.add(place, pressure)
         self.own.found.extend(path.limits)
         self._keep_buckling()
-        if path.limits or not path.reached:
+        if path.limits or not (path.reached or falls):
             self._keep_before_limit(start, q)
         self.beyond_limit = self.beyond_limit or bool(path.limits)
         for watch in self.watches.values():

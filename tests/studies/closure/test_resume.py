@@ -14,8 +14,9 @@ import numpy as np
 import pytest
 
 from dbvfiv.api import load, resume
-from dbvfiv.errors import CaseError
+from dbvfiv.errors import CaseError, SolveError
 from dbvfiv.studies.case import THESIS, thesis_case
+from dbvfiv.studies.closure import walk as walked
 from dbvfiv.studies.closure.walk import BUCKLED_CLASS, ClosureWalk
 from dbvfiv.studies.session import load_result
 from tests.observers import Stop
@@ -81,6 +82,24 @@ def test_what_buckles_in_another_class_is_said_again(whole):
     walk.record = SimpleNamespace(rows=lambda _: 0, notes=notes.get, warn=said.append)
     walk._warn_of_states()
     assert len(said) == 1 and said[0].startswith("The wall buckles at 7000 Pa in class SA: ")
+
+
+def fails(_target):
+    raise SolveError("No equilibrium was found.")
+
+
+@pytest.mark.parametrize(("target", "kept"), [(8e3, 1), (2e3, 0)])
+def test_a_walk_that_is_lost_as_the_pressure_falls_has_no_last_state_before_a_limit(target, kept, monkeypatch):
+    monkeypatch.setattr(walked, "LoadCurve", lambda *_: None)
+    monkeypatch.setattr(walked, "follow_past_limits", lambda _curve, target: fails(target))
+    walk, found = object.__new__(ClosureWalk), []
+    walk.steps = SimpleNamespace(pressure=5e3, q=None, options=SimpleNamespace(newton=None))
+    walk.model = SimpleNamespace(case=thesis_case())
+    walk.record = SimpleNamespace(progress=lambda _: None)
+    walk._keep_before_limit = lambda *given: found.append(given)
+    with pytest.raises(SolveError, match="Arclength did not get under way"):
+        walk._go_past_limit(target, SolveError("No equilibrium was found."))
+    assert found == [(5e3, None)] * kept
 
 
 @pytest.mark.slow

@@ -19,13 +19,15 @@ from dbvfiv.studies.session import load_result
 from tests.small_valves import FORMER, SMALL
 
 
-def result(pressures, sealed, overlap=None, buckling=(), supports="contact", failure=None, classes=(), **changes):
+def result(
+    pressures, sealed, overlap=None, buckling=(), supports="contact", failure=None, classes=(), lost=(), **changes
+):
     overlap = np.zeros(len(pressures)) if overlap is None else overlap
     walk = [
         SimpleNamespace(pressure=p, sealed_length=s, overlap=o, arclength=False)
         for p, s, o in zip(pressures, sealed, overlap)
     ]
-    case = thesis_case({"closure.pressures": [max(pressures)]} | {f"closure.{k}": v for k, v in changes.items()})
+    case = thesis_case({"closure.pressures": [*pressures, *lost]} | {f"closure.{k}": v for k, v in changes.items()})
     buckled = [SimpleNamespace(pressure=p, kind="limit point") for p in buckling]
     found = SimpleNamespace(walk=walk, case=case, buckling=buckled, supports=supports, walk_failure=failure)
     found.classes, found.states = classes, [SimpleNamespace(pressure=p, beyond_limit=False) for p in pressures]
@@ -101,8 +103,10 @@ def test_a_seal_that_supports_give_is_not_found_but_assumed():
 
 
 def test_where_equilibria_end_is_a_limit():
-    found = find_safety(result([1e3, 1.8e3], [0.1, 0.1], failure="No equilibrium was found.", rated_pressure=3e3))
+    asked = {"failure": "No equilibrium was found.", "rated_pressure": 3e3}
+    found = find_safety(result([1e3, 1.8e3], [0.1, 0.1], lost=[3e3], **asked))
     assert (found.limit, found.factor) == ("end of the path", pytest.approx(0.6))
+    assert find_safety(result([1e3, 1.8e3], [0.1, 0.1], lost=[5e2, 3e3], **asked)).at_least  # as the pressure falls
     assert find_safety(SimpleNamespace(walk=[])) is None
 
 
