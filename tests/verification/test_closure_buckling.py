@@ -167,6 +167,13 @@ def test_a_curve_passes_both_limit_points_on_its_way_down_as_on_its_way_up(start
     assert found == pytest.approx(turns**3 - 6 * turns**2 + 10 * turns, rel=1e-6)
 
 
+def test_a_state_that_is_settled_already_has_no_slope_of_the_last_try():
+    steps = LoadSteps(_Snapping(), _options())
+    steps.reach(1.0)
+    steps.slope = None
+    assert steps.settle().iterations == 0 and steps.slope is None
+
+
 @pytest.mark.slow
 def test_an_arch_snaps_at_a_limit_point_and_is_followed_beyond_it():
     model = _arch()

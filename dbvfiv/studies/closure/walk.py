@@ -326,6 +326,7 @@ class ClosureWalk:
         except SolveError as error:
             self._go_past_limit(target, error)
             last, spectrum = steps.settle(), self._watch(target, steps.q)
+            self.energy.begin(steps.q, target, steps.slope)  # as one that goes on from here
         self._keep_state(steps.q, target, spectrum, last, found, self._restart())
 
     def _accept(self, pressure: float, q: np.ndarray) -> None:
@@ -457,9 +458,10 @@ class ClosureWalk:
         self.record.item(state)
 
     def _restart(self) -> dict[str, Any]:
-        """Restart data of the present state."""
+        """Restart data of the present state, without a slope that is not known."""
         steps = self.steps
-        return {"step": steps.step, "slope": self.model.nodal(steps.slope), "energy": self.energy.totals}
+        way = {"step": steps.step, "energy": self.energy.totals}
+        return way if steps.slope is None else way | {"slope": self.model.nodal(steps.slope)}
 
     def _resume(self) -> int:
         """Stand at the last state that was asked for, or at rest, and say how many there are."""
@@ -474,7 +476,8 @@ class ClosureWalk:
         """Stand at the state of a row."""
         record, steps, restrict = self.record, self.steps, self.model.shell.dofs.restrict
         steps.pressure, steps.step = float(self._value("pressure", last)), float(self._value("way/step", last))
-        steps.q, steps.slope = restrict(self._value("nodal", last)), restrict(self._value("way/slope", last))
+        steps.q, slope = restrict(self._value("nodal", last)), restrict(self._value("way/slope", last))
+        steps.slope = None if np.isnan(slope).any() else slope
         self.energy.begin(steps.q, steps.pressure, steps.slope)
         self.energy.totals = tuple(self._value("way/energy", last))
         self.beyond_limit = bool(self._value("beyond_limit", last))
