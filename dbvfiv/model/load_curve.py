@@ -10,7 +10,7 @@ falls jumps back at the lower limit point.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeVar
 from weakref import WeakKeyDictionary, proxy
 
 import numpy as np
@@ -125,6 +125,9 @@ class LimitPoint(NamedTuple):
     highest: bool
 
 
+_Limit = TypeVar("_Limit", LimitState, LimitPoint)
+
+
 @dataclass
 class LoadCurve:
     """The curve of equilibria of one model.
@@ -200,13 +203,13 @@ class LoadCurve:
         return [limit for limit in _without_noise(self._limits(slice(None))) if limit.pressure <= highest]
 
     def limit_states(self) -> list[LimitState]:
-        """Limit points along the curve, solved for."""
+        """Limit points along the curve, solved for; pairs that `limits` puts down to the mesh are left out."""
         points, tracer, found = self._branch.points, self._tracer(), []
         for i in self._turns(self._slopes(slice(None))):
             at = tracer.root(points[i], points[i + 1], lambda point: point.tangent[-1], 1e-12)
             at = min(points[i : i + 2], key=lambda point: abs(point.tangent[-1])) if at is None else at
             found.append(LimitState(float(at.z[-1]), at.z[:-1], at.tangent[:-1]))
-        return found
+        return _without_noise(found)
 
     def _slopes(self, part: slice) -> np.ndarray:
         return np.array([point.tangent[-1] for point in self._branch.points[part]])
@@ -315,25 +318,26 @@ class LoadCurve:
         return Tracer(problem, options, [FoldMonitor()] if self.stops_at_limit else [], _Told(self.observer))
 
     def extend(self, target: float) -> None:
-        """Follow the curve on to a pressure, anew with other steps where it comes back to its start.
+        """Follow the curve on to a pressure, towards which it leaves its start, anew with other steps where it
+        comes back to that.
 
         Raises
         ------
         SolveError
             If no curve leaves the start.
         """
-        start, back = self._start, self.model.flow.back
+        start, back, way = self._start, self.model.flow.back, np.copysign(1.0, target - self._start)
         for angle in dict.fromkeys((self._angle, *_ANGLES)):
             if angle != self._angle:
                 self._angle, self._branch = angle, None
             if self._branch is None:
                 self._unit = max(1e-3 * abs(target - start), 1e-3 * abs(start - back), self.model.load_unit)
-            tracer = self._tracer((back - self._unit, target))
+            tracer = self._tracer((back - self._unit, target) if way > 0 else (target, np.inf))
             try:
                 if self._branch is None:
                     z = np.append(self._rest(), start)
                     direction = np.zeros(len(z))
-                    direction[-1] = 1.0
+                    direction[-1] = way
                     point = tracer.start(z, direction)
                     branch = Branch("equilibria", len(z) - 1, (LOAD,), (), {LOAD: start}, [point.record()])
                     self._branch = tracer.run(branch, point, _STEP)
@@ -345,7 +349,7 @@ class LoadCurve:
                 self._branch = None
                 raise KeyboardInterrupt
             ended = self._branch.reason.kind in (Reason.STOPPED, Reason.POINTS)
-            if ended or self.pressures[-1] >= target * (1 - 1e-12):
+            if ended or way * (self.pressures[-1] - target) >= -1e-12 * abs(target):
                 return
 
 
@@ -384,9 +388,9 @@ def _turn(pressure: np.ndarray, slope: np.ndarray) -> float:
     return float(pressure[0] + 0.5 * slope[0] ** 2 / change * length) if length > 0 else float(outer)
 
 
-def _without_noise(limits: list[LimitPoint]) -> list[LimitPoint]:
+def _without_noise(limits: list[_Limit]) -> list[_Limit]:
     """Limit points without pairs between which the pressure hardly changes."""
-    kept: list[LimitPoint] = []
+    kept: list[_Limit] = []
     for limit in limits:
         if kept and abs(kept[-1].pressure - limit.pressure) <= _NOISE * abs(limit.pressure):
             kept.pop()

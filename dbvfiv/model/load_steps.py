@@ -139,7 +139,8 @@ class LoadSteps:
                 )
 
     def settle(self) -> NewtonResult:
-        """Solve again at the present pressure, after something else of the model has changed.
+        """Solve again at the present pressure, after something else of the model has changed. Where that takes no
+        iteration no slope is found, as the solver has a tangent of another state.
 
         Raises
         ------
@@ -148,7 +149,7 @@ class LoadSteps:
         for solver in (self.solver, self.fallback):
             result = solver.solve(self.q, self.pressure)
             if result.converged:
-                self._take(result, self.pressure, _slope(solver, result, self.pressure))
+                self._take(result, self.pressure, _slope(solver, result, self.pressure) if result.iterations else None)
                 return result
         raise SolveError(f"The equilibrium at {self.pressure:.6g} Pa was lost: {result.reason}.")
 

@@ -2,19 +2,26 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
 import dbvfiv
 from continuation.normal_form import Motion
+from continuation.periodic import PeriodicMotion
+from dbvfiv.case.parameters import Mu
 from dbvfiv.case.quantity import GRAVITY
 from dbvfiv.errors import CaseError, SolveError
 from dbvfiv.model.classes import linearise_class
 from dbvfiv.model.equilibria import find_equilibrium, rest_state
 from dbvfiv.model.forms import ValveForms
 from dbvfiv.model.symmetry import SYMMETRIES
+from dbvfiv.motion.periodic import PeriodicValve
 from dbvfiv.studies.case import require_consistent, thesis_case
-from dbvfiv.studies.stability.place import is_surrounding
+from dbvfiv.studies.onset import search
+from dbvfiv.studies.stability import place
+from dbvfiv.studies.stability.place import is_surrounding, models_of, redesigned
 from tests.model.test_residual_forms import check, difference
 from tests.small_valves import SMALL, load_small, make_valve, settings
 from tests.studies.along import check_map, check_sensitivity, check_sweep, check_walk
@@ -116,6 +123,34 @@ def test_studies_over_the_density_follow_the_steady_state():
     assert len(swept.points) == 3
     check_walk((keys,), swept, "fluid.density", (0, 2))
     check_sensitivity((keys,), "density", "fluid.density", 1.0)
+
+
+def test_each_density_has_a_model_of_its_levels(monkeypatch):
+    """Of periodic motions and normal forms, with the other parameters of the design that are asked for."""
+    monkeypatch.setattr(place, "ValveModel", lambda case: SimpleNamespace(case=case, flow=own.flow))
+    case, lying = thesis_case(DOWN), thesis_case()
+    own = SimpleNamespace(case=case, flow=SimpleNamespace(names=("inlet",)))
+    models, mu = models_of(case, own), Mu.of(case).for_system()
+    assert models(mu | {"alpha": 2.0}) is own and models_of(lying, own)(mu | {"density": 300.0}) is own
+    for asked in ({"density": 300.0}, {"density": 300.0, "thickness": 1.1}, {"thickness": 1.1}):
+        assert models(mu | asked).case == redesigned(case, asked) and models(mu | asked) is models(mu | asked)
+    there, taken = Mu.of(case).at(density=300.0, thickness=1.1), []
+    light = SimpleNamespace(case=redesigned(case, {"density": 300.0}), flow=own.flow)
+    monkeypatch.setattr(search, "ValveForms", lambda model, *_: taken.append(model.case))
+    monkeypatch.setattr(search, "hopf_normal_form_of", lambda *_: None)
+    walk = SimpleNamespace(built=lambda _: SimpleNamespace(model=light), equilibrium=lambda _: None)
+    search.normal_form(case, walk, there, SimpleNamespace(eigenvalue=30j, q=np.zeros(2), u=np.zeros(1)))
+    assert taken == [redesigned(case, there.only("density", "thickness"))]
+
+
+def test_a_steady_state_of_another_density_is_a_periodic_motion():
+    model, light = load_small(DOWN).model, load_small(DOWN, {"fluid.density": 300.0})
+    mu = Mu.of(light.case).for_system()
+    q = light.steady(pressure=mu["inlet"]).q
+    rest = np.concatenate([q, light.model.flow.steady_inner(light.model.rows.areas(light.model.nodal(q)), mu)])
+    system = PeriodicValve(models_of(model.case, model), mu)
+    missing = system.residual(PeriodicMotion.of_waves((rest, np.zeros_like(rest)), 1, 30.0), mu)
+    assert np.abs(missing).max() < 1e-6 * model.force_scale(q, mu["inlet"])
 
 
 LOSSES = {"damping.model": "loss factor", "materials.constants": "stable"}

@@ -19,6 +19,7 @@ from dbvfiv.studies.session import Session
 from dbvfiv.studies.stability import walk
 from dbvfiv.studies.sweep import study as tracked
 from eigen import SearchOptions
+from eigen.columns import ReducedColumn
 from tests.observers import Stop
 
 LIGHT = Mu(density=10.0, alpha=0.0, beta=0.003)
@@ -185,6 +186,19 @@ def test_modes_on_the_reduced_model_are_searched_as_others_and_name_their_pressu
     tracking._leading = lost
     with pytest.raises(SolveError, match="The modes at 30000 Pa were not found: no convergence"):
         tracking._solve(pencil)
+
+
+def test_all_modes_that_are_followed_are_checked():
+    """The tenth of twelve is wrong by a thousandth."""
+    values = -np.arange(1.0, 16.0) + 100j
+    fine = SimpleNamespace(leading=lambda _: values, near=lambda _, places: np.array(places))
+    reduction = SimpleNamespace(correction=lambda pairs, _: 1e-3 * pairs * (pairs == values[9]))
+    line = SimpleNamespace(place=lambda value: value)
+    line.column = SimpleNamespace(model=ReducedColumn(None, reduction, None, fine, 0.0))
+    tracking = object.__new__(tracked.Tracking)
+    for count, error in ((12, 1e-3), (4, 0.0)):
+        vars(tracking).update(line=line, options=SimpleNamespace(count=count))
+        assert tracking._error(1.0) == pytest.approx(error)
 
 
 def test_what_is_done_is_kept_on_the_way(model, state, over_density, monkeypatch):

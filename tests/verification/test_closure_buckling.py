@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from functools import cache
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -85,6 +86,73 @@ def _arch(elements: int = 24, radius=0.5, angle=0.5, wall=0.01) -> ShellOnPlane:
     return ShellOnPlane(Shell(mesh, isotropic_section(E, NU, wall), free))
 
 
+class _Snapping:
+    """One unknown u that holds the pressure u^3 - 6 u^2 + 10 u, which falls between u = 2 -+ sqrt(2/3)."""
+
+    size, length_unit, load_unit, weight = 1, 1.0, 1e-3, None
+    flow, mesh = SimpleNamespace(back=0.0), SimpleNamespace(nodes=np.eye(2, 3, 1))
+    shell = SimpleNamespace(
+        mesh=SimpleNamespace(thickness=np.ones(1), node_count=1),
+        dofs=SimpleNamespace(free=np.ones((1, 5), bool), restrict=lambda nodal: nodal[0, :1]),
+    )
+
+    @staticmethod
+    def rest():
+        return np.zeros(1)
+
+    @staticmethod
+    def residual(q, pressure):
+        return q**3 - 6 * q**2 + 10 * q - pressure
+
+    @staticmethod
+    def tangent(q, _pressure):
+        return 3 * q**2 - 12 * q + 10
+
+    @staticmethod
+    def pressure_derivative(_q, _pressure):
+        return -np.ones(1)
+
+    @staticmethod
+    def apply(tangent, x):
+        return tangent * x
+
+    apply_transposed = apply
+
+    @staticmethod
+    def force_scale(_q, _pressure):
+        return 1.0
+
+    @staticmethod
+    def rounding(_q, _tangent):
+        return 1e-14
+
+    @staticmethod
+    def factor():
+        return SimpleNamespace()
+
+    @staticmethod
+    def refactor(factor, tangent):
+        factor.solve = factor.solve_transposed = lambda x: x / tangent
+
+
+@pytest.mark.parametrize(("start", "target"), [(8.0, 2.0), (2.0, 8.0)])
+def test_a_curve_passes_both_limit_points_on_its_way_down_as_on_its_way_up(start, target):
+    only = [next(x.real for x in np.roots([1, -6, 10, -p]) if abs(x.imag) < 1e-9) for p in (start, target)]
+    curve = LoadCurve(_Snapping(), NewtonOptions(), Observer(), (start, np.array(only[:1])))
+    curve.extend(target)
+    assert curve.pressures[-1] == pytest.approx(target) and curve.states[-1] == pytest.approx(only[1])
+    turns = 2.0 + np.sqrt(2 / 3) * np.array([1.0, -1.0] if target < start else [-1.0, 1.0])
+    found = [state.pressure for state in curve.limit_states()]
+    assert found == pytest.approx(turns**3 - 6 * turns**2 + 10 * turns, rel=1e-6)
+
+
+def test_a_state_that_is_settled_already_has_no_slope_of_the_last_try():
+    steps = LoadSteps(_Snapping(), _options())
+    steps.reach(1.0)
+    steps.slope = None
+    assert steps.settle().iterations == 0 and steps.slope is None
+
+
 @pytest.mark.slow
 def test_an_arch_snaps_at_a_limit_point_and_is_followed_beyond_it():
     model = _arch()
@@ -113,3 +181,7 @@ def test_an_arch_snaps_at_a_limit_point_and_is_followed_beyond_it():
         with pytest.raises(SolveError):
             back.reach(0.5 * bottom.pressure)
         assert back.pressure == pytest.approx(bottom.pressure, rel=1e-3)
+        curve = LoadCurve(model, NewtonOptions(), Observer(), (back.pressure, back.q))
+        fallen = follow_past_limits(curve, 0.5 * bottom.pressure)
+        assert fallen.reached and fallen.points[-1][0] == pytest.approx(0.5 * bottom.pressure)
+        assert fallen.limits[0].pressure == pytest.approx(bottom.pressure, rel=1e-6)

@@ -102,7 +102,8 @@ def find_safety(result: StudyResult) -> SafetyFactor | None:
     else:
         crossed = np.array([point.overlap > CROSSED * result.case.valve.initial_gap for point in rising])
         limits += [(at, CROSSING) for at in _last_before(rising, crossed)]
-    if result.walk_failure is not None and not result.buckling:
+    lost = () if result.walk_failure is None else closure.pressures[len(result.states) :]
+    if lost and lost[0] > followed and not result.buckling:
         limits.append((followed, END))
     if not limits:
         return SafetyFactor(followed / rated, True, None, None, rated, followed, held, is_rated, watched)

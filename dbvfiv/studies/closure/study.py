@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from ...case.measured import AREA, SHAPE
+from ...drawing.views import faces
 from ...model.closed import ClosedValve, Passage
 from ...model.symmetry import equilibria_of
 from ...record.mesh import MeshData, WholeValve
@@ -209,7 +210,7 @@ class PressedState(SimpleNamespace):
     def leak(self) -> float:
         """Leak of the whole valve through the gaps that are left, m3/s; 0 where a section is shut all over."""
         mesh, fluid = self.results.mesh, self.results.case.fluid
-        x = (mesh.nodes[:, 0] + self.nodal[:, 0])[mesh.rows]
+        x = faces(mesh, self.nodal)[0][mesh.rows, 0]
         gap = np.where(self.opening[:, None] > 0.0, self.gap[mesh.rows], 0.0)
         return film_leak(self.pressure, mesh.z, x, gap, mesh.part.copies, fluid.density, fluid.dynamic_viscosity)
 
@@ -310,8 +311,13 @@ class ClosureResult(StudyResult):
 
     @property
     def closing_pressure(self) -> float | None:
-        """Lowest pressure on the path, Pa, at which some section was shut; None if none was."""
-        return min((point.pressure for point in self.walk if point.sealed_length > 0), default=None)
+        """Pressure on the path, Pa, up to which the load had to rise for some section to be shut; None if none was."""
+        highest = 0.0
+        for point in self.walk:
+            if point.sealed_length > 0:
+                return max(highest, point.pressure)
+            highest = max(highest, point.pressure)
+        return None
 
     def at(self, pressure: np.ndarray, name: str) -> np.ndarray:
         """A column of `POINT` at back pressures (k,), Pa: of states where they are, between the load steps by a

@@ -326,6 +326,7 @@ class ClosureWalk:
         except SolveError as error:
             self._go_past_limit(target, error)
             last, spectrum = steps.settle(), self._watch(target, steps.q)
+            self.energy.begin(steps.q, target, steps.slope)  # as one that goes on from here
         self._keep_state(steps.q, target, spectrum, last, found, self._restart())
 
     def _accept(self, pressure: float, q: np.ndarray) -> None:
@@ -354,13 +355,14 @@ class ClosureWalk:
         SolveError
         """
         steps, goes_on = self.steps, self.model.case.closure.arclength
-        start, q = steps.pressure, steps.q
+        start, q, falls = steps.pressure, steps.q, target < steps.pressure
         self.record.progress(f"arclength from {start:.6g} Pa")
         curve = LoadCurve(self.model, steps.options.newton, self.record, (start, q), not goes_on)
         try:
             path = follow_past_limits(curve, target)
         except SolveError as reason:
-            self._keep_before_limit(start, q)
+            if not falls:
+                self._keep_before_limit(start, q)
             raise SolveError(f"{error} Arclength did not get under way either: {reason}") from reason
         rising = path.limits and not goes_on
         for pressure, place in path.points[1:-1] if rising else path.points[1:]:
@@ -372,7 +374,7 @@ class ClosureWalk:
             self.energy.add(place, pressure)
         self.own.found.extend(path.limits)
         self._keep_buckling()
-        if path.limits or not path.reached:
+        if path.limits or not (path.reached or falls):
             self._keep_before_limit(start, q)
         self.beyond_limit = self.beyond_limit or bool(path.limits)
         for watch in self.watches.values():
@@ -456,9 +458,10 @@ class ClosureWalk:
         self.record.item(state)
 
     def _restart(self) -> dict[str, Any]:
-        """Restart data of the present state."""
+        """Restart data of the present state, without a slope that is not known."""
         steps = self.steps
-        return {"step": steps.step, "slope": self.model.nodal(steps.slope), "energy": self.energy.totals}
+        way = {"step": steps.step, "energy": self.energy.totals}
+        return way if steps.slope is None else way | {"slope": self.model.nodal(steps.slope)}
 
     def _resume(self) -> int:
         """Stand at the last state that was asked for, or at rest, and say how many there are."""
@@ -473,7 +476,8 @@ class ClosureWalk:
         """Stand at the state of a row."""
         record, steps, restrict = self.record, self.steps, self.model.shell.dofs.restrict
         steps.pressure, steps.step = float(self._value("pressure", last)), float(self._value("way/step", last))
-        steps.q, steps.slope = restrict(self._value("nodal", last)), restrict(self._value("way/slope", last))
+        steps.q, slope = restrict(self._value("nodal", last)), restrict(self._value("way/slope", last))
+        steps.slope = None if np.isnan(slope).any() else slope
         self.energy.begin(steps.q, steps.pressure, steps.slope)
         self.energy.totals = tuple(self._value("way/energy", last))
         self.beyond_limit = bool(self._value("beyond_limit", last))

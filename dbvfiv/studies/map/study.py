@@ -186,10 +186,11 @@ def _doubts(plan: MapPlan, columns: Iterable[MapColumn], checks: Iterable[dict[s
         )
     for check in checks:
         if not check["agrees"]:
-            said.append(
-                f"At {plan.x.parameter} = {check['x']:.6g}, {plan.y.parameter} = {check['y']:.6g} the full pencil "
-                f"differs by {check['error']:.1e}."
-            )
+            apart = f"differs by {check['error']:.1e}"
+            if check["error"] <= ACCEPTED:
+                apart = f"has {check['unstable']} unstable eigenvalues and the cell another number"
+            at = f"{plan.x.parameter} = {check['x']:.6g}, {plan.y.parameter} = {check['y']:.6g}"
+            said.append(f"At {at} the full pencil {apart}.")
     frequencies = [s.verdict.frequency for c in solved for row in c.samples.values() for s in row]
     return [*said, *filter(None, [outside_band(plan.case, frequencies)])]
 

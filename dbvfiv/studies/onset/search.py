@@ -392,5 +392,5 @@ def normal_form(case: Case, walk: StabilityWalk, place: Mu, mode, parameter: str
     follows = parameter and not (parameter == "density" and case.gravity.is_there)  # whose levels it would leave out
     name = PARAMETERS[parameter].system_name or None if follows else None
     own = walk.built(place.only(*(name for name in place if name not in DESIGN))).model
-    forms = ValveForms(models_of(case, own)(mu), walk.equilibrium(place), mu)
+    forms = ValveForms(models_of(own.case, own)(mu), walk.equilibrium(place), mu)
     return hopf_normal_form_of(forms, abs(complex(mode.eigenvalue).imag), np.concatenate([mode.q, mode.u]), name)

@@ -285,14 +285,21 @@ def _shape_beside(case: Case, name: str, value: float) -> dict[str, object]:
 
 
 def models_of(case: Case, own: ValveModel) -> Callable[[Mapping[str, float]], ValveModel]:
-    """Models of a case for parameters by their names in the equations; `own` is that of the case itself."""
-    known, rebuild = {*own.flow.names, *SYSTEM_NAMES}, rebuilder(case)
+    """Models of a case for parameters by their names in the equations; `own` is that of the case itself. With gravity
+    each density has a model, whose levels and weight are numbers of it.
+    """
+    fixed = {"density": case.fluid.density} if case.gravity.is_there else {}
+    known, rebuild = {*own.flow.names, *SYSTEM_NAMES} - fixed.keys(), rebuilder(case)
 
     @lru_cache(8)
     def built(design: tuple) -> ValveModel:
         return rebuild(dict(design)) if design else own
 
-    return lambda mu: built(tuple(sorted((name, float(x)) for name, x in mu.items() if name not in known)))
+    def model(mu: Mapping[str, float]) -> ValveModel:
+        changed = ((name, float(x)) for name, x in mu.items() if name not in known)
+        return built(tuple(sorted(item for item in changed if item not in fixed.items())))
+
+    return model
 
 
 def rebuilder(case: Case) -> Callable[[Mapping[str, float]], ValveModel]:

@@ -182,10 +182,13 @@ SAMPLE_TABLE = TableSpec(SAMPLES, (*_OWN, *_MODES, *_FURTHER), chunk=512)
 
 
 def keep_samples(record: GrowingRecord, samples: Sequence[Sample]) -> None:
-    """Keep samples as rows; why one is missing or open is noted before its row, which vouches for it."""
-    rows = []
+    """Keep samples as rows; why one is missing or open is noted before its row, which vouches for it. A row in the
+    place of one that was cut off takes back what was noted of that.
+    """
+    rows, noted = [], {note["row"] for note in record.notes(_TEXT)}
     for number, sample in enumerate(samples, record.rows(SAMPLES)):
-        if texts := {name: text for name in _MISSING + _OPEN if (text := getattr(sample, name))}:
+        texts = {name: text for name in _MISSING + _OPEN if (text := getattr(sample, name))}
+        if texts or number in noted:
             record.note(_TEXT, row=number, **texts)
         modes = np.full(KEPT, complex(np.nan, np.nan))
         modes[: len(sample.eigenvalues)] = sample.eigenvalues[:KEPT]

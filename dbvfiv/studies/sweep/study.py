@@ -124,7 +124,7 @@ class Tracking:
     def _error(self, value: float) -> float:
         """Largest relative correction, by the full matrices, of the leading eigenvalues of the reduced-order model."""
         mu, model = self.line.place(value), self.line.column.model
-        leading = model.eigenvalues(mu)[: self.options.count]
+        leading = model.fine.leading(mu)[: self.options.count]
         return max((abs(model.corrected(mu, [x])[0]) / max(abs(x), 1.0) for x in leading), default=0.0)
 
     @property

@@ -9,8 +9,9 @@ import numpy as np
 import pytest
 
 from dbvfiv.api import load, resume
-from dbvfiv.errors import CaseError
+from dbvfiv.errors import CaseError, SolveError
 from dbvfiv.studies.case import thesis_case
+from dbvfiv.studies.closure import walk as walked
 from dbvfiv.studies.closure.walk import BUCKLED_CLASS, ClosureWalk
 from dbvfiv.studies.session import load_result
 from tests.observers import Stop
@@ -76,3 +77,53 @@ def test_what_buckles_in_another_class_is_said_again(whole):
     walk.record = SimpleNamespace(rows=lambda _: 0, notes=notes.get, warn=said.append)
     walk._warn_of_states()
     assert len(said) == 1 and said[0].startswith("The wall buckles at 7000 Pa in class SA: ")
+
+
+def test_a_state_that_arclength_has_led_to_goes_on_as_it_is_taken_up_again():
+    """With the same slope, or with none in the path and in the ledger."""
+    for slope in (None, np.array([2.0])):
+        walk, begun, kept = object.__new__(ClosureWalk), [], []
+        walk.energy = SimpleNamespace(begin=lambda *given: begun.append(given), totals=(1.0, 1.0, 0.0))
+        walk.model = SimpleNamespace(nodal=lambda q: q, shell=SimpleNamespace(dofs=SimpleNamespace(restrict=np.array)))
+        walk.steps = SimpleNamespace(pressure=3e3, q=np.array([1.0]), step=10.0, slope=slope, reach=fails)
+        walk._kept, walk.steps.settle = {}, lambda: None
+        walk._go_past_limit = walk._watch = lambda *_: None
+        walk._keep_state = lambda *given: kept.append({"way/slope": np.array([np.nan])} | named(given[-1]))
+        walk._go_to(3e3)
+        row = kept[0] | {"pressure": 3e3, "nodal": np.array([1.0]), "beyond_limit": True}
+        walk._value, walk.record, walk.watches, walk.own = lambda name, _: row[name], NoRows, {"SS": 0}, NoRows
+        walk._take_up(0)
+        assert begun[0] == begun[1] == (walk.steps.q, 3e3, slope) and walk.steps.slope == slope
+
+
+class NoRows:
+    """A record and a watch that hold nothing."""
+
+    found = ()
+
+    @staticmethod
+    def rows(_):
+        return 0
+
+
+def fails(_target):
+    raise SolveError("No equilibrium was found.")
+
+
+def named(way):
+    """Restart data by the names of their columns."""
+    return {f"way/{name}": value for name, value in way.items()}
+
+
+@pytest.mark.parametrize(("target", "kept"), [(8e3, 1), (2e3, 0)])
+def test_a_walk_that_is_lost_as_the_pressure_falls_has_no_last_state_before_a_limit(target, kept, monkeypatch):
+    monkeypatch.setattr(walked, "LoadCurve", lambda *_: None)
+    monkeypatch.setattr(walked, "follow_past_limits", lambda _curve, target: fails(target))
+    walk, found = object.__new__(ClosureWalk), []
+    walk.steps = SimpleNamespace(pressure=5e3, q=None, options=SimpleNamespace(newton=None))
+    walk.model = SimpleNamespace(case=thesis_case())
+    walk.record = SimpleNamespace(progress=lambda _: None)
+    walk._keep_before_limit = lambda *given: found.append(given)
+    with pytest.raises(SolveError, match="Arclength did not get under way"):
+        walk._go_past_limit(target, SolveError("No equilibrium was found."))
+    assert found == [(5e3, None)] * kept

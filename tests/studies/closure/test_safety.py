@@ -8,21 +8,26 @@ import numpy as np
 import pytest
 
 import dbvfiv
+from dbvfiv.model.closed import ClosedValve
+from dbvfiv.record.mesh import MeshData
 from dbvfiv.report.answers import _collapse, _margin
 from dbvfiv.studies.case import thesis_case
 from dbvfiv.studies.closure.safety import ClassBuckling, _buckling, find_safety, rated_sentence, rated_verdict
-from dbvfiv.studies.closure.walk import film_leak
+from dbvfiv.studies.closure.study import ClosureResult, PressedState
+from dbvfiv.studies.closure.walk import Pressed, film_leak
 from dbvfiv.studies.session import load_result
-from tests.small_valves import FORMER
+from tests.small_valves import FORMER, SMALL
 
 
-def result(pressures, sealed, overlap=None, buckling=(), supports="contact", failure=None, classes=(), **changes):
+def result(
+    pressures, sealed, overlap=None, buckling=(), supports="contact", failure=None, classes=(), lost=(), **changes
+):
     overlap = np.zeros(len(pressures)) if overlap is None else overlap
     walk = [
         SimpleNamespace(pressure=p, sealed_length=s, overlap=o, arclength=False)
         for p, s, o in zip(pressures, sealed, overlap)
     ]
-    case = thesis_case({"closure.pressures": [max(pressures)]} | {f"closure.{k}": v for k, v in changes.items()})
+    case = thesis_case({"closure.pressures": [*pressures, *lost]} | {f"closure.{k}": v for k, v in changes.items()})
     buckled = [SimpleNamespace(pressure=p, kind="limit point") for p in buckling]
     found = SimpleNamespace(walk=walk, case=case, buckling=buckled, supports=supports, walk_failure=failure)
     found.classes, found.states = classes, [SimpleNamespace(pressure=p, beyond_limit=False) for p in pressures]
@@ -98,9 +103,24 @@ def test_a_seal_that_supports_give_is_not_found_but_assumed():
 
 
 def test_where_equilibria_end_is_a_limit():
-    found = find_safety(result([1e3, 1.8e3], [0.1, 0.1], failure="No equilibrium was found.", rated_pressure=3e3))
+    asked = {"failure": "No equilibrium was found.", "rated_pressure": 3e3}
+    found = find_safety(result([1e3, 1.8e3], [0.1, 0.1], lost=[3e3], **asked))
     assert (found.limit, found.factor) == ("end of the path", pytest.approx(0.6))
+    assert find_safety(result([1e3, 1.8e3], [0.1, 0.1], lost=[5e2, 3e3], **asked)).at_least  # as the pressure falls
     assert find_safety(SimpleNamespace(walk=[])) is None
+
+
+@pytest.mark.parametrize(
+    ("points", "closing"),
+    [
+        ([(1e3, 0.0), (2e3, 0.1), (1.5e3, 0.1)], 2e3),  # opens less readily than it shuts
+        ([(1e3, 0.0), (3e3, 0.0), (2e3, 0.1), (1e3, 0.1), (4e3, 0.1)], 3e3),  # snaps at 3 kPa
+        ([(1e3, 0.0)], None),
+    ],
+)
+def test_the_closing_pressure_is_one_that_rises_up_to_it(points, closing):
+    walk = [SimpleNamespace(pressure=pressure, sealed_length=sealed) for pressure, sealed in points]
+    assert ClosureResult.closing_pressure.fget(SimpleNamespace(walk=walk)) == closing
 
 
 def test_leak_is_that_of_a_laminar_film_and_of_a_jet_at_its_ends():
@@ -113,6 +133,18 @@ def test_leak_is_that_of_a_laminar_film_and_of_a_jet_at_its_ends():
     assert film_leak(pressure, z, x, gap, 4, 1000.0, viscosity) < min(film, jet)
     gap[2] = -1e-6
     assert film_leak(pressure, z, x, gap, 4, 1000.0, viscosity) == 0.0
+
+
+def test_the_leak_of_a_state_goes_through_its_least_opening():
+    """Of the inner face: round the side edge of the lip it has less width than the middle of the wall."""
+    case = thesis_case(dict(SMALL))
+    model = ClosedValve(case)
+    pressed = Pressed(model, 2e-5 * np.random.default_rng(0).standard_normal(model.size), 2e3)
+    own = {name: getattr(pressed, name) for name in ("pressure", "nodal", "opening")}
+    results = SimpleNamespace(case=case, mesh=MeshData.of(model))
+    state = PressedState(results=results, gap=model.gaps(pressed.nodal), **own)
+    jet = pressed.least_opening * np.sqrt(2 * 2e3 / case.fluid.density)
+    assert state.leak == pytest.approx(jet, rel=1e-9)
 
 
 @pytest.mark.slow

@@ -12,6 +12,7 @@ from scipy.sparse import diags
 
 from dbvfiv.errors import SolveError
 from dbvfiv.model.closed import ClosedValve, Passage, load_steps
+from dbvfiv.model.load_curve import LoadCurve
 from dbvfiv.model.load_steps import LoadSteps
 from dbvfiv.studies.case import Case, thesis_case
 from dbvfiv.studies.closure.buckling import follow_past_limits, spectrum_of
@@ -170,6 +171,14 @@ def test_the_eigenvalue_of_a_limit_point_is_the_one_that_vanishes():
     curve.extend = lambda target: None
     (limit,) = follow_past_limits(curve, 4e3).limits
     assert limit.eigenvalue == pytest.approx(1e-9, rel=1e-3)
+
+
+@pytest.mark.parametrize(("lower", "number"), [(1.0003, 0), (0.8, 2)])
+def test_limit_points_that_are_put_down_to_the_mesh_are_no_limit_states(lower, number):
+    curve, along = object.__new__(LoadCurve), zip((0.0, 1.0, 1.0005, lower, 2.0), (1.0, 0.5, 0.01, -0.01, 1.0))
+    points = [SimpleNamespace(z=np.array([0.0, p]), tangent=np.array([1.0, slope])) for p, slope in along]
+    curve._branch, curve._tracer = SimpleNamespace(points=points), lambda: SimpleNamespace(root=lambda *_: None)
+    assert [state.pressure for state in curve.limit_states()] == [1.0005, lower][:number]
 
 
 @pytest.mark.slow

@@ -20,7 +20,7 @@ from dbvfiv.studies.map.figures import stability_map
 from dbvfiv.studies.map.study import MapResult, _doubts, check_cells, keep_column, tables_of
 from dbvfiv.studies.modes.search import run_modes
 from dbvfiv.studies.session import load_result
-from dbvfiv.studies.stability.samples import Sample
+from dbvfiv.studies.stability.samples import SAMPLE_TABLE, Sample, SampleKey, keep_samples, read_samples
 from eigen import Certificate, SingularShiftError, unstable_count
 from eigen.columns import DIRECT, Cell
 from tests.small_valves import SMALL, settings
@@ -62,9 +62,25 @@ def test_cells_whose_mode_grows_too_slowly_to_be_counted_are_uncertain(case):
     assert [text.split(" cells are")[0] for text in said] == [
         f"In class {name}: {number}" for name in ("SA", "AS", "AA")
     ]
+    place = {"x": 1e3, "y": 2.0, "unstable": 2, "agrees": False}
+    other, far = (_doubts(plan, columns, [place | {"error": error}])[-1] for error in (3e-9, 2e-4))
+    assert other.endswith("the full pencil has 2 unstable eigenvalues and the cell another number.")
+    assert far.endswith("the full pencil differs by 2.0e-04.")
     result = SimpleNamespace(plan=plan, columns=columns)
     note = {"symmetry": "SA", "motion": "sway", "certified": np.ones((10, 6), bool)}
     assert MapResult._class_line(result, 1, note) == "class SA (sway): 0 cells unstable, 0 stable, 60 of 60 certified."
+
+
+def test_a_text_of_a_sample_that_was_cut_off_is_not_told_of_the_next_in_its_row(case):
+    slow = Cell(np.array([complex(0.05, 94.0)]), Certificate(0, 0, True, 0.1), DIRECT)
+    plain = replace(Sample.of(1.0, slow), key=SampleKey(symmetry="SS"))
+    first = GrowingRecord(Header.of("map", case, "valve"), None, (SAMPLE_TABLE,))
+    keep_samples(first, [replace(plain, left_open="Above 25 Hz more is counted.")])
+    assert [sample.left_open for sample in read_samples(first)] == ["Above 25 Hz more is counted."]
+    known = SimpleNamespace(rows=lambda _: 0, log=first.log)
+    again = GrowingRecord(first.header, None, (SAMPLE_TABLE,), known=known)
+    keep_samples(again, [plain])
+    assert [sample.left_open for sample in read_samples(again)] == [""]
 
 
 def test_onsets_of_columns_lie_between_cells_of_opposite_sign(whole):
