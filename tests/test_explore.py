@@ -3,13 +3,19 @@
 from __future__ import annotations
 
 from time import process_time
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 import dbvfiv
+from dbvfiv.case.parameters import Mu
 from dbvfiv.errors import CaseError
-from dbvfiv.studies.case import thesis_case
+from dbvfiv.explore import Explorer
+from dbvfiv.model.symmetry import SYMMETRIES
+from dbvfiv.studies.case import Case, thesis_case
+from dbvfiv.studies.stability.samples import Sample
+from eigen.columns import DIRECT
 from tests.app.server import COARSE as COARSE_SIX
 
 COARSE = {"mesh.around": 6, "mesh.along": 8}
@@ -68,6 +74,41 @@ def test_confirmed_answers_are_those_of_the_command(explorer):
         assert ours[name] == pytest.approx(theirs[name], rel=1e-6), name
     # searched to 1e-4 of itself, so that it depends on what was asked before by a part of that
     assert ours["critical_damping_factor"] == pytest.approx(theirs["critical_damping_factor"], rel=1e-4)
+
+
+class Swaying:
+    """Walk of a valve that flutters in SA alone."""
+
+    def __init__(self, motion=SYMMETRIES["SS"]):
+        self.symmetry, self.refusal = motion, lambda place: ""
+        grows = motion.name == "SA"
+        values = np.array([(2.0 if grows else -1.0) + (50j if grows else 80j)])
+        self.spectrum = lambda place, count: SimpleNamespace(eigenvalues=values)
+        self.cell = lambda place, spectrum: spectrum
+        self.sample = lambda place, cell: Sample(np.nan, values, 2 * grows, 2 * grows, True, how=DIRECT)
+
+    def in_class(self, motion):
+        return Swaying(motion)
+
+
+@pytest.mark.parametrize(("asked", "outcome"), [("SS", "stable"), ("all", "flutters"), ("SA", "flutters")])
+def test_classes_that_the_case_asks_for_are_confirmed_too(monkeypatch, asked, outcome):
+    found = object.__new__(Explorer)
+    found.case, found.walk = Case().replace({"modes.symmetry": asked}), Swaying()
+    monkeypatch.setattr(Explorer, "state", lambda self, place: None)
+    monkeypatch.setattr(Explorer, "place", lambda self, values: Mu.of(self.case))
+    ends = {"SS": 0.4, "SA": 1.7}
+
+    def factor(walk, place, verdict):
+        return ends.get(walk.symmetry.name, 0.2), np.nan
+
+    monkeypatch.setattr("dbvfiv.explore.critical_damping_factor", factor)
+    answer = found.with_margin(found.confirm())
+    classes = {"SS": ["SS"], "all": [*SYMMETRIES], "SA": ["SS", "SA"]}[asked]
+    assert answer.verdict.outcome == outcome
+    assert [*answer.classes] == classes and len(answer.eigenvalues) == len(classes)
+    assert answer.eigenvalues[0] == (-1 + 80j if asked == "SS" else 2 + 50j)
+    assert answer.verdict.critical_damping_factor == (0.4 if asked == "SS" else 1.7)
 
 
 def test_an_unstable_mode_far_above_the_list_is_told():
