@@ -309,7 +309,7 @@ def _input(case: Case, name: str, text: str, source: str) -> Input:
         quantity = quantity_of(field)
         own, limits = plain_number(case, name, value), limits_of(field, name)
     try:
-        distribution = Distribution.parse(text, quantity, own)
+        distribution = Distribution.parse(text, quantity, own, case.fluid.density)
     except ValueError as error:
         raise CaseError(f"{key} is given as {text!r}, {error}; {FORMS}.", key=key) from None
     outside = distribution.share_outside(*limits)

@@ -284,6 +284,11 @@ def test_shipped_inputs_lie_where_their_numbers_can_be(keys, name, form, numbers
         assert inputs[name].form == form and inputs[name].numbers == pytest.approx(numbers, abs=0.06)
 
 
+def test_a_pressure_may_be_uncertain_as_a_head():
+    case = load_case(None, ["uncertainty.inputs.pressure=normal(1 m, 0.1 m)", "fluid.density=800"])
+    assert inputs_of(case)[0].distribution.numbers == pytest.approx((7845.32, 784.532))
+
+
 def test_a_sealing_pressure_may_be_uncertain():
     keys = {**SMALL, "uncertainty.inputs": {"sealing": "normal(5 %)"}}
     case = dbvfiv.load("cases/dbv12-moulded.toml", keys).case
