@@ -82,7 +82,7 @@ class Desk:
         found.interrupted = self._interrupted
         rows = {}
         for name, (low, high) in found.ranges.items():
-            rows[name] = shown_as(found.case, name)
+            rows[name] = shown_as(found.case, name, found.ranges)
             rows[name] |= {"low": low, "high": high, "own": found.base[name], "moves": found.moves(name)}
         return {"parameters": rows}
 

@@ -25,6 +25,7 @@ from dbvfiv.app.sheet import (
     write_sheet,
 )
 from dbvfiv.app.worker import text_for_page
+from dbvfiv.case.quantity import GRAVITY
 from dbvfiv.case.valve import Valve
 from dbvfiv.errors import CaseError
 from dbvfiv.geometry import key_point_table
@@ -160,6 +161,20 @@ def test_pictures_begin_above_the_pressure_downstream():
     assert arguments_of(case, "Root locus over head") == ["--over", "pressure=5750:12500:10"]
     case = load_case(None, ["drive.pressure=10 kPa"])
     assert arguments_of(case, "Root locus over head") == ["--over", "pressure=1500:15000:10"]
+
+
+@pytest.mark.parametrize(("units", "span"), [("psi", "0.217557 psi:2.17557 psi"), ("m", "0.152957 m:1.52957 m")])
+def test_pictures_keep_the_units_of_the_project(units, span):
+    case = load_case(None, ["drive.pressure=10 kPa", f"project.units={units}"])
+    assert arguments_of(case, "Head-loss curve") == ["-p", f"{span}:10"]
+
+
+def test_heads_beside_other_densities_are_of_a_fluid_that_is_named():
+    figure, _ = map_figure(Case(), found_map("density"))
+    assert figure["layout"]["xaxis"]["title"]["text"] == "Head of fluid of 1000 kg/m³, m"
+    assert figure["data"][0]["x"] == pytest.approx([1 / GRAVITY, 2 / GRAVITY])
+    figure, _ = map_figure(Case(), found_map("pipe_length"))
+    assert figure["layout"]["xaxis"]["title"]["text"] == "Head of the fluid, m"
 
 
 PICTURE = {"growth_rate": [[-2.0, 1.0]], "certified": [[True, False]], "onset_curves": []}
