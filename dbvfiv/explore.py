@@ -29,7 +29,7 @@ from .model.state import SteadyState
 from .model.symmetry import asks_for_equilibria, chosen_symmetries, symmetry_named
 from .studies.modes.search import critical_damping_factor
 from .studies.session import Session
-from .studies.stability.place import check_scan, is_surrounding
+from .studies.stability.place import check_scan, is_surrounding, require_parameter
 from .studies.stability.samples import Sample
 from .studies.stability.verdict import UNDECIDED, Verdict
 from .studies.stability.walk import StabilityWalk
@@ -130,12 +130,19 @@ class Explorer:
         damped = [name for name in ("loss_factor", "beta", "alpha") if self.base.get(name, 0.0) > 0]
         for name in ("pressure", "density", *damped[:1], "pipe_length"):
             own, (low, high) = self.base.get(name, 0.0), OFFERED.get(name, DAMPED)
-            if own > 0 and not (name == "pipe_length" and self.case.upstream.pieces):
+            if own > 0 and self._can_ask(name):
                 above = max(self.model.flow.back, 0.0) if name == "pressure" else 0.0
                 highest = min(above + high * (own - above), PARAMETERS[name].high)
                 if name == "loss_factor":
                     highest = self.model.relaxation.highest(own, highest)
                 yield name, (above + low * (own - above), highest)
+
+    def _can_ask(self, name: str) -> bool:
+        try:
+            require_parameter(self.case, name)
+        except CaseError:
+            return False
+        return True
 
     def moves(self, name: str) -> bool:
         """True where a parameter changes the steady state."""

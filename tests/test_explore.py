@@ -56,6 +56,18 @@ def test_the_damping_that_a_wall_has_is_offered(alpha, beta, name):
     assert {"alpha", "beta", "loss_factor"} & set(ranges) == {name}
 
 
+def test_the_density_behind_a_pump_is_not_offered():
+    """Its head is another pressure in another fluid."""
+    line = {"drive.pressure": 6e3, "upstream.length": 3.0, "upstream.diameter": 0.3}
+    for more, offered in (({}, True), ({"upstream.pump": [[0, 3.0], [0.1, 0.3]]}, False)):
+        found = object.__new__(Explorer)
+        found.case = Case().replace(line | more)
+        flow, relaxation = SimpleNamespace(back=0.0), SimpleNamespace(highest=lambda own, highest: highest)
+        found.base, found.model = Mu.of(found.case), SimpleNamespace(flow=flow, relaxation=relaxation)
+        ranges = dict(found._offered())
+        assert ("density" in ranges) is offered and {"pressure", "pipe_length"} <= set(ranges)
+
+
 def test_heads_begin_at_none_where_weight_opens_the_valve():
     explorer = dbvfiv.load(None, COARSE | {"gravity.direction": "-z", "materials.strain_level": 0.1}).explore()
     assert explorer.model.flow.back < 0.0 < explorer.ranges["pressure"][0]
