@@ -110,11 +110,13 @@ def picture(name: str, caption: str, draw: Callable[[], Figure], live: str = "",
     return Picture(name, caption, written.getvalue(), live)
 
 
-def pictures_of(result, captions: dict[str, str]) -> tuple[Picture, ...]:
-    """Pictures of a result by the names of its figures, in its units; those that it does not have are left out."""
+def pictures_of(result, captions: dict[str, str], before: str = "") -> tuple[Picture, ...]:
+    """Pictures of a result by the names of its figures, in its units; those that it does not have are left out. Words
+    before the names tell them from those of another study.
+    """
     drawers = result.drawers()
     return tuple(
-        picture(name, caption, drawers[name], units=result.case.units)
+        picture(f"{before}{name}", caption, drawers[name], units=result.case.units)
         for name, caption in captions.items()
         if name in drawers
     )
@@ -279,7 +281,10 @@ def pipe_part(found: Gathered) -> Part | None:
     lengths = list(next(iter(sweeps.values())).values)
     head = (f"{_pressure_title(found)}", *(f"pipe of {length:.3g} m" for length in lengths))
     rows = tuple(
-        (units.pressure(p, 3), *(f"{v.outcome}, {digits(100 * v.damping_ratio, 2)} %" for v in r.verdicts))
+        (
+            units.pressure(p, 3),
+            *(", ".join((v.outcome, *_ratio(v.damping_ratio))) for v in r.verdicts),
+        )
         for p, r in sweeps.items()
     )
     caption = "Least damping ratio over the length of the pipe."
@@ -292,6 +297,11 @@ def pipe_part(found: Gathered) -> Part | None:
     return Part(
         "pipe", title, (said,), (Table(head, rows),), pictures, tuple(f for r in sweeps.values() for f in r.failures)
     )
+
+
+def _ratio(value: float) -> tuple[str, ...]:
+    """A damping ratio in per cent; nothing where it is not known."""
+    return (f"{digits(100 * value, 2)} %",) if np.isfinite(value) else ()
 
 
 def chance_part(found: Gathered) -> Part | None:
@@ -372,7 +382,7 @@ def closure_part(found: Gathered) -> Part:
     left = ("Forces balance",) if rated else ("Forces balance", "Safety factor")
     sentences = tuple(line for line in result.remarks() if not line.startswith(left))
     trust = (*result.failures, *(line for line in result.remarks() if line.startswith("Forces")))
-    return Part("closure", _CLOSURE, sentences, (table,), (curve, *pictures_of(result, _MEASURED)), trust)
+    return Part("closure", _CLOSURE, sentences, (table,), (curve, *pictures_of(result, _MEASURED, "closure-")), trust)
 
 
 def valve_part(found: Gathered) -> Part | None:
