@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
+from ..case.materials import Layer
 from ..case.parameters import Mu
 from ..case.units import Units
 from ..drawing.style import put_in_units, style
@@ -20,7 +21,7 @@ from ..errors import CaseError
 from ..fit.cards import describe_damping, law_from_case
 from ..materials.stability import StableRange, stable_range
 from ..model.symmetry import symmetry_named
-from ..record.mesh import MeshData
+from ..studies.result import StudyResult
 from ..texts import digits, listed
 from .answers import lacking, loss_range
 from .figures import closure_figure, headloss_figure, live_valve, pipe_figure, vibration_figure
@@ -398,7 +399,7 @@ def valve_part(found: Gathered) -> Part | None:
     size, wall = units.text_of("size", float(np.ptp(mesh.z)), 4), _range(mesh.thickness / units.factor("size"))
     sentences = [f"{size} long; the wall is {wall} {units.name('size')} thick, layers from inside to outside."]
     sentences += [found.levels or f"Strain levels of the rubbers: {told}."] if levels else []
-    tables = (_layers(mesh, units), *damping)
+    tables = (_layers(result, units), *damping)
     caption = "As the case describes it: faces, measures, wall and layers."
     return Part(
         "layers",
@@ -436,14 +437,31 @@ def _range(values: np.ndarray) -> str:
     return f"{low:.4g}" if high - low < 1e-6 * high else f"{low:.4g} to {high:.4g}"
 
 
-def _layers(mesh: MeshData, units: Units) -> Table:
+def _layers(result: StudyResult, units: Units) -> Table:
+    """Thickness of each layer over the elements where it is."""
+    mesh, case = result.mesh, result.case
+    limited = any(layer.is_limited for layer in case.layers)
+    shares = np.atleast_2d(result.model.shell.at_rest.fractions if limited else mesh.layer_fractions)
+    walls = mesh.thickness[:, None] * shares / units.factor("size")
     rows = []
-    for i, name in enumerate(mesh.layer_names):
-        share, angle = mesh.layer_fractions[i], mesh.layer_angles[i]
-        rows.append((str(i + 1), name, _range(mesh.thickness * share / units.factor("size")), f"{angle:g}"))
+    for i, (name, layer) in enumerate(zip(mesh.layer_names, case.layers)):
+        there, words = walls[walls[:, i] > 0, i], _where(layer.enlarged(case.valve.scale), units)
+        rows.append((str(i + 1), name + words, _range(there) if there.size else "-", f"{mesh.layer_angles[i]:g}"))
     return Table(
         ("layer", "material", f"thickness, {units.name('size')}", "angle from the valve's axis, degrees"), tuple(rows)
     )
+
+
+def _where(layer: Layer, units: Units) -> str:
+    """Words on where a layer of limited extent is; empty of one that is everywhere."""
+    words, size = [], units.factor("size")
+    if layer.axial_edges:
+        end = "the inlet" if layer.end is None else units.text_of("size", layer.end)
+        words.append(f"z = {(layer.begin or 0.0) / size:.4g} to {end}")
+    if layer.section_edges:
+        end = 1.0 if layer.around_to is None else layer.around_to
+        words.append(f"{layer.around_from or 0.0:g} to {end:g} of the section")
+    return f" ({', '.join(words)})" if words else ""
 
 
 def warnings_part(found: Gathered) -> Part | None:
