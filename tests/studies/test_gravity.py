@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
@@ -14,7 +16,9 @@ from dbvfiv.model.equilibria import find_equilibrium, rest_state
 from dbvfiv.model.forms import ValveForms
 from dbvfiv.model.symmetry import SYMMETRIES
 from dbvfiv.studies.case import require_consistent, thesis_case
+from dbvfiv.studies.session import Session
 from dbvfiv.studies.stability.place import is_surrounding
+from dbvfiv.studies.state import State
 from tests.model.test_residual_forms import check, difference
 from tests.small_valves import SMALL, load_small, make_valve, settings
 from tests.studies.along import check_map, check_sensitivity, check_sweep, check_walk
@@ -23,6 +27,26 @@ from tests.verification.test_transient_modes import check_three_routes, three_ro
 DOWN, UP = {"gravity.direction": "-z"}, {"gravity.direction": "+z"}
 WET = {"outside.fluid": "same"}
 LEVEL = 1000.0 * GRAVITY * 0.56
+
+
+def test_the_operator_of_a_state_is_refused_in_a_fluid_whose_weight_moves_it(monkeypatch):
+    """As its modes are."""
+
+    def refuse(model, state):
+        raise SolveError(f"no equilibrium of the {model}")
+
+    monkeypatch.setattr("dbvfiv.studies.state.require_equilibrium", refuse)
+    pencil = SimpleNamespace(pencil=lambda point: dict(point))
+    monkeypatch.setattr("dbvfiv.studies.state.linearise", lambda *_: pencil)
+    monkeypatch.setattr(Session, "model", "other model")
+    monkeypatch.setattr(State, "solution", lambda self: None)
+    state, session = object.__new__(State), Session(thesis_case(DOWN))
+    results = SimpleNamespace(session=session, model=SimpleNamespace(case=session.case))
+    for name, value in {"results": results, "pressure": 6e3, "q": None}.items():
+        object.__setattr__(state, name, value)
+    assert state.pencil(alpha=0.0)["alpha"] == 0.0
+    with pytest.raises(SolveError, match="no equilibrium of the other model"):
+        state.pencil(density=500.0)
 
 
 @pytest.mark.slow
