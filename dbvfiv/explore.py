@@ -26,9 +26,11 @@ from .errors import CaseError, SolveError
 from .model.build import build_flow
 from .model.equilibria import redescribe
 from .model.state import SteadyState
+from .model.symmetry import asks_for_equilibria, chosen_symmetries, symmetry_named
 from .studies.modes.search import critical_damping_factor
 from .studies.session import Session
-from .studies.stability.place import check_scan, is_surrounding
+from .studies.stability.place import check_scan, is_surrounding, require_parameter
+from .studies.stability.samples import Sample
 from .studies.stability.verdict import UNDECIDED, Verdict
 from .studies.stability.walk import StabilityWalk
 
@@ -58,6 +60,8 @@ class Answer:
         Estimated relative error of the leading eigenvalues; 0 of the full operator, NaN where it was not estimated.
     confirmed : bool
         True of the full operator with its independent count.
+    classes : dict of Verdict
+        Of a confirmed answer those of the classes of motion it joins, by their names.
     """
 
     place: Mu
@@ -66,6 +70,7 @@ class Answer:
     eigenvalues: np.ndarray = field(default_factory=lambda: np.zeros(0, complex))
     bound: float = np.nan
     confirmed: bool = False
+    classes: Mapping[str, Verdict] = field(default_factory=dict)
 
     def summary(self) -> dict[str, Any]:
         """Plain SI numbers for JSON."""
@@ -125,12 +130,19 @@ class Explorer:
         damped = [name for name in ("loss_factor", "beta", "alpha") if self.base.get(name, 0.0) > 0]
         for name in ("pressure", "density", *damped[:1], "pipe_length"):
             own, (low, high) = self.base.get(name, 0.0), OFFERED.get(name, DAMPED)
-            if own > 0 and not (name == "pipe_length" and self.case.upstream.pieces):
+            if own > 0 and self._can_ask(name):
                 above = max(self.model.flow.back, 0.0) if name == "pressure" else 0.0
                 highest = min(above + high * (own - above), PARAMETERS[name].high)
                 if name == "loss_factor":
                     highest = self.model.relaxation.highest(own, highest)
                 yield name, (above + low * (own - above), highest)
+
+    def _can_ask(self, name: str) -> bool:
+        try:
+            require_parameter(self.case, name)
+        except CaseError:
+            return False
+        return True
 
     def moves(self, name: str) -> bool:
         """True where a parameter changes the steady state."""
@@ -230,7 +242,8 @@ class Explorer:
         return [float(value) for value in low * (high / low) ** share]
 
     def confirm(self, **values: float) -> Answer:
-        """Answer of the full operator with its independent count, as `dbvfiv modes` gives it.
+        """Answer of the full operator with its independent count, as `dbvfiv modes` gives it: on the motions that are
+        predicted, and those of all classes that modes.symmetry asks for.
 
         Raises
         ------
@@ -240,11 +253,19 @@ class Explorer:
         state, refusal = self.state(place), self.walk.refusal(place)
         if refusal:
             return Answer(place, state, Verdict.not_valid(refusal), confirmed=True)
-        spectrum = self.walk.spectrum(place, self.case.modes.count)
-        found = self.walk.sample(place, self.walk.cell(place, spectrum))
+        motions = dict.fromkeys((self.walk.symmetry, *chosen_symmetries(self.case.modes.symmetry, self.case.part)))
+        found = {motion.name: self._confirmed(self.walk.in_class(motion), place) for motion in motions}
+        eigenvalues = np.concatenate([sample.eigenvalues for sample in found.values()])
+        eigenvalues = eigenvalues[np.argsort(-eigenvalues.real, kind="stable")]
+        verdicts = {name: sample.verdict for name, sample in found.items()}
+        return Answer(place, state, Verdict.joined(verdicts), eigenvalues, 0.0, True, verdicts)
+
+    def _confirmed(self, walk: StabilityWalk, place: Mu) -> Sample:
+        """Sample of the motions of a class, by the full operator."""
+        spectrum = walk.spectrum(place, self.case.modes.count)
+        found = walk.sample(place, walk.cell(place, spectrum))
         # the count may have pointed to unstable modes beyond the band of the list
-        best = max(replace(found, eigenvalues=spectrum.eigenvalues), found, key=lambda sample: sample.pairs)
-        return Answer(place, state, best.verdict, best.eigenvalues, 0.0, True)
+        return max(replace(found, eigenvalues=spectrum.eigenvalues), found, key=lambda sample: sample.pairs)
 
     def with_margin(self, answer: Answer) -> Answer:
         """A confirmed answer with the factor on the damping at which flutter begins or ends.
@@ -253,9 +274,12 @@ class Explorer:
         ------
         SolveError
         """
-        factor, sought = critical_damping_factor(self.walk, answer.place, answer.verdict)
-        verdict = replace(answer.verdict, critical_damping_factor=factor, damping_sought=sought)
-        return replace(answer, verdict=verdict)
+        verdicts = {}
+        for name, verdict in answer.classes.items():
+            walk = self.walk.in_class(symmetry_named(name))
+            factor, sought = critical_damping_factor(walk, answer.place, verdict)
+            verdicts[name] = replace(verdict, critical_damping_factor=factor, damping_sought=sought)
+        return replace(answer, verdict=Verdict.joined(verdicts), classes=verdicts) if verdicts else answer
 
     def _corners(self, place: Mu) -> list[Mu]:
         """Corners of the ranges that share the steady state of a point."""
@@ -282,7 +306,8 @@ class Explorer:
         _, space, _ = self._space
         values = np.asarray(space.leading(place))[: self.case.modes.count]
         unstable = number_right_of(values)
-        said = f"{unstable} unstable eigenvalues of the reduced operator; the full one has not confirmed them."
+        alone = "" if asks_for_equilibria(self.case.modes.symmetry) else f" of class {self.walk.symmetry.name}"
+        said = f"{unstable} unstable eigenvalues{alone} of the reduced operator; the full one has not confirmed them."
         found = replace(Verdict.of(values, unstable, unstable, True, proven=False, statement=said), certain=False)
         if values.size and abs(values[0].real) <= bound * abs(values[0]):
             found = replace(found, outcome=UNDECIDED, reason=f"The leading mode is neutral within {bound:.1g}. {said}")

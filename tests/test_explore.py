@@ -3,13 +3,19 @@
 from __future__ import annotations
 
 from time import process_time
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 import dbvfiv
+from dbvfiv.case.parameters import Mu
 from dbvfiv.errors import CaseError
-from dbvfiv.studies.case import thesis_case
+from dbvfiv.explore import Explorer
+from dbvfiv.model.symmetry import SYMMETRIES
+from dbvfiv.studies.case import Case, thesis_case
+from dbvfiv.studies.stability.samples import Sample
+from eigen.columns import DIRECT
 from tests.app.server import COARSE as COARSE_SIX
 
 COARSE = {"mesh.around": 6, "mesh.along": 8}
@@ -50,6 +56,18 @@ def test_the_damping_that_a_wall_has_is_offered(alpha, beta, name):
     assert {"alpha", "beta", "loss_factor"} & set(ranges) == {name}
 
 
+def test_the_density_behind_a_pump_is_not_offered():
+    """Its head is another pressure in another fluid."""
+    line = {"drive.pressure": 6e3, "upstream.length": 3.0, "upstream.diameter": 0.3}
+    for more, offered in (({}, True), ({"upstream.pump": [[0, 3.0], [0.1, 0.3]]}, False)):
+        found = object.__new__(Explorer)
+        found.case = Case().replace(line | more)
+        flow, relaxation = SimpleNamespace(back=0.0), SimpleNamespace(highest=lambda own, highest: highest)
+        found.base, found.model = Mu.of(found.case), SimpleNamespace(flow=flow, relaxation=relaxation)
+        ranges = dict(found._offered())
+        assert ("density" in ranges) is offered and {"pressure", "pipe_length"} <= set(ranges)
+
+
 def test_heads_begin_at_none_where_weight_opens_the_valve():
     explorer = dbvfiv.load(None, COARSE | {"gravity.direction": "-z", "materials.strain_level": 0.1}).explore()
     assert explorer.model.flow.back < 0.0 < explorer.ranges["pressure"][0]
@@ -68,6 +86,41 @@ def test_confirmed_answers_are_those_of_the_command(explorer):
         assert ours[name] == pytest.approx(theirs[name], rel=1e-6), name
     # searched to 1e-4 of itself, so that it depends on what was asked before by a part of that
     assert ours["critical_damping_factor"] == pytest.approx(theirs["critical_damping_factor"], rel=1e-4)
+
+
+class Swaying:
+    """Walk of a valve that flutters in SA alone."""
+
+    def __init__(self, motion=SYMMETRIES["SS"]):
+        self.symmetry, self.refusal = motion, lambda place: ""
+        grows = motion.name == "SA"
+        values = np.array([(2.0 if grows else -1.0) + (50j if grows else 80j)])
+        self.spectrum = lambda place, count: SimpleNamespace(eigenvalues=values)
+        self.cell = lambda place, spectrum: spectrum
+        self.sample = lambda place, cell: Sample(np.nan, values, 2 * grows, 2 * grows, True, how=DIRECT)
+
+    def in_class(self, motion):
+        return Swaying(motion)
+
+
+@pytest.mark.parametrize(("asked", "outcome"), [("SS", "stable"), ("all", "flutters"), ("SA", "flutters")])
+def test_classes_that_the_case_asks_for_are_confirmed_too(monkeypatch, asked, outcome):
+    found = object.__new__(Explorer)
+    found.case, found.walk = Case().replace({"modes.symmetry": asked}), Swaying()
+    monkeypatch.setattr(Explorer, "state", lambda self, place: None)
+    monkeypatch.setattr(Explorer, "place", lambda self, values: Mu.of(self.case))
+    ends = {"SS": 0.4, "SA": 1.7}
+
+    def factor(walk, place, verdict):
+        return ends.get(walk.symmetry.name, 0.2), np.nan
+
+    monkeypatch.setattr("dbvfiv.explore.critical_damping_factor", factor)
+    answer = found.with_margin(found.confirm())
+    classes = {"SS": ["SS"], "all": [*SYMMETRIES], "SA": ["SS", "SA"]}[asked]
+    assert answer.verdict.outcome == outcome
+    assert [*answer.classes] == classes and len(answer.eigenvalues) == len(classes)
+    assert answer.eigenvalues[0] == (-1 + 80j if asked == "SS" else 2 + 50j)
+    assert answer.verdict.critical_damping_factor == (0.4 if asked == "SS" else 1.7)
 
 
 def test_an_unstable_mode_far_above_the_list_is_told():

@@ -10,6 +10,7 @@ from typing import Any
 
 from nicegui import ui
 
+from ..case.parameters import PARAMETERS
 from ..errors import CaseError
 
 #: Steps of a slider; time for which it rests before more than the prediction is computed, s.
@@ -43,6 +44,8 @@ class AskPanel:
         self.values: dict[str, float] = {}
         self.answers = 0
         self._file: Path | None = None
+        self._wanted: dict[str, float] = {}
+        self._drawn = False
         self._rows: dict[str, dict] = {}
         self._boxes: dict[str, tuple[ui.slider, ui.number]] = {}
         self._moved = asyncio.Event()
@@ -92,12 +95,14 @@ class AskPanel:
             return
         if self._task is not None and not self._task.done() and file == self._file:
             if values is not None:
-                self.go({name: row["own"] for name, row in self._rows.items()} | values)
+                self._wanted = values  # at which a valve that is being built is asked then
+                if self._drawn:
+                    self._go_there()
             return
         if self._task is not None:
             self._task.cancel()
-        self._file = file
-        self._task = asyncio.create_task(self._follow(file, values or {}))
+        self._file, self._wanted, self._drawn = file, values or {}, False
+        self._task = asyncio.create_task(self._follow(file))
 
     def values_of(self, file: Path | None) -> dict[str, float]:
         """Values of the sliders, SI, where they are those of a case file; empty where it is another."""
@@ -111,7 +116,26 @@ class AskPanel:
                 self.values[name] = min(max(value, row["low"]), row["high"])
                 slider.value = box.value = self.values[name] / row["scale"]
 
-    async def _follow(self, file: Path, values: dict[str, float]) -> None:
+    def _go_there(self) -> None:
+        """Move the sliders to the values that are wanted, the others to those of the case; where a slider does not
+        reach its value that is told, and none moves.
+        """
+        for name, value in self._wanted.items():
+            row = self._rows.get(name)
+            if row is None:
+                said = f"{PARAMETERS[name].title} cannot be moved here, so that the valve is not asked there."
+            else:
+                reach = (row["high"] - row["low"]) / STEPS
+                if row["low"] - reach <= value <= row["high"] + reach:
+                    continue
+                low, high, given = (f"{number / row['scale']:.4g}" for number in (row["low"], row["high"], value))
+                said = f"{row['title']} reaches from {low} to {high} {row['unit']} here, so that {given} is not asked."
+            with self._card:
+                self.page.tell(said)
+            return
+        self.go({name: row["own"] for name, row in self._rows.items()} | self._wanted)
+
+    async def _follow(self, file: Path) -> None:
         """Answer moves of the sliders, the last one always, until another valve is opened."""
         predictor, confirmer = self.page.site.workers.of(file, self)
         self._status.text = "The valve is being built; the first answer takes longest."
@@ -122,7 +146,8 @@ class AskPanel:
             return
         self._rows = found["parameters"]
         self._draw_sliders()
-        self.go(values)
+        self._drawn = True
+        self._go_there()
         self._status.text = ""
         self._since = time.monotonic()
         self._moved.set()

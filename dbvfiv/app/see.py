@@ -24,7 +24,7 @@ from .sheet import shown_as
 LOOK, LARGEST = 1.0, 15 << 20
 #: Pictures of a valve: title, study, and its arguments; low and high are heads, Pa, damping a range of the damping.
 PICTURES = {
-    "Head-loss curve": ("steady", ("-p", "{kpa_low:.6g} kPa:{kpa_high:.6g} kPa:10")),
+    "Head-loss curve": ("steady", ("-p", "{shown_low:.6g} {unit}:{shown_high:.6g} {unit}:10")),
     "Root locus over head": ("sweep", ("--over", "pressure={low:.6g}:{high:.6g}:10")),
     "Stability map": (
         "map",
@@ -44,7 +44,8 @@ def arguments_of(case: Any, title: str) -> list[str]:
     name, own = next(((name, own) for name, own in damping if own > 0), ("density", case.fluid.density))
     back = max(case.rest_pressure, 0.0)
     low, high = (back + share * (case.drive.pressure - back) for share in (0.15, 1.5))
-    heads = {"low": low, "high": high, "kpa_low": 1e-3 * low, "kpa_high": 1e-3 * high}
+    unit, scale = case.units.name("pressure"), case.units.factor("pressure")  # in any other the command would tell all
+    heads = {"low": low, "high": high, "shown_low": low / scale, "shown_high": high / scale, "unit": unit}
     values = heads | {"damping": f"{name}={0.25 * own:.6g}:{3 * own:.6g}"}
     return [argument.format(**values) for argument in PICTURES[title][1]]
 
@@ -179,7 +180,7 @@ def map_figure(case: Case, found: dict[str, Any]) -> tuple[dict[str, Any], str]:
     laws = found.get("laws", [found])
     picture = next((one for one in laws if one["continuity"] == case.fluid.continuity), laws[0])
     names = [found[axis]["parameter"] for axis in "xy"]
-    rows = [shown_as(case, name) for name in names]
+    rows = [shown_as(case, name, names) for name in names]
     x, y = ([value / row["scale"] for value in found[axis]["values"]] for axis, row in zip("xy", rows))
     leading = picture | picture.get("leading", {})
     rates, certified = leading["growth_rate"], leading["certified"]

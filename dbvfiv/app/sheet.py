@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -124,13 +124,16 @@ def usual_value(section: Section, name: str) -> Any:
     return quantity.show(value) if quantity is not None and isinstance(value, (int, float)) else value
 
 
-def shown_as(case: Case, name: str) -> dict[str, Any]:
-    """Title, unit and its SI value of a parameter as a page shows it: pressures of liquids as heads."""
+def shown_as(case: Case, name: str, beside: Collection[str] = ()) -> dict[str, Any]:
+    """Title, unit and its SI value of a parameter as a page shows it: pressures of liquids as heads, beside other
+    densities as those of the fluid of the case.
+    """
     row, units = PARAMETERS[name], case.units
     if name != "pressure" or case.fluid.density < LIQUID or (units.text and not units.heads):
         return {"title": row.title, "unit": row.shown_unit, "scale": row.scale}
     scale = units.factor("pressure") if units.heads else GRAVITY * case.fluid.density
-    return {"title": "Head of the fluid", "unit": units.name("pressure") if units.heads else "m", "scale": scale}
+    title = f"Head of fluid of {case.fluid.density:g} kg/m³" if "density" in beside else "Head of the fluid"
+    return {"title": title, "unit": units.name("pressure") if units.heads else "m", "scale": scale}
 
 
 def change(data: dict[str, Any], key: str, text: str) -> None:

@@ -31,10 +31,12 @@ from ..errors import CaseError, SolveError
 from ..explore import Answer, Explorer
 from ..model.equilibria import model_warnings
 from ..model.sizes import ValveSizes
+from ..model.symmetry import symmetry_named
 from ..record.files import reading
 from ..record.mesh import MeshData
 from ..shell.recovery import layer_fields
 from ..studies.case import Case
+from ..studies.modes.figures import drawn_amplitude
 from ..studies.session import find_study, load_result
 from ..texts import json_value
 from .sheet import shown_as, stay_inside
@@ -82,7 +84,7 @@ class Desk:
         found.interrupted = self._interrupted
         rows = {}
         for name, (low, high) in found.ranges.items():
-            rows[name] = shown_as(found.case, name)
+            rows[name] = shown_as(found.case, name, found.ranges)
             rows[name] |= {"low": low, "high": high, "own": found.base[name], "moves": found.moves(name)}
         return {"parameters": rows}
 
@@ -139,10 +141,12 @@ class Desk:
         mode = next((mode for mode in found.modes if mode.frequency > 0), None)
         if mode is None:
             raise CaseError("No mode that is listed oscillates.")
-        skin, most = ValveSkin.of(found.mesh), mode.drawn_amplitude(found.state)
-        moved = (found.state.nodal + most * mode.at_phase(2 * np.pi * i / frames) for i in range(frames))
+        skin, most = ValveSkin.of(found.mesh), drawn_amplitude(found.state, mode)
+        parity = symmetry_named(mode.symmetry).parity(skin.valve.sign)
+        turns = (most * mode.at_phase(2 * np.pi * i / frames) for i in range(frames))
+        moved = [np.round(skin.moving_points(found.state.nodal, turn, parity), 5) for turn in turns]
         said = f"Mode of {mode.frequency:.4g} Hz, growth rate {mode.growth_rate:.4g} 1/s"
-        return {"frames": [np.round(skin.points(nodal), 5) for nodal in moved], "text": said}
+        return {"frames": moved, "text": said}
 
     def result(self, path: str, figures: str) -> dict[str, Any]:
         """Text, figures and tables of a result file, these written into a folder."""

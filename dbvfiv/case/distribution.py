@@ -8,12 +8,14 @@
 ============================  =========================================================================
 
 Arguments carry units as everywhere in a case. A per cent is of the value that the case has: ``normal(5 %)`` and
-``lognormal(1.2)`` lie about that, ``uniform(-10 %, 10 %)`` on both sides of it.
+``lognormal(1.2)`` lie about that, ``uniform(-10 %, 10 %)`` on both sides of it. Of a number that cases give in per
+cent, such as a strain level, it is so as a spread alone: mean, median, bounds and samples are values themselves.
 """
 
 from __future__ import annotations
 
 import re
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -50,8 +52,11 @@ class Distribution:
     numbers: tuple[float, ...]
 
     @classmethod
-    def parse(cls, text: Any, quantity: Quantity, own: float | None = None) -> Distribution:
-        """Read a distribution of a quantity whose value in the case is `own`, SI, where it has one number.
+    def parse(
+        cls, text: Any, quantity: Quantity, own: float | None = None, density: float | None = None
+    ) -> Distribution:
+        """Read a distribution of a quantity whose value in the case is `own`, SI, where it has one number; heads are of
+        a fluid with a density, kg/m3.
 
         Raises
         ------
@@ -61,6 +66,10 @@ class Distribution:
         match = _FORM.fullmatch(text) if isinstance(text, str) else None
         if match is None:
             raise ValueError("which is no distribution")
+
+        def value(part: str) -> float:
+            return quantity.parse(number_or_text(part), density)
+
         form, inside = match[1], match[2].strip()
         if (file := samples_file(text)) is not None:
             inside = ",".join(line for _, line in numbered_lines(file))
@@ -68,29 +77,30 @@ class Distribution:
         if form == "samples":
             if len(parts) < 2:
                 raise ValueError("which names no file and fewer than two values")
-            values = tuple(sorted(quantity.parse(number_or_text(part)) for part in parts))
+            values = tuple(sorted(map(value, parts)))
             if values[0] == values[-1]:
                 raise ValueError("whose values are all the same")
             return cls(form, values)
         if not 1 <= len(parts) <= 2 or (form == "uniform" and len(parts) == 1):
             raise ValueError(f"which has {len(parts)} arguments")
-        if own is None and (len(parts) == 1 or any(map(_PERCENT.fullmatch, parts)) and quantity.shown != "%"):
+        spreads = parts if quantity.shown != "%" else parts[1:] if form == "normal" else []
+        if own is None and (len(parts) == 1 or any(map(_PERCENT.fullmatch, spreads))):
             raise ValueError("which is relative to the value of the case, and that is no one number")
         if form == "lognormal":
             factor = Quantity("").parse(number_or_text(parts[-1]))
-            median = own if len(parts) == 1 else quantity.parse(number_or_text(parts[0]))
+            median = own if len(parts) == 1 else value(parts[0])
             if factor <= 1:
                 raise ValueError(f"whose factor {factor:g} is not greater than 1")
             if median <= 0:
                 raise ValueError(f"whose median {median:g} is not greater than 0")
             return cls(form, (median, factor))
         if form == "normal":
-            mean = own if len(parts) == 1 else quantity.parse(number_or_text(parts[0]))
-            spread = _of(parts[-1], quantity, own, 0.0)
+            mean = own if len(parts) == 1 else value(parts[0])
+            spread = _of(parts[-1], value, own, 0.0)
             if spread <= 0:
                 raise ValueError("whose standard deviation is not greater than 0")
             return cls(form, (mean, spread))
-        low, high = (_of(part, quantity, own, own) for part in parts)
+        low, high = (_of(part, value, own, None if quantity.shown == "%" else own) for part in parts)
         if low >= high:
             raise ValueError("whose bounds do not rise")
         return cls(form, (low, high))
@@ -187,9 +197,9 @@ def with_full_names(text: str, folder: Path | None) -> str:
         return text
 
 
-def _of(text: str, quantity: Quantity, own: float | None, base: float | None) -> float:
-    """A value, or `base` with a per cent of the case's own value on it."""
+def _of(text: str, value: Callable[[str], float], own: float | None, base: float | None) -> float:
+    """A value, or `base` with a per cent of the case's own value on it where there is one."""
     percent = _PERCENT.fullmatch(text)
-    if percent is None or (quantity.shown == "%" and own is None):
-        return quantity.parse(number_or_text(text))
+    if percent is None or base is None:
+        return value(text)
     return base + 0.01 * float(percent[1]) * abs(own)

@@ -348,8 +348,8 @@ class Materials(Section):
         changes = {}
         for name, level in levels.items():
             own = self.named[name].model_dump(mode="json") if name in self.named else {}
-            shipped = {"kind": "shipped", "rubber": name, "strain_level": level, "constants": self.constants}
-            changes[f"materials.{name}"] = own | shipped
+            shipped = {"kind": "shipped", "strain_level": level}
+            changes[f"materials.{name}"] = {"rubber": name, "constants": self.constants} | own | shipped
         return changes
 
     def levels(self, names: Collection[str]) -> dict[str, float]:

@@ -94,7 +94,8 @@ class Case(Section):
         report = data.get("report")
         heads = report.get("heads") if isinstance(report, Mapping) else None
         given = drive.get("pressure", heads[0] if isinstance(heads, (list, tuple)) and heads else heads)
-        unit = "m" if drive.get("head") is not None else unit_of(given)
+        head = drive.get("head")
+        unit = unit_of(given) if head is None else unit_of(head) or "m"
         return {**data, "project": {**project, "units": unit}} if unit not in ("", "kPa") else data
 
     @model_validator(mode="after")

@@ -102,7 +102,7 @@ class LipSizes:
 
 
 #: What key points say in place of the case's keys.
-_SHAPE = ("lip_half_width", "lip_rise", "bill_offset", "lip_radius", "cuff_radius", "flange_radius", "saddle")
+SHAPE = ("lip_half_width", "lip_rise", "bill_offset", "lip_radius", "cuff_radius", "flange_radius", "saddle")
 #: Steepest a transition may run from the axis, rad: beyond it the rows of the mesh lie in its surface.
 _STEEPEST = math.radians(80.0)
 #: Least passage between the lips at rest, over that of the flange: below it nothing flows, and rounding says how much.
@@ -111,7 +111,7 @@ _LEAST_PASSAGE = 1e-8
 
 def check_key_points(valve: Valve) -> None:
     """Refuse keys of the parametric shape beside key points."""
-    for name in _SHAPE:
+    for name in SHAPE:
         value = getattr(valve, name)
         if name not in valve.following and value != type(valve).model_fields[name].default:
             unit = "" if name == "bill_offset" else " m"
@@ -544,6 +544,14 @@ class Valve(FollowingSection):
             "moulded_length": self.duckbill_length,
         }
         self._fill(numbers)
+
+    def numbers_beside_key_points(self, points: Path) -> dict[str, float]:
+        """Numbers, m, that were not given and that follow otherwise where a file of key points gives the shape."""
+        own = self.as_given
+        other = own.model_copy(update={"key_points": points})
+        other._follow_wall_and_shape()
+        names = sorted(own.following - set(SHAPE))
+        return {name: getattr(own, name) for name in names if getattr(own, name) != getattr(other, name)}
 
     @model_validator(mode="after")
     def _fits_together(self) -> Valve:

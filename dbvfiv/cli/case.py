@@ -159,13 +159,17 @@ def _write_new(target: str | None, overrides: list[str] | None, as_json: bool) -
 
 def _write_key_points(valve, file: Path, points: int, profiles: int, as_json: bool) -> None:
     """Write the shape of a case as key points."""
+    from ..case.describe import quantity_of, show_value
+    from ..case.valve import SHAPE
     from ..geometry.surface import key_point_table
 
     _write(str(file), key_point_table(valve, points, profiles))
-    instead = ("lip_half_width", "lip_rise", "lip_radius", "cuff_radius", "flange_radius", "saddle")
-    smooth = ', key_point_skin = "smooth"' if valve.saddle == "smooth" else ""
-    told = f'Wrote {file}; edit it and give key_points = "{file.name}"{smooth} in [valve] in place of '
-    print_either({"written": str(file)}, [f"{told}{', '.join(instead)}."], as_json)
+    keys = {"key_points": file.name} | ({"key_point_skin": "smooth"} if valve.saddle == "smooth" else {})
+    keys |= valve.numbers_beside_key_points(file)
+    fields = type(valve).model_fields
+    words = ", ".join(f"{name} = {show_value(value, quantity_of(fields[name]))}" for name, value in keys.items())
+    told = f"Wrote {file}; edit it and give {words} in [valve] in place of {', '.join(SHAPE)}."
+    print_either({"written": str(file)}, [told], as_json)
 
 
 def _write(target: str, text: str) -> None:

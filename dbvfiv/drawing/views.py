@@ -124,14 +124,18 @@ class ValveSkin:
         """(n, 4, 3) m, corners of the quadrilaterals."""
         return self.points(nodal)[self.quads]
 
-    def moving_corners(self, steady: np.ndarray, motion: np.ndarray, parity: np.ndarray) -> np.ndarray:
-        """(n, 4, 3) m, corners of a motion (nn, c) about a symmetric state (nn, c); `parity` (np,) are its factors at
+    def moving_points(self, steady: np.ndarray, motion: np.ndarray, parity: np.ndarray) -> np.ndarray:
+        """(2 np, 3) m, points of a motion (nn, c) about a symmetric state (nn, c); `parity` (np,) are its factors at
         the points of mirrored images.
         """
         points = self.points(steady + motion)
         if np.any(parity < 0):
             points = np.where(np.tile(parity, 2)[:, None] < 0, self.points(steady - motion), points)
-        return points[self.quads]
+        return points
+
+    def moving_corners(self, steady: np.ndarray, motion: np.ndarray, parity: np.ndarray) -> np.ndarray:
+        """(n, 4, 3) m, corners of the quadrilaterals of a motion, see `moving_points`."""
+        return self.moving_points(steady, motion, parity)[self.quads]
 
     def means(self, field: np.ndarray) -> np.ndarray:
         """(n,) mean over each quadrilateral of a field (nn,) of the part's nodes."""

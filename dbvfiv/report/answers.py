@@ -293,6 +293,7 @@ def closes(found: Gathered) -> Answer:
         return Answer(question, UNKNOWN, found.why("closure") if result is None else _first(result.failures))
     rated = found.case.closure.rated_pressure or max(s.pressure for s in result.states)
     states = [s for s in result.states if not s.beyond_limit and s.pressure <= rated * (1 + 1e-9)]
+    states.sort(key=lambda state: state.pressure)  # those of closure.pressures stand as they were asked for
     if not states:
         return Answer(question, UNKNOWN, _first(result.failures))
     shut = [s.pressure for s in states if s.closed]

@@ -21,6 +21,7 @@ from ..case.parameters import Mu
 from ..effects import with_effect, without_numbers
 from ..errors import CaseError, SolveError
 from ..model.sizes import ValveSizes
+from ..model.symmetry import equilibria_of
 from ..observer import Observer, is_watched
 from ..studies.case import Case
 from ..studies.onset.search import coarse_mesh
@@ -252,7 +253,9 @@ def cycle_run(found: Gathered) -> Iterator[Run]:
     nearest = min(found.modes, key=lambda p: abs(p - here), default=None)
     if onset is None or nearest is None or found.modes[nearest].stable is not False:
         return
-    beside = [p for p in onset.points if p["edge"] and (p["value"] < here) == p["gains"] and p["frequency"] > 0]
+    own = equilibria_of(found.case.part).name  # whose cycles alone are followed
+    known = [p for p in onset.points if p.get("symmetry", own) == own]
+    beside = [p for p in known if p["edge"] and (p["value"] < here) == p["gains"] and p["frequency"] > 0]
     if not beside:
         return
     begins = min(beside, key=lambda point: abs(point["value"] - here))

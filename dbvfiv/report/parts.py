@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
+from ..case.materials import Layer
 from ..case.parameters import Mu
 from ..case.units import Units
 from ..drawing.style import put_in_units, style
@@ -20,7 +21,7 @@ from ..errors import CaseError
 from ..fit.cards import describe_damping, law_from_case
 from ..materials.stability import StableRange, stable_range
 from ..model.symmetry import symmetry_named
-from ..record.mesh import MeshData
+from ..studies.result import StudyResult
 from ..texts import digits, listed
 from .answers import lacking, loss_range
 from .figures import closure_figure, headloss_figure, live_valve, pipe_figure, vibration_figure
@@ -110,11 +111,13 @@ def picture(name: str, caption: str, draw: Callable[[], Figure], live: str = "",
     return Picture(name, caption, written.getvalue(), live)
 
 
-def pictures_of(result, captions: dict[str, str]) -> tuple[Picture, ...]:
-    """Pictures of a result by the names of its figures, in its units; those that it does not have are left out."""
+def pictures_of(result, captions: dict[str, str], before: str = "") -> tuple[Picture, ...]:
+    """Pictures of a result by the names of its figures, in its units; those that it does not have are left out. Words
+    before the names tell them from those of another study.
+    """
     drawers = result.drawers()
     return tuple(
-        picture(name, caption, drawers[name], units=result.case.units)
+        picture(f"{before}{name}", caption, drawers[name], units=result.case.units)
         for name, caption in captions.items()
         if name in drawers
     )
@@ -279,7 +282,10 @@ def pipe_part(found: Gathered) -> Part | None:
     lengths = list(next(iter(sweeps.values())).values)
     head = (f"{_pressure_title(found)}", *(f"pipe of {length:.3g} m" for length in lengths))
     rows = tuple(
-        (units.pressure(p, 3), *(f"{v.outcome}, {digits(100 * v.damping_ratio, 2)} %" for v in r.verdicts))
+        (
+            units.pressure(p, 3),
+            *(", ".join((v.outcome, *_ratio(v.damping_ratio))) for v in r.verdicts),
+        )
         for p, r in sweeps.items()
     )
     caption = "Least damping ratio over the length of the pipe."
@@ -292,6 +298,11 @@ def pipe_part(found: Gathered) -> Part | None:
     return Part(
         "pipe", title, (said,), (Table(head, rows),), pictures, tuple(f for r in sweeps.values() for f in r.failures)
     )
+
+
+def _ratio(value: float) -> tuple[str, ...]:
+    """A damping ratio in per cent; nothing where it is not known."""
+    return (f"{digits(100 * value, 2)} %",) if np.isfinite(value) else ()
 
 
 def chance_part(found: Gathered) -> Part | None:
@@ -372,7 +383,7 @@ def closure_part(found: Gathered) -> Part:
     left = ("Forces balance",) if rated else ("Forces balance", "Safety factor")
     sentences = tuple(line for line in result.remarks() if not line.startswith(left))
     trust = (*result.failures, *(line for line in result.remarks() if line.startswith("Forces")))
-    return Part("closure", _CLOSURE, sentences, (table,), (curve, *pictures_of(result, _MEASURED)), trust)
+    return Part("closure", _CLOSURE, sentences, (table,), (curve, *pictures_of(result, _MEASURED, "closure-")), trust)
 
 
 def valve_part(found: Gathered) -> Part | None:
@@ -388,7 +399,7 @@ def valve_part(found: Gathered) -> Part | None:
     size, wall = units.text_of("size", float(np.ptp(mesh.z)), 4), _range(mesh.thickness / units.factor("size"))
     sentences = [f"{size} long; the wall is {wall} {units.name('size')} thick, layers from inside to outside."]
     sentences += [found.levels or f"Strain levels of the rubbers: {told}."] if levels else []
-    tables = (_layers(mesh, units), *damping)
+    tables = (_layers(result, units), *damping)
     caption = "As the case describes it: faces, measures, wall and layers."
     return Part(
         "layers",
@@ -426,14 +437,31 @@ def _range(values: np.ndarray) -> str:
     return f"{low:.4g}" if high - low < 1e-6 * high else f"{low:.4g} to {high:.4g}"
 
 
-def _layers(mesh: MeshData, units: Units) -> Table:
+def _layers(result: StudyResult, units: Units) -> Table:
+    """Thickness of each layer over the elements where it is."""
+    mesh, case = result.mesh, result.case
+    limited = any(layer.is_limited for layer in case.layers)
+    shares = np.atleast_2d(result.model.shell.at_rest.fractions if limited else mesh.layer_fractions)
+    walls = mesh.thickness[:, None] * shares / units.factor("size")
     rows = []
-    for i, name in enumerate(mesh.layer_names):
-        share, angle = mesh.layer_fractions[i], mesh.layer_angles[i]
-        rows.append((str(i + 1), name, _range(mesh.thickness * share / units.factor("size")), f"{angle:g}"))
+    for i, (name, layer) in enumerate(zip(mesh.layer_names, case.layers)):
+        there, words = walls[walls[:, i] > 0, i], _where(layer.enlarged(case.valve.scale), units)
+        rows.append((str(i + 1), name + words, _range(there) if there.size else "-", f"{mesh.layer_angles[i]:g}"))
     return Table(
         ("layer", "material", f"thickness, {units.name('size')}", "angle from the valve's axis, degrees"), tuple(rows)
     )
+
+
+def _where(layer: Layer, units: Units) -> str:
+    """Words on where a layer of limited extent is; empty of one that is everywhere."""
+    words, size = [], units.factor("size")
+    if layer.axial_edges:
+        end = "the inlet" if layer.end is None else units.text_of("size", layer.end)
+        words.append(f"z = {(layer.begin or 0.0) / size:.4g} to {end}")
+    if layer.section_edges:
+        end = 1.0 if layer.around_to is None else layer.around_to
+        words.append(f"{layer.around_from or 0.0:g} to {end:g} of the section")
+    return f" ({', '.join(words)})" if words else ""
 
 
 def warnings_part(found: Gathered) -> Part | None:

@@ -287,6 +287,11 @@ class WallParts:
         return np.stack(values)[self.zones.of_element]
 
     @cached_property
+    def fractions(self) -> np.ndarray:
+        """(ne, nl): those of the section of each element; 0 where it lacks a layer."""
+        return self._by_element([section.fractions for section in self.sections])
+
+    @cached_property
     def plane_stiffness(self) -> np.ndarray:
         """(ne, 6, 6): that of the section of each element."""
         return self._by_element([section.plane_stiffness for section in self.sections])

@@ -18,7 +18,15 @@ from ..case.quantity import Quantity
 from ..errors import CaseError
 from ..materials.shipped import shipped_loss, shipped_loss_names
 from .case import Case
-from .stability.place import design_value, is_surrounding, limits_of, number_of, plain_number, require_parameter
+from .stability.place import (
+    design_value,
+    is_surrounding,
+    limits_of,
+    number_of,
+    plain_number,
+    redesigned,
+    require_parameter,
+)
 from .stability.verdict import lowered
 from .stability.walk import StabilityWalk
 
@@ -266,7 +274,7 @@ class Plan:
             For numbers that do not go together.
         """
         keys = {one.name: float(x) for one, x in zip(self.inputs, row) if one.name not in PARAMETERS}
-        return self.case.replace(keys) if keys else self.case
+        return redesigned(self.case, keys)
 
     def walk(self, row: np.ndarray, solver: ColumnSolver) -> StabilityWalk:
         """Walk of a sample, which keeps the symbolic factorisations of a solver.
@@ -301,7 +309,7 @@ def _input(case: Case, name: str, text: str, source: str) -> Input:
         quantity = quantity_of(field)
         own, limits = plain_number(case, name, value), limits_of(field, name)
     try:
-        distribution = Distribution.parse(text, quantity, own)
+        distribution = Distribution.parse(text, quantity, own, case.fluid.density)
     except ValueError as error:
         raise CaseError(f"{key} is given as {text!r}, {error}; {FORMS}.", key=key) from None
     outside = distribution.share_outside(*limits)

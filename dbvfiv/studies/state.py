@@ -16,7 +16,7 @@ from eigen.operator import CoupledPencil
 from ..case.parameters import Mu
 from ..errors import CaseError, SolveError
 from ..model.dynamics import linearise
-from ..model.equilibria import LoadPath, SteadyOptions
+from ..model.equilibria import LoadPath, SteadyOptions, require_equilibrium
 from ..model.state import SteadyState
 from ..model.valve import ValveModel
 from ..record.mesh import WholeValve
@@ -83,14 +83,23 @@ class State(SteadyState):
         Fluid and damping may differ from those it was found with, see `modes`. Rows of M, C and K are the unknowns of
         ``q``, those of ``model.shell.dofs``.
 
+        Raises
+        ------
+        SolveError
+            If it is no steady state of that fluid.
+
         Examples
         --------
         >>> state.pencil(density=1.2, alpha=0).K     # doctest: +SKIP
         """
         if given := {"symmetry", "in_vacuo", "max_frequency"} & set(changes):
             raise CaseError(f"{min(given)!r} is given, which the operator of a state does not take; see `modes`.")
-        point = Mu.of(self._session(changes, {}).case)
-        return linearise(self.model, self.q, self.pressure).pencil(point)
+        session, model = self._session(changes, {}), self.model
+        point, own = Mu.of(session.case), Mu.of(model.case)
+        if any(point.get(name) != own.get(name) for name in ("density", "pipe_length")):  # which may move the state
+            model = session.model
+            require_equilibrium(model, self)
+        return linearise(model, self.q, self.pressure).pencil(point)
 
     def modes(
         self, *, count: int | None = None, output: str | Path | None = None, observer: Any = None, **changes: Any

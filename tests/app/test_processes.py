@@ -10,6 +10,7 @@ from pathlib import Path
 from types import SimpleNamespace
 
 import h5py
+import numpy as np
 import pytest
 
 import dbvfiv
@@ -19,6 +20,7 @@ from dbvfiv.app.processes import Run, Runs, Worker, Workers
 from dbvfiv.app.server import Site
 from dbvfiv.app.worker import Desk
 from dbvfiv.errors import CaseError
+from dbvfiv.studies.modes.search import ModeShape
 
 #: A program that ignores what asks it to end.
 STUBBORN = (
@@ -213,6 +215,20 @@ def test_so_many_valves_are_held():
     pairs = [workers.of(Path(str(number)), number) for number in range(processes.VALVES + 1)]
     assert workers.of(Path("0"), 0) is not pairs[0]
     assert workers.of(Path("2"), 2) is pairs[2]
+
+
+def test_a_mode_that_sways_is_animated_as_it_sways():
+    """Both lips the same way, not towards each other."""
+    mesh = dbvfiv.load(None, {"mesh.around": 6, "mesh.along": 8}).session.mesh
+    shape = np.zeros(mesh.nodal_shape, complex)
+    shape[:, 1] = mesh.z[0] + 1.0 - mesh.nodes[:, 2] / mesh.z[-1]
+    state = SimpleNamespace(nodal=np.zeros(mesh.nodal_shape), results=SimpleNamespace(mesh=mesh))
+    mode = ModeShape(1, 1.0, 60.0, 0.0, 0.0, shape, np.zeros(1), np.zeros(1), 0j, "SA")
+    desk = Desk()
+    desk.valve = SimpleNamespace(modes=lambda pressure, **_: SimpleNamespace(modes=[mode], mesh=mesh, state=state))
+    first, *_, last = desk.motion({"pressure": 5e3}, frames=2)["frames"]
+    moved = first[:, 1] - last[:, 1]  # from one end of the swing to the other
+    assert moved.min() >= 0.0 and moved.max() > 0.01
 
 
 @pytest.mark.slow

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
-from contextlib import suppress
+import asyncio
+from contextlib import nullcontext, suppress
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 from hypothesis import given as drawn
 from hypothesis import strategies as st
 
+from dbvfiv.app.ask import AskPanel
 from dbvfiv.app.see import arguments_of, map_figure
 from dbvfiv.app.sheet import (
     bring,
@@ -22,6 +25,7 @@ from dbvfiv.app.sheet import (
     write_sheet,
 )
 from dbvfiv.app.worker import text_for_page
+from dbvfiv.case.quantity import GRAVITY
 from dbvfiv.case.valve import Valve
 from dbvfiv.errors import CaseError
 from dbvfiv.geometry import key_point_table
@@ -159,6 +163,20 @@ def test_pictures_begin_above_the_pressure_downstream():
     assert arguments_of(case, "Root locus over head") == ["--over", "pressure=1500:15000:10"]
 
 
+@pytest.mark.parametrize(("units", "span"), [("psi", "0.217557 psi:2.17557 psi"), ("m", "0.152957 m:1.52957 m")])
+def test_pictures_keep_the_units_of_the_project(units, span):
+    case = load_case(None, ["drive.pressure=10 kPa", f"project.units={units}"])
+    assert arguments_of(case, "Head-loss curve") == ["-p", f"{span}:10"]
+
+
+def test_heads_beside_other_densities_are_of_a_fluid_that_is_named():
+    figure, _ = map_figure(Case(), found_map("density"))
+    assert figure["layout"]["xaxis"]["title"]["text"] == "Head of fluid of 1000 kg/m³, m"
+    assert figure["data"][0]["x"] == pytest.approx([1 / GRAVITY, 2 / GRAVITY])
+    figure, _ = map_figure(Case(), found_map("pipe_length"))
+    assert figure["layout"]["xaxis"]["title"]["text"] == "Head of the fluid, m"
+
+
 PICTURE = {"growth_rate": [[-2.0, 1.0]], "certified": [[True, False]], "onset_curves": []}
 
 
@@ -200,3 +218,45 @@ def test_a_map_of_both_flow_models_is_drawn_for_that_of_the_case():
     assert "margin 4 %" in said and "margin 4 %" in [line.get("name") for line in figure["data"]]
     figure, said = map_figure(Case(), found_map("density"))
     assert figure["data"][0]["z"] == [[-2.0, None]] and "title" not in figure["layout"] and "margin" not in said
+
+
+ROWS = {"pressure": {"title": "Head", "unit": "m", "scale": 9806.65, "low": 980.665, "high": 24516.625, "own": 9806.65}}
+ROWS |= {"density": {"title": "Density", "unit": "kg/m³", "scale": 1.0, "low": 500.0, "high": 1500.0, "own": 1e3}}
+
+
+@pytest.mark.parametrize(
+    ("clicked", "asked", "told"),
+    [
+        ({"density": 700.0}, {"pressure": 9806.65, "density": 700.0}, None),
+        ({"density": 499.9999}, {"pressure": 9806.65, "density": 500.0}, None),
+        ({"density": 10.0, "pressure": 2e3}, {}, "Density reaches from 500 to 1500 kg/m³ here, so that 10 is"),
+        ({"wave_speed": 300.0}, {}, "cannot be moved here"),
+    ],
+)
+def test_a_valve_that_is_being_built_is_asked_where_a_map_was_clicked(monkeypatch, clicked, asked, told):
+    """The tab opens it first, by itself; what the sliders do not reach is told in place of an answer elsewhere."""
+    said, moved, file = [], {}, Path("case.toml")
+
+    async def day():
+        built = asyncio.Event()
+
+        async def about(_file, _do):
+            await built.wait()
+            return {"parameters": ROWS}
+
+        workers = SimpleNamespace(of=lambda *_: (SimpleNamespace(about=about), None))
+        panel = AskPanel(SimpleNamespace(file=file, tell=said.append, site=SimpleNamespace(workers=workers)))
+        panel._status, panel._card = SimpleNamespace(), nullcontext()
+        monkeypatch.setattr(AskPanel, "_draw_sliders", lambda self: None)
+        monkeypatch.setattr(AskPanel, "_answer", lambda *_: asyncio.sleep(0))
+        panel._boxes = {name: (SimpleNamespace(), SimpleNamespace()) for name in ROWS}
+        panel.open()
+        await asyncio.sleep(0)
+        panel.open(clicked)
+        built.set()
+        await asyncio.sleep(0.01)
+        panel._task.cancel()
+        moved.update(panel.values)
+
+    asyncio.run(day())
+    assert moved == asked and (not said if told is None else told in said[0])

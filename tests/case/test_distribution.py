@@ -8,7 +8,7 @@ from scipy.special import ndtri
 from dbvfiv.case.distribution import Distribution, with_full_names
 from dbvfiv.case.quantity import Quantity
 
-PLAIN, LENGTH = Quantity(""), Quantity("m", "mm")
+PLAIN, LENGTH, PERCENT = Quantity(""), Quantity("m", "mm"), Quantity("", "%")
 SHARES = np.array([0.001, 0.025, 0.3, 0.5, 0.84, 0.999])
 
 
@@ -35,6 +35,31 @@ def test_values_are_those_of_their_probability(text, own, expected):
 def test_units_are_read():
     found = Distribution.parse("normal(2 mm, 0.1 mm)", LENGTH)
     assert found.numbers == (2e-3, 1e-4) and found.words(LENGTH) == "normal(0.002 m, 0.0001 m)"
+
+
+@pytest.mark.parametrize(
+    ("text", "own", "numbers"),
+    [
+        ("uniform(10 %, 20 %)", 0.1, (0.1, 0.2)),
+        ("uniform(10 %, 20 %)", None, (0.1, 0.2)),
+        ("normal(45 %, 2 %)", 0.4, (0.45, 0.008)),
+        ("normal(45 %, 0.02)", None, (0.45, 0.02)),
+        ("normal(5 %)", 0.4, (0.4, 0.02)),
+        ("lognormal(45 %, 1.1)", 0.4, (0.45, 1.1)),
+        ("samples(40 %, 50 %)", 0.4, (0.4, 0.5)),
+    ],
+)
+def test_numbers_given_in_per_cent_are_values_where_they_are_no_spread(text, own, numbers):
+    assert Distribution.parse(text, PERCENT, own).numbers == pytest.approx(numbers, rel=1e-12)
+    with pytest.raises(ValueError, match="relative to the value of the case"):
+        Distribution.parse("normal(45 %, 2 %)", PERCENT, None)
+
+
+def test_heads_are_of_the_fluid_of_the_case():
+    pressure = Quantity("Pa", "kPa", head=True)
+    found = Distribution.parse("normal(1 m, 0.1 m)", pressure, 18e3, 800.0)
+    assert found.numbers == pytest.approx((7845.32, 784.532), rel=1e-12)
+    assert Distribution.parse("uniform(1 m, 2 m)", pressure, 18e3, 800.0).numbers == pytest.approx((7845.32, 15690.64))
 
 
 def test_samples_come_from_a_list_or_a_file(tmp_path):

@@ -22,6 +22,8 @@ def test_pressures_are_read_in_the_unit_they_were_given_in():
         "Settled at 2 m, between 1 to 2 m, 3.2 mm."
     )
     assert load_case(None, ["drive.pressure=10 psi"]).units.pressure(6894.757) == "1 psi"
+    assert load_case(None, ["drive.head=6 ft"]).project.units == "ft"
+    assert load_case(None, ["drive.head=2"]).project.units == load_case(None, ["drive.head=2 m"]).project.units == "m"
     assert load_case(None, ["drive.pressure=10 kPa"]).project.units == ""
 
 

@@ -42,6 +42,9 @@ def test_published_constants():
     assert law_from_case(case, "SBR") == published_rubber("SBR", 0.20)
     levels = case.replace(case.materials.at_levels({"SBR": 0.3}))
     assert law_from_case(levels, "SBR") == published_rubber("SBR", 0.3)
+    table = _case().replace({"materials.CR": {"kind": "shipped", "rubber": "EPDM", "constants": "published"}})
+    card = table.replace(table.materials.at_levels({"CR": 0.3})).materials.card("CR")
+    assert (card.rubber, card.constants, card.strain_level) == ("EPDM", "published", 0.3)
     with pytest.raises(CaseError, match="materials.constants.*stable.*published"):
         _case(constants="thesis")
 

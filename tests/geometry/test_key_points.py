@@ -60,6 +60,18 @@ def test_the_parametric_shape_comes_back(more, tmp_path):
     assert two.rest_area - two.wall_deduction == pytest.approx(passage, rel=1e-8)
 
 
+def test_the_command_says_which_keys_give_the_valve_back(tmp_path, command_line):
+    """Deductions of the 12-inch valve, which follow otherwise beside key points: three times its passage at rest."""
+    target, case = tmp_path / "own.csv", Case()
+    said = command_line("case", "--key-points", target, "--points", 65).out
+    keys = dict(re.findall(r'(\w+) = "([^"]+)"', said))
+    assert keys.pop("key_points") == "own.csv"
+    assert keys == {"duckbill_wall_deduction": "6.19 mm", "flange_wall_deduction": "8.19 mm"}
+    again = by_points(case, tmp_path, 65, **{f"valve.{name}": text for name, text in keys.items()})
+    one, two = (valve_mesh(c.valve, c.mesh) for c in (case, again))
+    assert two.rest_area - two.wall_deduction == pytest.approx(one.rest_area - one.wall_deduction, rel=1e-8)
+
+
 def test_a_wide_bill_by_points_and_by_parameters_is_one_valve(tmp_path):
     """Flow, opening and modes of a bill 1.86 times as wide as its pipe agree to 1e-10."""
     case = thesis_case(WIDE | {"steady.tolerance": 1e-12})

@@ -6,6 +6,7 @@ import pytest
 from dbvfiv.case import CaseError
 from dbvfiv.geometry import valve_mesh
 from dbvfiv.studies.case import Case
+from dbvfiv.studies.stability.place import redesigned
 
 SIX_INCH = {
     "valve.duckbill_length": 0.105,
@@ -84,6 +85,13 @@ def test_shape_beside_key_points_is_refused(points, key, value):
 def test_saddle_beside_key_points_is_refused(points):
     with pytest.raises(CaseError, match="valve.saddle is 'smooth' beside key_points"):
         Case().replace({"valve.key_points": points, "valve.saddle": "smooth"})
+
+
+def test_a_number_of_a_valve_of_key_points_changes_by_itself(points):
+    case = Case().replace({"valve.key_points": points})
+    valve = redesigned(case, {"valve.initial_gap": 2e-4}).valve
+    assert valve.initial_gap == 2e-4 and valve.key_points is not None
+    assert valve.flange_wall_deduction == case.valve.flange_wall_deduction
 
 
 def test_walls_of_key_points_follow_from_the_points(points):

@@ -24,12 +24,13 @@ from dbvfiv.case.units import UNITS
 from dbvfiv.errors import CaseError
 from dbvfiv.model import ValveModel
 from dbvfiv.model.material_stability import material_stability
-from dbvfiv.report import gather, write_page, write_pdf
+from dbvfiv.report import gather, parts, write_page, write_pdf
 from dbvfiv.report.answers import UNKNOWN, answers, closes, loss_range, opens, trade
 from dbvfiv.report.figures import vibration_figure
-from dbvfiv.report.gather import Gathered, Run, _Studies, following, heads_of, planned, second_mesh
+from dbvfiv.report.gather import Gathered, Run, _Studies, cycle_run, following, heads_of, planned, second_mesh
 from dbvfiv.report.page import sheet
-from dbvfiv.report.parts import heads_part, onset_part, steady_part
+from dbvfiv.report.parts import _layers, heads_part, onset_part, steady_part
+from dbvfiv.shell.section import Section, WallParts, Zones
 from dbvfiv.studies.case import load_case
 from dbvfiv.studies.onset.search import NO_ONSET
 from dbvfiv.studies.session import Session
@@ -356,6 +357,56 @@ def test_numbers_of_tables_have_units(made):
         ), title
 
 
+def test_layers_are_as_thick_as_they_are_where_they_are():
+    """A filler from 210 to 490 mm between rubbers, which fill the wall where it is not."""
+    rubber, ply = ({"material": name, "thickness": size} for name, size in (("CR", 0.006), ("fibre", 0.001)))
+    case = load_case().replace({"layers": [rubber, ply | {"begin": 0.21, "end": 0.49, "angle": 54}, rubber]})
+    wall = Section(tuple(SimpleNamespace(thickness=layer.thickness) for layer in case.layers))
+    walls = WallParts(wall, Zones.of(np.array([[1, 0, 1], [1, 1, 1], [1, 1, 1], [1, 0, 1]])))
+    mesh = SimpleNamespace(
+        thickness=np.array([0.012, 0.015, 0.019, 0.016]),
+        layer_names=("CR", "fibre", "CR"),
+        layer_angles=np.array([0.0, 54.0, 0.0]),
+        layer_fractions=wall.fractions,
+    )
+    result = SimpleNamespace(case=case, mesh=mesh, model=SimpleNamespace(shell=SimpleNamespace(at_rest=walls)))
+    rows = _layers(result, case.units).rows
+    assert [row[2] for row in rows] == ["6 to 8.769", "1.154 to 1.462", "6 to 8.769"]
+    assert [row[1] for row in rows] == ["CR", "fibre (z = 210 to 490 mm)", "CR"]
+    everywhere = case.replace({"layers": [rubber, ply, rubber]})
+    rows = _layers(SimpleNamespace(case=everywhere, mesh=mesh), case.units).rows
+    assert [row[2] for row in rows] == ["5.538 to 8.769", "0.9231 to 1.462", "5.538 to 8.769"]
+    assert [row[1] for row in rows] == ["CR", "fibre", "CR"]
+
+
+def test_figures_of_steady_states_and_of_the_closure_have_names_of_their_own(monkeypatch):
+    monkeypatch.setattr(parts, "picture", lambda name, *_, **__: SimpleNamespace(name=name))
+    case, numbers = load_case(), ("pressure", "sealed_length", "leak", "contact_force", "max_displacement")
+    state = SimpleNamespace(**dict.fromkeys(numbers, 1.0), closed=True, beyond_limit=False)
+    drawers = dict.fromkeys(("measured-passage", "measured-sections"))
+    result = SimpleNamespace(states=(state,), drawers=lambda: drawers, case=case, failures=(), remarks=lambda: ())
+    part = parts.closure_part(SimpleNamespace(get={"closure": result}.get, case=case))
+    assert [one.name for one in part.pictures] == ["closure", "closure-measured-passage", "closure-measured-sections"]
+
+
+def test_verdicts_over_the_pipe_without_a_mode_have_no_damping_ratio(monkeypatch):
+    monkeypatch.setattr(parts, "picture", lambda *_, **__: None)
+    case = load_case("cases/dbv12-in-line.toml", ["project.units=kPa"])
+    verdicts = [Verdict.not_valid("The rubber fails."), Verdict.of([-3 + 100j], 0, 0, True)]
+    sweep = SimpleNamespace(values=(5.0, 20.0), verdicts=verdicts, case=case, failures=())
+    (table,) = parts.pipe_part(SimpleNamespace(pipes={5e3: sweep}, case=case)).tables
+    assert table.rows == (("5 kPa", "not valid", "stable, 3 %"),)
+
+
+@pytest.mark.parametrize(("name", "count"), [("SS", 1), ("SA", 0)])
+def test_cycles_are_followed_from_onsets_that_open_and_close_the_lips(name, count):
+    case = load_case(None, ["drive.pressure=6 kPa"])
+    point = {"edge": True, "value": 5e3, "gains": True, "frequency": 30.0, "symmetry": name}
+    results = {"onset": SimpleNamespace(points=(point,))}
+    found = SimpleNamespace(case=case, get=results.get, modes={6e3: SimpleNamespace(stable=False)})
+    assert len([*cycle_run(found)]) == count
+
+
 def test_a_second_report_computes_nothing(made):
     found, page = made
     folder = page.parent / "runs"
@@ -455,8 +506,10 @@ def test_a_rated_pressure_that_was_not_reached_is_named(rated, answer):
     missed = "; no state was found at the rated 100 kPa" if answer == UNKNOWN else ""
     assert (told.answer, told.text) == (answer, f"Shut at 10 kPa and 60 kPa{missed}.")
     found.case = found.results["closure"].case = case.replace({"closure.rated_pressure": None})  # the largest
-    states.reverse()
-    assert (closes(found).answer, closes(found).text) == ("yes", "Shut at 60 kPa and 10 kPa.")
+    states.reverse()  # as closure.pressures has them
+    assert (closes(found).answer, closes(found).text) == ("yes", "Shut at 10 kPa and 60 kPa.")
+    states[0].closed = False
+    assert (closes(found).answer, closes(found).text) == ("no", "Shut at 10 kPa.")
 
 
 @pytest.mark.parametrize(

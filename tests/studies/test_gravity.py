@@ -20,8 +20,10 @@ from dbvfiv.model.symmetry import SYMMETRIES
 from dbvfiv.motion.periodic import PeriodicValve
 from dbvfiv.studies.case import require_consistent, thesis_case
 from dbvfiv.studies.onset import search
+from dbvfiv.studies.session import Session
 from dbvfiv.studies.stability import place
 from dbvfiv.studies.stability.place import is_surrounding, models_of, redesigned
+from dbvfiv.studies.state import State
 from tests.model.test_residual_forms import check, difference
 from tests.small_valves import SMALL, load_small, make_valve, settings
 from tests.studies.along import check_map, check_sensitivity, check_sweep, check_walk
@@ -29,6 +31,26 @@ from tests.studies.along import check_map, check_sensitivity, check_sweep, check
 DOWN, UP = {"gravity.direction": "-z"}, {"gravity.direction": "+z"}
 WET = {"outside.fluid": "same"}
 LEVEL = 1000.0 * GRAVITY * 0.56
+
+
+def test_the_operator_of_a_state_is_refused_in_a_fluid_whose_weight_moves_it(monkeypatch):
+    """As its modes are."""
+
+    def refuse(model, state):
+        raise SolveError(f"no equilibrium of the {model}")
+
+    monkeypatch.setattr("dbvfiv.studies.state.require_equilibrium", refuse)
+    pencil = SimpleNamespace(pencil=lambda point: dict(point))
+    monkeypatch.setattr("dbvfiv.studies.state.linearise", lambda *_: pencil)
+    monkeypatch.setattr(Session, "model", "other model")
+    monkeypatch.setattr(State, "solution", lambda self: None)
+    state, session = object.__new__(State), Session(thesis_case(DOWN))
+    results = SimpleNamespace(session=session, model=SimpleNamespace(case=session.case))
+    for name, value in {"results": results, "pressure": 6e3, "q": None}.items():
+        object.__setattr__(state, name, value)
+    assert state.pencil(alpha=0.0)["alpha"] == 0.0
+    with pytest.raises(SolveError, match="no equilibrium of the other model"):
+        state.pencil(density=500.0)
 
 
 @pytest.mark.slow

@@ -11,7 +11,7 @@ from pydantic.fields import FieldInfo
 
 from ...case.damping import LARGEST_LOSS
 from ...case.describe import numeric_limits, quantity_of
-from ...case.materials import BUILT_IN, RUBBERS, BuiltIn, Materials
+from ...case.materials import AUTO, BUILT_IN, RUBBERS, BuiltIn, Materials
 from ...case.parameters import OUTSIDE, PARAMETERS, PIPES, SYSTEM_NAMES, Mu
 from ...case.quantity import Quantity
 from ...case.section import Section
@@ -180,6 +180,7 @@ def redesigned(case: Case, design: Mapping[str, float]) -> Case:
         For values that the case does not allow.
     """
     changes: dict[str, object] = {}
+    keys: dict[str, float] = {}
     for name, value in design.items():
         if name == "thickness":
             changes[PARAMETERS[name].key] = case.valve.thickness_factor * value
@@ -195,7 +196,8 @@ def redesigned(case: Case, design: Mapping[str, float]) -> Case:
         elif name in PARAMETERS:
             changes[PARAMETERS[name].key] = value
         else:
-            changes |= {name: value} | _shape_beside(case, name, value)
+            keys[name] = value
+    changes |= _shape_beside(case, keys) | keys
     return case.replace(changes) if changes else case
 
 
@@ -222,16 +224,20 @@ def number_of(case: Case, name: str, key: str) -> tuple[FieldInfo, Any]:
         if isinstance(target, Valve):  # sizes before its scale, as they are written
             target = target.as_given
     if field is None or quantity_of(field) is None:
+        material = name.removeprefix("materials.").partition(".")[0]
+        more = f"; other numbers of {material} need a table [materials.{material}] with its kind"
         raise CaseError(
             f"{key} is given, and {name!r} is neither a parameter ({', '.join(PARAMETERS)}) nor a key of the case that "
-            "holds a number, such as materials.CR.stiffness_factor or valve.initial_gap.",
+            f"holds a number, such as materials.CR.stiffness_factor or valve.initial_gap"
+            f"{more if material in BUILT_IN else ''}.",
             key=key,
         )
     return field, target
 
 
 def _card(materials: Materials, name: str) -> Section:
-    return materials.card(name) if name in BUILT_IN else BuiltIn()
+    """What may change of a material without a table; rubbers whose levels are sought have one once these are found."""
+    return materials.card(name) if name in RUBBERS and materials.strain_level == AUTO else BuiltIn()
 
 
 def key_of(case: Case, name: str, key: str) -> tuple[Quantity, float]:
@@ -266,21 +272,24 @@ def limits_of(field: FieldInfo, name: str) -> tuple[float, float]:
     return (0.0, LARGEST_LOSS) if is_loss else numeric_limits(field)
 
 
-def _shape_beside(case: Case, name: str, value: float) -> dict[str, object]:
-    """Keys that keep the rest of a valve's shape where one of its numbers changes: steps of a measured wall move with
+def _shape_beside(case: Case, changed: Mapping[str, float]) -> dict[str, object]:
+    """Keys that keep the rest of a valve's shape where some of its numbers change: steps of a measured wall move with
     its parts, and what follows from wall and shape by rules that jump stays.
     """
-    part, valve = name.removeprefix("valve."), case.valve.as_given
-    if part == name:
+    sizes = {name.removeprefix("valve."): value for name, value in changed.items() if name.startswith("valve.")}
+    if not sizes:
         return {}
-    found: dict[str, object] = {f"valve.{key}": getattr(valve, key) for key in KEPT if key in valve.following}
-    if part in PARTS and valve.wall_map:
+    valve = case.valve.as_given
+    kept = [key for key in KEPT if key in valve.following and key not in sizes]
+    if valve.key_points is not None and "lip_radius" in kept:  # which the points give
+        kept.remove("lip_radius")
+    found: dict[str, object] = {f"valve.{key}": getattr(valve, key) for key in kept}
+    if valve.wall_map and not sizes.keys().isdisjoint(PARTS):
         lengths = [getattr(valve, each) for each in PARTS]
-        longer = [value if each == part else length for each, length in zip(PARTS, lengths)]
+        longer = [sizes.get(each, length) for each, length in zip(PARTS, lengths)]
         own, moved = (np.concatenate([[0.0], np.cumsum(each)]) for each in (lengths, longer))
         steps = case.to_dict()["valve"]["wall_map"]
         found["valve.wall_map"] = [step | {"to": float(np.interp(step["to"], own, moved))} for step in steps]
-    found.pop(name, None)
     return found
 
 

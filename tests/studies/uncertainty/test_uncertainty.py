@@ -3,6 +3,7 @@ run is interrupted; what cannot be used is answered by a sentence.
 """
 
 import json
+from contextlib import suppress
 from types import SimpleNamespace
 
 import numpy as np
@@ -10,6 +11,7 @@ import pytest
 
 import dbvfiv
 from dbvfiv.case.distribution import Distribution
+from dbvfiv.case.materials import BUILT_IN, RUBBERS, HalpinTsai, ShippedRubber
 from dbvfiv.errors import CaseError
 from dbvfiv.observer import Observer
 from dbvfiv.record.record import GrowingRecord
@@ -19,6 +21,7 @@ from dbvfiv.studies import workers
 from dbvfiv.studies.case import load_case
 from dbvfiv.studies.inputs import Plan, inputs_of, quasi_random
 from dbvfiv.studies.session import load_result
+from dbvfiv.studies.stability.place import number_of, plain_number
 from dbvfiv.studies.stability.verdict import OUTCOMES
 from dbvfiv.studies.uncertainty.figures import tornado
 from dbvfiv.studies.uncertainty.study import UncertaintyResult
@@ -281,6 +284,11 @@ def test_shipped_inputs_lie_where_their_numbers_can_be(keys, name, form, numbers
         assert inputs[name].form == form and inputs[name].numbers == pytest.approx(numbers, abs=0.06)
 
 
+def test_a_pressure_may_be_uncertain_as_a_head():
+    case = load_case(None, ["uncertainty.inputs.pressure=normal(1 m, 0.1 m)", "fluid.density=800"])
+    assert inputs_of(case)[0].distribution.numbers == pytest.approx((7845.32, 784.532))
+
+
 def test_a_sealing_pressure_may_be_uncertain():
     keys = {**SMALL, "uncertainty.inputs": {"sealing": "normal(5 %)"}}
     case = dbvfiv.load("cases/dbv12-moulded.toml", keys).case
@@ -312,6 +320,8 @@ MALFORMED = [
     ('inputs.tail_length = "normal(5 %)"', "no tail_length to change"),
     ('inputs."valve.wall" = "normal(5 %)"', "holds a number"),
     ('inputs."materials.CR.loss_factor" = "uniform(0.1, 3)"', "cannot be"),
+    ('inputs."materials.fibre.fibre_fraction" = "normal(5 %)"', "of fibre need a table .materials.fibre. with its"),
+    ('inputs."materials.CR.density" = "normal(5 %)"', "other numbers of CR need a table"),
     ('inputs.density = "normal(5 %)"\ninputs."fluid.density" = "normal(2 %)"', "density twice"),
     ('inputs.pressure = "normal(5 %)"\nover = "pressure=0.1 m:1 m:3"', "uncertainty.over moves"),
     ('inputs."fluid.density" = "normal(5 %)"\nover = "density=10:100:3"', "uncertainty.over moves"),
@@ -385,3 +395,34 @@ def test_samples_are_told_at_the_median_of_their_pressures(pressure, told):
     inputs = {"thickness": "lognormal(1.1)"} | ({"pressure": pressure} if pressure else {})
     keys = [f"uncertainty.inputs.{name}={text}" for name, text in inputs.items()]
     assert Plan(load_case(None, ["drive.pressure=2 kPa", *keys])).values == (pytest.approx(told),)
+
+
+@pytest.mark.parametrize("level", ["10 %", "auto"])
+def test_numbers_that_are_taken_as_inputs_can_be_set(level):
+    """Of built-in materials, before and after their strain levels are found."""
+    case = load_case(None, [f"materials.strain_level={level}"])
+    settled = case.replace(case.materials.at_levels(dict.fromkeys(RUBBERS, 0.2) if level == "auto" else {}))
+    taken = []
+    for name in BUILT_IN:
+        for field in {**HalpinTsai.model_fields, **ShippedRubber.model_fields}:
+            key = f"materials.{name}.{field}"
+            with suppress(CaseError):
+                value = number_of(case, key, "of")[1]
+                taken.append((key, plain_number(case, key, value)))
+    for key, number in taken:
+        assert settled.replace({key: 0.3 if number is None else number})
+    rubber = {"density", "strain_level"} if level == "auto" else set()
+    assert {key.rpartition(".")[2] for key, _ in taken} == {"stiffness_factor", "loss_factor"} | rubber
+
+
+def test_lengths_and_sizes_of_a_sampled_valve_move_as_those_of_a_design():
+    """Steps of the wall with the parts; sizes that follow by rules of the 12-inch valve stay."""
+    inputs = {"valve.duckbill_length": "normal(2 %)", "valve.saddle_length": "normal(2 %)"}
+    inputs |= {"valve.lip_half_width": "normal(1 %)", "materials.CR.stiffness_factor": "lognormal(1.1)"}
+    plan = Plan(load_case("cases/dbv12.toml").replace({"uncertainty.inputs": inputs}))
+    valve, sampled = plan.case.valve, plan.redescribed(np.array([0.22, 0.29, 0.126, 1.2]))
+    ends = [step.to for step in sampled.valve.wall_map]
+    assert ends == pytest.approx([0.22, 0.22 + 0.29 * 0.09 / 0.28, 0.51, 0.58])
+    assert (sampled.valve.lip_half_width, sampled.materials.named["CR"].stiffness_factor) == (0.126, 1.2)
+    for name in ("lip_radius", "duckbill_wall_deduction", "flange_wall_deduction"):
+        assert getattr(sampled.valve, name) == getattr(valve, name)
