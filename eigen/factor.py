@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import weakref
 from collections.abc import Callable, Iterable
-from functools import cache
+from functools import cache, cached_property
 from typing import Any
 
 import numpy as np
@@ -82,6 +82,17 @@ class StructureMatrices:
     def matrix(self, s: complex) -> sp.csr_matrix:
         """s^2 M + s C + K + sum phi_g(s) K_g."""
         return sp.csr_matrix((self.values(s), self.indices, self.indptr), self.shape)
+
+    def columns(self, values: np.ndarray) -> sp.csc_matrix:
+        """Entries on the common pattern as compressed columns."""
+        indptr, indices, order = self._transpose
+        return sp.csc_matrix((values[order], indices, indptr), self.shape)
+
+    @cached_property
+    def _transpose(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        places = np.arange(self.indices.size, dtype=float)
+        order = sp.csr_matrix((places, self.indices, self.indptr), self.shape).tocsc()
+        return order.indptr, order.indices, order.data.astype(np.int64)
 
 
 @cache
@@ -373,7 +384,7 @@ class Workspace:
         elif petsc_is_complex():
             factor = DirectFactor(structure.indptr, structure.indices)
         else:
-            return ScaledLU(structure.matrix(shift))
+            return ScaledLU(structure.columns(structure.values(shift)))
         factor.refactor(structure.values(shift))
         return factor
 
