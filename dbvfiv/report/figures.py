@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 import plotly.graph_objects as go
 from matplotlib.figure import Figure
-from plotly.offline import get_plotlyjs
 
 from ..drawing.style import COMPUTED, DANGER, PUBLISHED, STABLE, UNSTABLE, new_figure, parameter_label
 from ..drawing.views import ValveSkin
@@ -136,11 +135,6 @@ def closure_figure(result) -> Figure:
         if rated is not None:
             axes.axvline(rated / 1e3, color="0.2", lw=1.0, ls="--")
     return figure
-
-
-def library() -> str:
-    """The source of the drawing library."""
-    return get_plotlyjs()
 
 
 def live_valve(state: State, units: Units) -> str:

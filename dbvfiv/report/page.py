@@ -5,14 +5,16 @@ from __future__ import annotations
 import contextlib
 import shutil
 import subprocess
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from datetime import datetime
 from importlib.resources import files
 from importlib.util import find_spec
 from pathlib import Path
+from typing import Any
 
 from jinja2 import Environment, StrictUndefined
+from plotly.offline import get_plotlyjs
 
 from .. import __version__
 from ..case.parameters import OUTSIDE, PARAMETERS
@@ -20,32 +22,8 @@ from ..case.write import case_toml
 from ..errors import CaseError
 from ..studies.stability.place import fixed_conditions
 from .answers import UNKNOWN, Answer, answers, trade
-from .figures import library
 from .gather import Gathered
-from .parts import MAKERS, Part, Picture, first_pictures
-
-
-@dataclass(frozen=True)
-class First:
-    """Content of the first page.
-
-    Attributes
-    ----------
-    sheet : tuple of (str, str)
-        Project, customer, tag and the like.
-    answers : tuple of Answer
-    trade : tuple of (str, str)
-        Names and numbers that a buyer asks for.
-    open : tuple of str
-        Questions without an answer and studies that failed, each with its reason.
-    pictures : tuple of Picture
-    """
-
-    sheet: tuple[tuple[str, str], ...]
-    answers: tuple[Answer, ...]
-    trade: tuple[tuple[str, str], ...]
-    open: tuple[str, ...]
-    pictures: tuple[Picture, ...]
+from .parts import MAKERS, Part, first_pictures
 
 
 def write_page(found: Gathered, path: Path) -> Path:
@@ -56,7 +34,9 @@ def write_page(found: Gathered, path: Path) -> Path:
     CaseError
         If the file cannot be written.
     """
-    first = First(sheet(found), tuple(answers(found)), tuple(trade(found)), unanswered(found), first_pictures(found))
+    told = answers(found)
+    first = {"sheet": sheet(found), "answers": told, "trade": trade(found), "open": unanswered(found, told)}
+    first |= {"pictures": first_pictures(found)}
     parts = _told_once([part for part in (make(found) for make in MAKERS) if part is not None])
     return write_parts(path, found.name, setting(found), _in_units(found, parts), case_toml(found.case), first)
 
@@ -71,7 +51,7 @@ def _in_units(found: Gathered, parts: list[Part]) -> list[Part]:
 
 
 def write_parts(
-    path: Path, title: str, setting: str, parts: Sequence[Part], case: str = "", first: First | None = None
+    path: Path, title: str, setting: str, parts: Sequence[Part], case: str = "", first: Mapping[str, Any] | None = None
 ) -> Path:
     """Write a page of parts.
 
@@ -83,8 +63,8 @@ def write_parts(
     parts : sequence of Part
     case : str
         Text of a case file that stands at the end.
-    first : First, optional
-        The first page.
+    first : mapping, optional
+        The first page: its sheet, answers, trade and pictures, and what is open, each with its reason.
 
     Raises
     ------
@@ -93,7 +73,7 @@ def write_parts(
     """
     environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
     template = environment.from_string(files(__package__).joinpath("page.html").read_text(encoding="utf-8"))
-    pictures = [*(first.pictures if first else ()), *(picture for part in parts for picture in part.pictures)]
+    pictures = [*(first["pictures"] if first else ()), *(picture for part in parts for picture in part.pictures)]
     text = template.render(
         name=title,
         setting=setting,
@@ -101,7 +81,7 @@ def write_parts(
         parts=parts,
         figures={picture.name: number for number, picture in enumerate(pictures, start=1)},
         case=case,
-        library=library() if any(picture.live for picture in pictures) else "",
+        library=get_plotlyjs() if any(picture.live for picture in pictures) else "",
         version=__version__,
     )
     try:
@@ -120,10 +100,10 @@ def sheet(found: Gathered) -> tuple[tuple[str, str], ...]:
     return (*given, ("date", project.date or f"{datetime.now().astimezone():%Y-%m-%d}"))
 
 
-def unanswered(found: Gathered) -> tuple[str, ...]:
+def unanswered(found: Gathered, told: Sequence[Answer]) -> tuple[str, ...]:
     """Questions without an answer and studies that failed, each with its reason."""
     say = found.case.units.say
-    questions = [f"{a.question} {a.text}" for a in answers(found) if a.answer == UNKNOWN]
+    questions = [f"{a.question} {a.text}" for a in told if a.answer == UNKNOWN]
     return (*questions, *(f"The study {name} failed: {say(why)}" for name, why in found.failed.items()))
 
 

@@ -16,6 +16,7 @@ from matplotlib.figure import Figure
 from ..case.parameters import PARAMETERS
 from ..drawing.style import ACCENT, COMPUTED, headline, new_figure
 from ..errors import CaseError
+from ..texts import json_value
 from ..verdict import Series, judge_record, spectrum
 from ..verdict.reading import JudgedSignal
 from .result import StudyResult
@@ -64,8 +65,7 @@ class Candidate:
 
     def summary(self) -> dict[str, Any]:
         """Plain numbers for JSON."""
-        plain = {name: float(getattr(self, name)) for name in list(self.__dataclass_fields__)[1:]}
-        return {"name": self.name} | {name: value if np.isfinite(value) else None for name, value in plain.items()}
+        return json_value(self)
 
 
 def candidates_of(result: StudyResult, error: float) -> list[Candidate]:
