@@ -18,6 +18,7 @@ from ...case.parameters import PARAMETERS
 from ...case.write import case_toml
 from ...drawing.style import ACCENT, COMPUTED, REST, headline, new_figure, parameter_label
 from ...errors import CaseError, SolveError
+from ...model.symmetry import equilibria_of, only_class_of
 from ...record.record import GrowingRecord, Record
 from ...texts import digits
 from ..case import Case
@@ -371,6 +372,7 @@ class IdentifyResult(StudyResult):
             return {"inputs": [], "matches": [], "onset": None, "further": []} | self.ending()
         texts, pairs = self.uncertainty()
         return {
+            "symmetry": equilibria_of(self.case.part).name,
             "records": self.record.notes(_MEASURED)[-1]["records"],
             "matches": self.matches,
             "inputs": self.inputs,
@@ -392,6 +394,8 @@ class IdentifyResult(StudyResult):
         said = [f"At {describe_fixed(self.case, *(one.name for one in self.plan.inputs))}:"]
         for row in self.record.notes(_MEASURED)[-1]["records"]:
             said.append(f"  record {row['record'] + 1} {row['file']}: {row['says']}, modes measured: {row['modes']}")
+        own = only_class_of(self.case.part)
+        said.append(f"Modes are of {own}; a line of another motion is taken for one of these, or left out:")
         for match in self.matches:
             said.append(f"  {_oscillation(match)} at {match['place']} is {_modes_said(match)}")
         said += ["", f"{'input':<34}{'before (95 %)':>28}{'after (95 %)':>28}{'learned':>9}"]

@@ -31,6 +31,7 @@ from ...errors import CaseError, SolveError
 from ...flow.law import FlowMotion
 from ...model.dynamics import LinearisedState
 from ...model.state import LipCentre
+from ...model.symmetry import equilibria_of, only_class_of
 from ...record.record import GrowingRecord, Record
 from ...record.table import Column, TableSpec
 from ...texts import digits
@@ -448,7 +449,8 @@ class ResponseResult(StudyResult):
             peaks = [{k: float(v) for k, v in p.items()} for p in self.peaks(point["value"])]
             points.append(point | {"peaks": peaks, "curve": shown})
         fixed = fixed_conditions(self.case, self.parameter)
-        return {"parameter": self.parameter, "points": points, "fixed": fixed} | self.ending()
+        known = {"parameter": self.parameter, "symmetry": equilibria_of(self.case.part).name}
+        return known | {"points": points, "fixed": fixed} | self.ending()
 
     def _missed(self, lost: int) -> str:
         return f"There is no response at {lost} of the states"
@@ -465,6 +467,7 @@ class ResponseResult(StudyResult):
         ]
         if not self.points:
             return [*said, "There is no stable state."]
+        said.append(f"They are stable in {only_class_of(self.case.part)}.")
         last = self.points[-1]
         said += ["", f"Peaks at {row.text(last['value'])}, per kPa at the inlet:"]
         said.append(f"{'frequency, Hz':>14}{'damping, %':>12}{'lip, um':>12}{'flow, L/s':>12}{'flange, Pa':>12}")

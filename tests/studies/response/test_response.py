@@ -144,6 +144,7 @@ def test_the_command_tells_peaks_precursors_and_states_that_flutter(tmp_path, co
     document = json.loads(told.out)
     assert told.status == 1 and len(document["failures"]) == 1 and "is not stable" in document["failures"][0]
     first, second = document["points"]
+    assert document["symmetry"] == "SS"
     assert first["value"] == 550 and second["value"] == 1000
     assert first["lip_displacement_rms"] > second["lip_displacement_rms"]  # the onset lies at lower densities
     assert len(first["curve"]["frequency"]) == 64 and first["peaks"][0]["frequency"] > 0
