@@ -112,8 +112,9 @@ def _each_once(found: Sequence[Measured], more: Sequence[Measured], error: float
             near.frequency_error + one.frequency_error + error * one.frequency
         ):
             kept.append(one)
-        elif one.frequency_error < near.frequency_error and near in kept:
-            kept[kept.index(near)] = one
+        elif one.frequency_error < near.frequency_error:
+            at = next((i for i, other in enumerate(kept) if other is near), len(kept))
+            kept[at : at + 1] = [one]
     return kept
 
 

@@ -6,12 +6,13 @@ import numpy as np
 import pytest
 from scipy.stats import norm
 
+from dbvfiv.case.axis import parse_point
 from dbvfiv.case.distribution import Distribution
-from dbvfiv.case.quantity import Quantity
+from dbvfiv.case.quantity import GRAVITY, Quantity
 from dbvfiv.studies.identify.learning import Emulator, Learned, expected_variance, sample_posterior
 from dbvfiv.studies.identify.search import Search, _some
 from dbvfiv.studies.identify.study import IdentifyResult, distribution_text
-from dbvfiv.studies.identify.valves import follow, least_damping, onsets
+from dbvfiv.studies.identify.valves import Measured, _each_once, follow, least_damping, onsets
 
 SLOPES = np.array([[1.0, 0.8, 0.0, 0.0], [0.0, 0.3, 1.0, 0.0]])
 DATA = np.array([1.2, -0.4])
@@ -132,6 +133,11 @@ def test_flutter_at_the_last_record_ends_and_does_not_begin(ends):
     assert now == 1.0 or 4e3 < begins["median"] < 8e3
 
 
+def test_two_modes_of_a_later_column_are_two_beside_one_broad_line():
+    broad, first, second = (Measured(0, f, e) for f, e in ((20.0, 1.0), (19.5, 0.05), (20.5, 0.05)))
+    assert _each_once([broad], [first, second], 0.0) == [first, second] == _each_once([first, second], [broad], 0.0)
+
+
 @pytest.mark.parametrize(("present", "names"), [(0.01, ["onset above"]), (-0.01, ["end above"])])
 def test_a_further_measurement_is_sought_for_where_flutter_begins_or_ends(present, names):
     found, above = object.__new__(IdentifyResult), np.array([4.0, 5.0, np.nan])
@@ -140,6 +146,12 @@ def test_a_further_measurement_is_sought_for_where_flutter_begins_or_ends(presen
     vars(found).update(learned=learned, learning=learning, samples=np.zeros((3, 3)), _onsets=onsets_)
     assert list(found.further) == names
     np.testing.assert_array_equal(found.further[names[0]], above)
+
+
+def test_a_head_of_a_record_is_one_of_the_density_beside_it():
+    for text in ("pressure=1 m, density=1025", "density=1025, pressure=1 m"):
+        assert parse_point(text, 1000.0) == {"pressure": pytest.approx(1025 * GRAVITY), "density": 1025.0}
+    assert [*parse_point("pressure=1 m, density=1025", 1000.0)] == ["pressure", "density"]
 
 
 def test_modes_are_followed_by_their_shapes():
