@@ -8,7 +8,8 @@ import pytest
 
 import dbvfiv
 from dbvfiv.case.parameters import Mu
-from dbvfiv.studies.case import load_case
+from dbvfiv.errors import CaseError
+from dbvfiv.studies.case import load_case, thesis_case
 from dbvfiv.studies.response.study import OUTPUTS, Transfer
 from dbvfiv.studies.stability.walk import StabilityWalk
 from tests.small_valves import SMALL, load_small
@@ -56,6 +57,18 @@ def test_a_lip_that_stops_hold_answers_as_exactly_as_the_rest():
     (found,), (full, _) = transfer.at([33.3]), transfer.full(33.3)
     assert abs(full[0]) < 1e-4 * abs(full[1]) and transfer.error <= 1e-5
     assert found == pytest.approx(full, rel=1e-4)
+
+
+def test_a_spectrum_may_name_the_units_of_its_columns(tmp_path):
+    """Power densities in kPa2/Hz are 1e6 times as large as in Pa2/Hz."""
+    case, path, rows = thesis_case(), tmp_path / "spectrum.csv", np.array([[10.0, 4.0], [60.0, 2.0]])
+    for head, unit in (("", 1.0), ("frequency [Hz], density [Pa2/Hz]\n", 1.0), ("f [Hz];power [kPa^2/Hz]\n", 1e-6)):
+        path.write_text(head + "".join(f"{f}{';' if ';' in head else ','}{unit * p}\n" for f, p in rows))
+        found = case.replace({"response.spectrum": str(path)}).response.density()
+        assert np.array(found) == pytest.approx(rows, rel=1e-12)
+    path.write_text("frequency [Hz], density [Pa]\n10, 4\n60, 2\n")
+    with pytest.raises(CaseError, match="names the unit 'Pa', which is not a power density of a pressure"):
+        case.replace({"response.spectrum": str(path)}).response.density()
 
 
 def in_time(case, folder, time, pressure, step, duration):
