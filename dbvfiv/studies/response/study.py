@@ -28,6 +28,7 @@ from eigen.pairs import all_eigenvalues
 from ...case.parameters import PARAMETERS, PIPES, Mu
 from ...drawing.style import ACCENT, COMPUTED, headline, new_figure, parameter_label, some_of
 from ...errors import CaseError, SolveError
+from ...fit.cards import outside_band
 from ...flow.law import FlowMotion
 from ...model.dynamics import LinearisedState
 from ...model.state import LipCentre
@@ -300,15 +301,18 @@ def check(case: Case) -> None:
     left_out(case)
 
 
-def frequencies(case: Case) -> np.ndarray:
-    """Frequencies, Hz, that the response is made for: those of the curves, and some below them."""
+def frequencies(case: Case, resolved: float = np.inf) -> np.ndarray:
+    """Frequencies, Hz, that the response is made for: those of the curves, and some below them; up to where waves are
+    resolved.
+    """
     # down to a little above zero: a long line lets slow pulsation through that it keeps from faster one
-    step = case.response.max_frequency / case.response.count
+    step = min(case.response.max_frequency, resolved) / case.response.count
     return np.append(step * SLOW, step * np.arange(1, case.response.count + 1))
 
 
-def left_out(case: Case) -> list[str]:
-    """Sentences on the power of response.spectrum beyond the frequencies that the response is made for.
+def left_out(case: Case, resolved: float = np.inf) -> list[str]:
+    """Sentences on the power of response.spectrum beyond the frequencies that the response is made for, up to where
+    waves are resolved.
 
     Raises
     ------
@@ -316,7 +320,7 @@ def left_out(case: Case) -> list[str]:
         Without any power within them.
     """
     frequency, power = np.transpose(case.response.density())
-    (low, most), whole = frequencies(case)[[0, -1]], trapezoid(power, frequency)
+    (low, most), whole = frequencies(case, resolved)[[0, -1]], trapezoid(power, frequency)
 
     def up_to(limit: float) -> float:
         within = np.append(frequency[frequency < limit], min(limit, frequency[-1]))
@@ -366,6 +370,22 @@ def run(session: Session, record: GrowingRecord) -> None:
         except (CaseError, SolveError, ArithmeticError) as error:
             record.fail(f"At {PARAMETERS[asked.parameter].text(value)}: {error}")
         record.item(value)
+    for sentence in filter(None, (ended_early(record, case), outside_band(case, record.column(PEAKS, "frequency")))):
+        record.warn(sentence)
+
+
+def ended_early(record: Record, case: Case) -> str | None:
+    """Sentence on curves that end where waves are no longer resolved; None where all go to response.max_frequency."""
+    values, frequency = (record.column(CURVE, name) for name in ("value", "frequency"))
+    most = case.response.max_frequency
+    least = min((frequency[values == value].max() for value in np.unique(values)), default=most)
+    if least >= most * (1.0 - 1e-9):
+        return None
+    return (
+        "The elements of the line, or the rows of the mesh in a fluid that is compressed, resolve waves up to "
+        f"{digits(least, 4)} Hz, so curves, peaks and root mean squares end there, below response.max_frequency = "
+        f"{digits(most, 4)} Hz; more upstream.elements or mesh.along reach further."
+    )
 
 
 def _respond(walk: StabilityWalk, place: Mu, value: float, rows, record: GrowingRecord) -> None:
@@ -374,7 +394,10 @@ def _respond(walk: StabilityWalk, place: Mu, value: float, rows, record: Growing
     if not verdict.stable:
         state = "is not stable" if verdict.stable is False else "is not known to be stable"
         raise SolveError(f"the state {state}, so that motions about it do not stay small. {verdict.reason}")
-    transfer = Transfer(walk.family(place).linear, place, frequencies(walk.case))
+    linear = walk.family(place).linear
+    resolved = linear.resolved(place)
+    left_out(walk.case, resolved)  # a spectrum without power below
+    transfer = Transfer(linear, place, frequencies(walk.case, resolved))
     even = transfer.frequencies[len(SLOW) :]
     curve = transfer.at(even)
     columns: dict[str, Any] = {"value": np.full(len(curve), value), "frequency": even}

@@ -5,11 +5,13 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from scipy.integrate import trapezoid
 
 import dbvfiv
 from dbvfiv.case.parameters import Mu
 from dbvfiv.errors import CaseError
 from dbvfiv.studies.case import load_case, thesis_case
+from dbvfiv.studies.response import study
 from dbvfiv.studies.response.study import OUTPUTS, Transfer
 from dbvfiv.studies.stability.walk import StabilityWalk
 from tests.small_valves import SMALL, load_small
@@ -57,6 +59,45 @@ def test_a_lip_that_stops_hold_answers_as_exactly_as_the_rest():
     (found,), (full, _) = transfer.at([33.3]), transfer.full(33.3)
     assert abs(full[0]) < 1e-4 * abs(full[1]) and transfer.error <= 1e-5
     assert found == pytest.approx(full, rel=1e-4)
+
+
+class Oscillators(Transfer):
+    """Two modes of closed form, of 5 and 20 Hz."""
+
+    size, error = 2, 0.0
+
+    def __init__(self, _linear, _mu, frequencies):
+        self.frequencies, self.reduced = frequencies, None
+
+    def at(self, frequencies):
+        turns = 2 * np.pi * np.asarray(frequencies)
+        found = sum(1.0 / (abs(v) ** 2 - turns**2 - 2j * v.real * turns) for v in EIGENVALUES)
+        return np.repeat(found[:, None], len(OUTPUTS), axis=1)
+
+
+EIGENVALUES = 2 * np.pi * np.array([5.0, 20.0]) * complex(-0.02, 1.0)
+
+
+@pytest.mark.parametrize(("resolved", "most", "modes"), [(8.0, 8.0, [5.0]), (np.inf, 60.0, [5.0, 20.0])])
+def test_a_response_ends_where_waves_are_no_longer_resolved(monkeypatch, resolved, most, modes):
+    stable = SimpleNamespace(stable=True, growth_rate=-1.0, frequency=5.0)
+    linear = SimpleNamespace(resolved=lambda _place: resolved)
+    keys = {"response.max_frequency": 60.0, "response.count": 240, "damping.band": ["10 Hz", "50 Hz"], **LOSS}
+    valve = load_small(keys)
+    walk = SimpleNamespace(case=valve.case, verdict=lambda _: stable, family=lambda _: SimpleNamespace(linear=linear))
+    monkeypatch.setattr(study, "StabilityWalk", lambda *_: walk)
+    monkeypatch.setattr(study, "Transfer", Oscillators)
+    monkeypatch.setattr(study, "all_eigenvalues", lambda _reduced: EIGENVALUES)
+    found = valve.response()
+    (point,) = found.points
+    assert found.curve(point["value"])["frequency"][-1] == pytest.approx(most)
+    assert [peak["frequency"] for peak in found.peaks(point["value"])] == pytest.approx(modes)
+    ended = [text for text in found.warnings if "resolve waves up to 8 Hz, so curves, peaks and root mean" in text]
+    assert len(ended) == (resolved == 8.0)
+    assert any(text.startswith("5 Hz lies outside damping.band") for text in found.warnings)
+    fine = np.linspace(0.0, most, 200_001)
+    power = np.abs(Oscillators.at(None, fine)[:, 0]) ** 2 * 100.0**2 / 60.0
+    assert point["lip_displacement_rms"] == pytest.approx(np.sqrt(trapezoid(power, fine)), rel=1e-3)
 
 
 def test_a_spectrum_may_name_the_units_of_its_columns(tmp_path):
