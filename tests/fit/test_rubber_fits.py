@@ -249,6 +249,22 @@ def test_a_workbook_is_read_like_its_table(tmp_path, monkeypatch):
         read_curves(path)
 
 
+def test_a_cell_of_a_workbook_that_shows_a_per_cent_is_one(tmp_path):
+    """It holds a fraction, which the unit of the column must not divide by 100 once more."""
+    from openpyxl import Workbook
+
+    book, path = Workbook(), tmp_path / "tension.xlsx"
+    for row in (("engineering_strain [%]", "nominal_stress [MPa]"), (0.05, 1.0), (10.0, 2.0), (15.0, 3.0)):
+        book.active.append(row)
+    book.active["A2"].number_format, book.active["A4"].number_format = "0.0%", '0" %"'
+    book.save(path)
+    assert read_curves(path)[0].strain == pytest.approx([0.05, 0.1, 0.15], rel=1e-14)
+    book.active["B3"].number_format = "0%"
+    book.save(path)
+    with pytest.raises(MaterialError, match="line 3: column nominal_stress must hold a finite number, but '200%' was"):
+        read_curves(path)
+
+
 def test_bad_questions_are_refused(tmp_path, treloar):
     with pytest.raises(MaterialError, match="neo-hookean, softening, mooney-rivlin, yeoh, ogden, but 'gent'"):
         form_of("gent")
