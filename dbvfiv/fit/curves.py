@@ -298,7 +298,8 @@ class CycleReport:
     set_strain : float
         Strain at which its loading begins to carry stress; 0 where it does so from the first row.
     lost, loss_factor : float
-        Work lost in the loop over the volume, J/m3, and tan delta; NaN without a way back.
+        Work lost in the loop over the volume, J/m3, that of both directions of a biaxial test, and tan delta; NaN
+        without a way back.
     """
 
     mode: str
@@ -426,4 +427,5 @@ def _described(curve: TensionTest) -> CycleReport:
     except MaterialError as error:
         raise MaterialError(f"Cycle {curve.cycle} of the {curve.mode} test: {error}") from None
     residual = _set_of(strain[: top + 1], stress[: top + 1])[0]
+    lost *= 2.0 if curve.mode == "biaxial" else 1.0
     return CycleReport(curve.mode, curve.cycle, float(strain[top]), float(stress[top]), residual, lost, factor)
