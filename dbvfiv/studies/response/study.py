@@ -30,7 +30,7 @@ from ...drawing.style import ACCENT, COMPUTED, headline, new_figure, parameter_l
 from ...errors import CaseError, SolveError
 from ...fit.cards import outside_band
 from ...flow.law import FlowMotion
-from ...model.dynamics import LinearisedState
+from ...model.dynamics import LinearisedState, still_channel
 from ...model.state import LipCentre
 from ...model.symmetry import equilibria_of, only_class_of
 from ...record.record import GrowingRecord, Record
@@ -141,15 +141,36 @@ class Transfer:
         rows = jax.jacrev(leaving, argnums=(0, 1, 2))(area, jnp.zeros_like(area), inner)
         self._by_area, self._by_rate = (copies * np.pad(np.asarray(row), (0, m - len(area))) for row in rows[:2])
         self._by_inner, self._copies, self._flange = copies * np.asarray(rows[2]), copies, len(area) - 1
+        self._tail = self._behind(area, inner, given)
         lip = LipCentre(linear.model.mesh, linear.model.shell)
         self._lip = np.array([lip.displacement(row) for row in np.eye(self.pencil.n)])
         self.force = self.pencil.G @ self.pressure
+
+    def _behind(self, area, inner, given) -> list[np.ndarray]:
+        """Derivatives (2, ...) of the pressure around the jet over that at the far end of a pipe behind the valve, by
+        areas, their rates and inner unknowns: of its head, Pa, and of its momentum, Pa s. Nothing without one.
+        """
+        tail, flow, m = self.linear.model.tail, self.linear.model.flow, self.pencil.m
+        if tail is None:
+            return []
+        channel = still_channel(flow)
+
+        def lifted(area, rate, inner):
+            stream = channel.stream(area, rate, flow.speeds_of(area, rate, inner, given), inner)
+            return given["density"] * jnp.array([tail.head(stream, given), tail.momentum(stream, given)])
+
+        rows = jax.jacrev(lifted, argnums=(0, 1, 2))(area, jnp.zeros_like(area), inner)
+        by_area, by_rate = (np.pad(np.asarray(row), ((0, 0), (0, m - len(area)))) for row in rows[:2])
+        return [by_area, by_rate, np.asarray(rows[2])]
 
     def _outputs(self, s: complex, lip, motion, inner) -> np.ndarray:
         """Outputs (4, ...) from the displacement of the lip, areas (m, ...) and inner unknowns (b, ...)."""
         A, B, _, _ = self.pencil.fluid_at(s)
         flow = (self._by_area + s * self._by_rate) @ motion + self._by_inner @ inner
         pressure = A[self._flange] @ motion + B[self._flange] @ inner + self.pressure[self._flange]
+        if self._tail:  # stations have the pressure over that around the jet, a gauge that over the surroundings
+            by_area, by_rate, by_inner = self._tail
+            pressure = pressure + np.array([1.0, s]) @ ((by_area + s * by_rate) @ motion + by_inner @ inner)
         return np.array([lip, self._copies * motion[0], flow, pressure])
 
     def full(self, frequency: float) -> tuple[np.ndarray, np.ndarray]:

@@ -9,11 +9,15 @@ from scipy.integrate import trapezoid
 
 import dbvfiv
 from dbvfiv.case.parameters import Mu
+from dbvfiv.case.part import QUARTER
 from dbvfiv.errors import CaseError
+from dbvfiv.flow.channel import Channel
+from dbvfiv.flow.terms.tail import Tail
 from dbvfiv.studies.case import load_case, thesis_case
 from dbvfiv.studies.response import study
 from dbvfiv.studies.response.study import OUTPUTS, Transfer
 from dbvfiv.studies.stability.walk import StabilityWalk
+from eigen.operator import CoupledPencil
 from tests.small_valves import SMALL, load_small
 
 RAYLEIGH = {"damping.alpha": 5.0, "damping.beta": 0.001}
@@ -59,6 +63,25 @@ def test_a_lip_that_stops_hold_answers_as_exactly_as_the_rest():
     (found,), (full, _) = transfer.at([33.3]), transfer.full(33.3)
     assert abs(full[0]) < 1e-4 * abs(full[1]) and transfer.error <= 1e-5
     assert found == pytest.approx(full, rel=1e-4)
+
+
+def test_the_pressure_at_a_flange_without_a_line_is_that_which_drives(monkeypatch):
+    """However the wall moves, with a pipe behind the valve too, whose fluid moves the pressure around the jet."""
+    z, area = np.linspace(0.0, 0.56, 6), np.linspace(2e-3, 18e-3, 6)
+    flow = Channel(z, 1e-5, 1.0, terms=[Tail(0.33, 10.0, 1.5)])
+    monkeypatch.setattr(study, "LipCentre", lambda *_: None)
+    transfer, empty = object.__new__(Transfer), np.zeros((0, 6))
+    parts = flow.linearise_still(area, {"inlet": 6e3, "density": 1000.0}).parts()
+    transfer.pencil = CoupledPencil(*np.zeros((3, 0, 0)), empty, empty.T, **parts)
+    model = SimpleNamespace(flow=flow, tail=flow.terms[0], mesh=SimpleNamespace(part=QUARTER), shell=None)
+    transfer.linear = SimpleNamespace(model=model, inlet=6e3, area=area)
+    transfer._drive(flow, Mu(density=1000.0, storage=1.0))
+    random = np.random.default_rng(9)
+    for s in (0.0, 2j * np.pi * 3.0, 2j * np.pi * 20.0):
+        motion = 1e-6 * (random.standard_normal(6) + 1j * random.standard_normal(6))
+        _, _, R, S = transfer.pencil.fluid_at(s)
+        inner = np.linalg.solve(S, -transfer.balance - R @ motion)
+        assert transfer._outputs(s, 0.0, motion, inner)[3] == pytest.approx(1.0, rel=1e-9)
 
 
 class Oscillators(Transfer):
@@ -170,12 +193,26 @@ def test_the_reduced_operator_is_the_full_one():
         assert np.abs(transfer.at([frequency])[0] / full - 1).max() < 1e-5
 
 
+PIPES = {
+    "upstream.length": 5.0,
+    "upstream.diameter": "300 mm",
+    "upstream.loss": 1.5,
+    "downstream.pipe_diameter": "330 mm",
+    "downstream.length": 5.0,
+    "downstream.loss": 1.5,
+}
+
+
 @pytest.mark.slow
-def test_the_static_response_is_the_slope_of_the_steady_states():
-    case = load_small(STATES["storage-rayleigh"], {"fluid.density": 1000.0}).case
+@pytest.mark.parametrize("pipes", [{}, PIPES])
+def test_the_static_response_is_the_slope_of_the_steady_states(pipes):
+    case = load_small(STATES["storage-rayleigh"], {"fluid.density": 1000.0}, pipes).case
     low, high = (dbvfiv.load(case).steady(pressure=pressure) for pressure in (5990.0, 6010.0))
-    slopes = [(getattr(high, n) - getattr(low, n)) / 20 for n in ("lip_displacement", "volume_flow")]
-    assert transfer_of(case, FREQUENCIES[12:44]).full(0.0)[0][[0, 2]] == pytest.approx(slopes, rel=2e-3)
+    names = "lip_displacement", "volume_flow", "flange_pressure"
+    slopes = [(getattr(high, n) - getattr(low, n)) / 20 for n in names]
+    place = Mu.of(case)
+    transfer = Transfer(StabilityWalk(case).family(place).linear, place, FREQUENCIES[12:44])
+    assert transfer.full(0.0)[0][[0, 2, 3]] == pytest.approx(slopes, rel=2e-3)
 
 
 def test_variance_and_correlation_time_of_one_mode_are_those_of_its_formula(monkeypatch):
