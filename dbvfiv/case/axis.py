@@ -117,7 +117,7 @@ def _value(row: Parameter, text: str, density: float | None) -> float:
 
 def parse_point(text: str, density: float | None = None) -> dict[str, float]:
     """Read ``PARAMETER=VALUE, ...``, SI values by name; a pressure may be a head of a fluid of the density, kg/m3, that
-    is given, or that stands in front of it.
+    is given, or that stands beside it.
 
     Raises
     ------
@@ -125,8 +125,8 @@ def parse_point(text: str, density: float | None = None) -> dict[str, float]:
         With a clause that completes "key is given as X, ...".
     """
     found: dict[str, float] = {}
-    for part in filter(None, (part.strip() for part in text.split(","))):
-        name, equals, given = (piece.strip() for piece in part.partition("="))
+    parts = [[piece.strip() for piece in part.partition("=")] for part in filter(str.strip, text.split(","))]
+    for name, equals, given in sorted(parts, key=lambda part: part[0] != "density"):
         if name not in PLACES or not equals:
             raise ValueError("which is not of that form")
         row = PARAMETERS[name]
@@ -134,7 +134,7 @@ def parse_point(text: str, density: float | None = None) -> dict[str, float]:
         if not row.low <= value <= row.high:
             raise ValueError(f"whose {name} is not within {row.low:g} to {row.high:g} {row.quantity.si}".rstrip())
         found[name] = value
-    return found
+    return {name: found[name] for name, *_ in parts}
 
 
 def parse_stability_axis(text: str, density: float | None = None) -> Axis:

@@ -82,11 +82,17 @@ class Softening(Relaxing):
 
     kind: Literal["softening"] = key(..., "Incompressible rubber with a knee at small strain.")
     mu_inf: Modulus = key(0.0, "Shear modulus beyond the knee; from mu_0/200 on every state is stable.", ge=0, le=1e12)
-    mu_0: Modulus = key(..., "What the shear modulus at small strain exceeds mu_inf by.", gt=0, le=1e12)
+    mu_0: Modulus = key(..., "What the shear modulus at small strain exceeds mu_inf by.", ge=0, le=1e12)
     x_0: Number = key(..., "I1 - 3 at the knee, about 3 times the square of its strain in tension.", gt=0, le=1e6)
     c: Modulus = key(0.0, "Stiffening at large strains.", ge=0, le=1e12)
     c_3: Modulus = key(0.0, "Stiffening at larger ones, with the square of x.", ge=0, le=1e13)
     density: Density = _density(...)
+
+    @model_validator(mode="after")
+    def _stiff_at_rest(self) -> Softening:
+        if not self.mu_inf + self.mu_0 > 0:
+            raise BrokenRule("mu_0", "0 Pa beside mu_inf = 0 Pa", "mu_inf + mu_0 must be greater than 0")
+        return self
 
 
 class Ogden(Relaxing):

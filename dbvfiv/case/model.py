@@ -285,6 +285,10 @@ class Case(Section):
         """Hydrostatic pressure, Pa, of the fluid up to an outlet above the inlet; negative for an outlet below it."""
         return self.fluid.density * self.gravity.along * self.valve.length if self.drive.kind == "flow" else 0.0
 
+    def outside_level(self, height: Any) -> Any:
+        """Pressure, Pa, of the fluid outside at rest at heights, m, over the lips along the axis, over that there."""
+        return self.outside.density(self.fluid.density) * (self.gravity.along * height)
+
     @property
     def has_waves(self) -> bool:
         """True where the upstream pipe is elastic and carries pressure waves."""

@@ -49,6 +49,7 @@ DIMENSION = {
     "deg": "angle",
     "Pa s": "viscosity",
     "J/m^2": "energy per area",
+    "Pa^2/Hz": "power density of a pressure",
     "": "plain number",
 }
 A_DIMENSION = {si: f"{'an' if name[0] in 'aeiou' else 'a'} {name}" for si, name in DIMENSION.items()}
@@ -71,7 +72,7 @@ def _factor(unit_text: str, si: str) -> float | None:
     try:
         registry = _registry()
         text = ("1" if unit_text.startswith("/") else "") + unit_text.replace("%", "percent")
-        text = re.sub(r"\b([cdm]?m|ft|in)([23])\b", r"\1^\2", text)
+        text = re.sub(r"\b([cdm]?m|ft|in|[hkM]?Pa|m?bar|psi)([23])\b", r"\1^\2", text)
         source = registry.Quantity(1.0, registry.parse_units(text))
         target = "degree" if si == "deg" else (si or "dimensionless")
         if si == "Hz" and "radian" in str(source.to_root_units().units):

@@ -132,6 +132,7 @@ def ply(
     document = {
         "ply": _ply_values(found.ply),
         "measured": found.measured,
+        "missed": found.missed,
         "constituents": vars(found.constituents),
         "residuals": {t.direction: t.residuals for t in found.tests},
         "at": [{"fibre_fraction": f} | _ply_values(made) for f, made in plies.items()],
@@ -194,6 +195,7 @@ def _ply_lines(fit: PlyFit, plies: dict[float, OrthotropicPly]) -> list[str]:
         f"Halpin-Tsai backwards at {c.fibre_fraction:.3g} of fibre: fibre {c.fibre_modulus / 1e6:.5g} MPa, matrix "
         f"{c.matrix_modulus / 1e6:.5g} MPa, Poisson ratios {c.fibre_poisson:.3g} and {c.matrix_poisson:.3g}."
     )
+    rows += [fit.missed] if fit.missed else []
     rows += [f"With {f:.3g} of fibre: {_ply_text(ply)}." for f, ply in plies.items()]
     return rows
 

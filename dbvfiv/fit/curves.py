@@ -22,6 +22,7 @@ import re
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 from zipfile import BadZipFile
 
 import numpy as np
@@ -163,7 +164,9 @@ def _table(path: Path, known: dict[str, dict[str, float]]) -> tuple[list[str], I
     def read():
         for line, row in rows:
             place = f"Tension test {path}, line {line}"
-            values = {name: _number(place, name, _cell(row, index)) * unit for name, (index, unit) in columns.items()}
+            values = {}
+            for name, (index, unit) in columns.items():
+                values[name] = _in_si(place, name, _cell(row, index), unit, known[name])
             if "stretch" in values:
                 values["engineering_strain"] = values.pop("stretch") - 1.0
             yield place, row, values
@@ -187,6 +190,13 @@ def _number(place: str, name: str, cell: str) -> float:
     if not math.isfinite(number):
         raise MaterialError(f"{place}: column {name} must hold a finite number, but {cell!r} was found.")
     return number
+
+
+def _in_si(place: str, name: str, cell: str, unit: float, units: dict[str, float]) -> float:
+    """SI value of a cell under a title with a unit; a cell of a ratio may have a per cent sign of its own."""
+    if cell.endswith("%") and units.get("-") == 1.0:
+        return 0.01 * _number(place, name, cell[:-1].strip())
+    return unit * _number(place, name, cell)
 
 
 def _mode(place: str, cell: str) -> str:
@@ -228,12 +238,21 @@ def _rows(path: Path) -> list[tuple[int, list[str]]]:
 
 
 def _sheet(path: Path) -> str:
-    """First sheet of a workbook as lines with tabs; cells that hold a formula count with their last value."""
+    """First sheet of a workbook as lines with tabs; cells that hold a formula count with their last value, and those
+    shown as a per cent have its sign.
+    """
     from openpyxl import load_workbook  # optional
 
-    book = load_workbook(path, data_only=True)
-    cells = ((" ".join(str("" if v is None else v).split()) for v in row) for row in book.worksheets[0].values)
-    return "\n".join("\t".join(row) for row in cells)
+    rows = load_workbook(path, data_only=True).worksheets[0].iter_rows()
+    return "\n".join("\t".join(" ".join(_shown(cell).split()) for cell in row) for row in rows)
+
+
+def _shown(cell: Any) -> str:
+    """Text of a cell of a workbook."""
+    value, plain = cell.value, re.sub(r'"[^"]*"|\\.', "", cell.number_format or "")  # a sign in quotes is a mere text
+    if isinstance(value, (int, float)) and not isinstance(value, bool) and "%" in plain:
+        return f"{100.0 * value:.15g}%"
+    return "" if value is None else str(value)
 
 
 def _columns(
@@ -279,7 +298,8 @@ class CycleReport:
     set_strain : float
         Strain at which its loading begins to carry stress; 0 where it does so from the first row.
     lost, loss_factor : float
-        Work lost in the loop over the volume, J/m3, and tan delta; NaN without a way back.
+        Work lost in the loop over the volume, J/m3, that of both directions of a biaxial test, and tan delta; NaN
+        without a way back.
     """
 
     mode: str
@@ -407,4 +427,5 @@ def _described(curve: TensionTest) -> CycleReport:
     except MaterialError as error:
         raise MaterialError(f"Cycle {curve.cycle} of the {curve.mode} test: {error}") from None
     residual = _set_of(strain[: top + 1], stress[: top + 1])[0]
+    lost *= 2.0 if curve.mode == "biaxial" else 1.0
     return CycleReport(curve.mode, curve.cycle, float(strain[top]), float(stress[top]), residual, lost, factor)

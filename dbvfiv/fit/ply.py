@@ -22,6 +22,9 @@ from dbvfiv.fit.curves import STRAIN_UNITS, TensionTest, read_columns
 from dbvfiv.materials.laws import MaterialError, OrthotropicPly, halpin_tsai, ply_from_constituents, require_positive
 
 _SOFTEST, _STIFFEST = 1e-3, 0.5
+#: Poisson ratios of fibre and matrix where none is measured, and those of the matrix next to one that no matrix gives,
+#: as cases take them.
+_USUAL, _ENDS = (0.21, 0.35), (1e-3, 0.499)
 
 
 @dataclass(frozen=True)
@@ -106,7 +109,7 @@ def constituents_of(
     fibre_fraction: float = 0.45,
     xi: float = 120000.0,
     nu12: float | None = None,
-    poisson: tuple[float, float] = (0.21, 0.35),
+    poisson: tuple[float, float] = _USUAL,
 ) -> Constituents:
     """Halpin-Tsai backwards: fibre and matrix from the moduli of the ply.
 
@@ -171,12 +174,15 @@ def _matrix_poisson(nu12: float, fibre_poisson: float, fraction: float) -> float
 
 @dataclass(frozen=True)
 class PlyFit:
-    """A ply from its tests: constants measured, or else from the constituents by Halpin-Tsai backwards."""
+    """A ply from its tests: constants measured, or else from the constituents by Halpin-Tsai backwards; `missed` is a
+    sentence on a measured Poisson ratio that no constituents give.
+    """
 
     tests: tuple[StripTest, ...]
     constituents: Constituents
     ply: OrthotropicPly
     measured: tuple[str, ...]
+    missed: str = ""
 
 
 def fit_ply(
@@ -194,7 +200,8 @@ def fit_ply(
         if direction not in by:
             raise MaterialError(f"A ply needs tests along warp and weft, but {direction} is missing.")
     e1, e2, nu12 = by["warp"].modulus, by["weft"].modulus, by["warp"].poisson
-    constituents = constituents_of(e1, e2, fibre_fraction, xi, nu12)
+    near, missed = _nearest_poisson(nu12, fibre_fraction)
+    constituents = constituents_of(e1, e2, fibre_fraction, xi, near)
     made = constituents.ply(density)
     values = {name: getattr(made, name) for name in ("nu12", "g12", "g13", "g23")} | {"e1": e1, "e2": e2}
     measured = ["e1", "e2"]
@@ -204,7 +211,21 @@ def fit_ply(
     if "bias" in by:
         values["g12"] = _shear_modulus(by["bias"].modulus, e1, e2, values["nu12"])
         measured.append("g12")
-    return PlyFit(tests, constituents, OrthotropicPly(**values, density=density), tuple(measured))
+    return PlyFit(tests, constituents, OrthotropicPly(**values, density=density), tuple(measured), missed)
+
+
+def _nearest_poisson(nu12: float | None, fraction: float) -> tuple[float | None, str]:
+    """Poisson ratio of a ply, or the nearest one that a matrix gives beside the usual fibre, and a sentence on that."""
+    if nu12 is None or not 0.0 < fraction < 1.0:
+        return nu12, ""
+    low, high = (halpin_tsai(_USUAL[0], end, fraction, 2.0) for end in _ENDS)
+    near = float(np.clip(nu12, low, high))
+    if near == nu12:
+        return nu12, ""
+    return near, (
+        f"No matrix gives a ply the Poisson ratio {nu12:.4g} with {_USUAL[0]:g} of the fibre and a fraction of "
+        f"{fraction:g}; what is not measured is that of the nearest, {near:.4g}."
+    )
 
 
 def _shear_modulus(bias: float, e1: float, e2: float, nu12: float) -> float:

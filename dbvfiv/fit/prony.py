@@ -88,9 +88,10 @@ def fit_moduli(frequency, storage, loss, times) -> PronyFit:
     branch, even = branch_moduli(frequency, times), even_weights(frequency)
     above = np.hstack([np.ones((len(frequency), 1)), branch.real]) * (even / storage)[:, None]
     below = np.hstack([np.zeros((len(frequency), 1)), branch.imag]) * (even / loss)[:, None]
-    found = nonnegative(np.vstack([above, below]), np.concatenate([even, even]))
+    matrix, weight = np.vstack([above, below]), np.concatenate([even, even])
+    found = nonnegative(matrix, weight)
     prony = Prony(_over_slow(found, "storage modulus"), times)
-    return PronyFit(prony, "moduli", prony.loss_factor(frequency) * storage / loss - 1.0)
+    return PronyFit(prony, "moduli", matrix @ found / weight - 1.0)
 
 
 def fit_relaxation(time, modulus, times) -> PronyFit:

@@ -69,7 +69,7 @@ class FitReport:
             )
         for mode in dict.fromkeys(c.mode for c in self.cycles):
             peaks = [c.peak_stress for c in self.cycles if c.mode == mode]
-            if len(peaks) > 1:
+            if len(peaks) > 1 and peaks[-2] > 0.0:
                 change = abs(peaks[-1] / peaks[-2] - 1)
                 done = "stabilised" if change <= STABILISED else "not stabilised yet"
                 rows.append(f"The largest {mode} stress changes by {change:.1%} in the last cycle: {done}.")

@@ -194,7 +194,7 @@ class PronyFit:
     quantity : str
         What was fitted: "tan delta", "moduli" or "relaxing modulus".
     error : numpy.ndarray, shape (n,)
-        Fitted over wanted, less one: of tan delta, or of the relaxing modulus.
+        Fitted over wanted, less one: of tan delta, of storage and then loss modulus, or of the relaxing modulus.
     """
 
     prony: Prony

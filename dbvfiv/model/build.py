@@ -114,9 +114,9 @@ def _levels(case: Case, mesh: ValveMesh) -> dict[str, np.ndarray]:
     """Pressures of the fluids' levels, Pa, over those at the lips, as `Channel` takes them; none without gravity."""
     if not case.gravity.is_there:
         return {}
-    inside = case.fluid.density
-    depth = case.gravity.along * (mesh.z - mesh.z[0])
-    return {"levels": inside * depth, "levels_outside": case.outside.density(inside) * depth}
+    height = mesh.z - mesh.z[0]
+    inside = case.fluid.density * (case.gravity.along * height)
+    return {"levels": inside, "levels_outside": case.outside_level(height)}
 
 
 def build_flow(case: Case, mesh: ValveMesh) -> FlowLaw:

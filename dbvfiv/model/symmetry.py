@@ -106,6 +106,12 @@ def equilibria_of(part: Part) -> Symmetry:
     return next(iter(symmetries_of(part).values()))
 
 
+def only_class_of(part: Part) -> str:
+    """Words of the class that studies without a choice of classes look at."""
+    own = equilibria_of(part)
+    return f"class {own.name} alone ({own.words})"
+
+
 def symmetry_named(name: str) -> Symmetry:
     """The class of a name."""
     return _CLASSES[name]

@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from ..materials.shipped import shipped_loss, shipped_loss_names
+from ..model.symmetry import only_class_of
 from ..studies.closure.safety import BUCKLING, CROSSING, END, OWN, SEAL, FirstBuckling, buckles_first, rated_verdict
 from ..studies.onset.search import NO_ONSET
 from ..studies.stability.verdict import DIVERGES, FLUTTERS, Verdict
@@ -271,7 +272,7 @@ def _chance(found: Gathered) -> str | None:
     most = max(known, key=lambda point: point["probability"])
     chance, low, high = (digits(100 * x, 2) for x in (most["probability"], *most["interval"]))
     at = found.case.units.parameter(result.parameter).text(most["value"])
-    return f"probability of chatter at {at}: {chance} % ({low} to {high} %)"
+    return f"probability of chatter at {at}: {chance} % ({low} to {high} %), {only_class_of(found.case.part)}"
 
 
 def loss_range(case) -> tuple[float, float] | None:

@@ -20,7 +20,7 @@ from ..effects import explained, without_numbers
 from ..errors import CaseError
 from ..fit.cards import describe_damping, law_from_case
 from ..materials.stability import StableRange, stable_range
-from ..model.symmetry import symmetry_named
+from ..model.symmetry import only_class_of, symmetry_named
 from ..studies.result import StudyResult
 from ..texts import digits, listed
 from .answers import lacking, loss_range
@@ -324,7 +324,8 @@ def chance_part(found: Gathered) -> Part | None:
         "margin": "Least damping ratio of the samples.",
         "tornado": "Least damping ratio with each input low and high.",
     }
-    said = (*result.deciding_lines(), *(f"Input: {one.words()}." for one in result.plan.inputs))
+    inputs = (f"Input: {one.words()}." for one in result.plan.inputs)
+    said = (f"Verdicts on {only_class_of(result.case.part)}.", *result.deciding_lines(), *inputs)
     tables = (Table.of(result.points, columns),)
     return Part("chance", title, said, tables, pictures_of(result, captions), result.failures)
 

@@ -161,6 +161,13 @@ class MeasuredCurve:
         return f"{begin}; computed {what} over measured {spread} % at the {len(known)} within the pressures computed."
 
 
+def static_pressure(state: Any, case: Any, z: np.ndarray) -> np.ndarray:
+    """Static pressure (m,) of a state at stations, Pa, over that of the surroundings at the lips, as drive.pressure is;
+    z (m,), m, is their distance from the lips.
+    """
+    return state.station_pressure + state.outlet_pressure + case.outside_level(z - z[0])
+
+
 @dataclass(frozen=True)
 class MeasuredTaps:
     """Static pressures measured along the axis, and those computed there.
@@ -184,15 +191,15 @@ class MeasuredTaps:
     without: str = ""
 
     @classmethod
-    def of(cls, columns: Sequence[Sequence[float]], states: Sequence[Any], stations: np.ndarray) -> MeasuredTaps:
-        """Columns of pressure, z and tap beside states that flow, whose pressures run straight between stations, m."""
+    def of(cls, columns: Sequence[Sequence[float]], result: Any) -> MeasuredTaps:
+        """Columns of pressure, z and tap beside states that flow, whose pressures run straight between stations."""
         pressure, z, measured = np.array(columns)
-        flowing = [state for state in states if state.mass_flow > 0]
+        flowing, stations = [state for state in result.states if state.mass_flow > 0], result.mesh.z
         computed = np.full(len(z), np.nan)
         for p in set(pressure):
             chosen, state = pressure == p, state_at(flowing, p)
             if state is not None:
-                along = state.station_pressure + state.outlet_pressure
+                along = static_pressure(state, result.case, stations)
                 computed[chosen] = np.interp(z[chosen], stations, along, left=np.nan, right=np.nan)
         return cls(pressure, z, measured, computed, lacking(flowing, pressure))
 
@@ -452,7 +459,7 @@ class Measured:
             if kind == SHAPE:
                 self.parts[kind] = MeasuredShapes.of(columns, WallSections(result.mesh, result.states))
             elif kind == TAPS:
-                self.parts[kind] = MeasuredTaps.of(columns, result.states, result.mesh.z)
+                self.parts[kind] = MeasuredTaps.of(columns, result)
             else:
                 pressure, values = np.array(columns, float)
                 self.parts[kind] = MeasuredCurve(quantity, pressure, values, result.at(pressure, quantity.column))

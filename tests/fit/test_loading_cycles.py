@@ -58,6 +58,20 @@ def test_cycles_are_compared_where_there_are_two_that_can_be_fitted():
     assert "first loading: Cycle 1 of the uniaxial test has 2 rows" in "\n".join(report.lines("r", 1300.0))
 
 
+def test_a_first_cycle_without_stress_is_compared_with_none():
+    """A logger that calls its first sample, at rest, cycle 1."""
+    first = TensionTest(np.array([0.0]), np.array([0.0]), cycle=1)
+    text = "\n".join(describe_fits([first, _cycle(2, 0.6e6)], law="neo-hookean").lines("r", 1300.0))
+    assert "stabilised" not in text
+
+
+def test_a_loop_of_a_biaxial_test_loses_the_work_of_both_directions():
+    one = _cycle(2, 0.6e6)
+    both = TensionTest(one.strain, one.stress, "biaxial", cycle=2)
+    alone, twice = describe_cycles([one, both])
+    assert twice.lost == pytest.approx(2.0 * alone.lost) and twice.loss_factor == pytest.approx(alone.loss_factor)
+
+
 def test_a_set_on_a_row_is_taken_off_exactly():
     curve = _cycle(2, 0.6e6, 0.05)  # a row lies at 5 %
     test = loading_tests([curve])[0]

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from dbvfiv.fit import TensionTest
 from dbvfiv.fit.ply import StripTest, constituents_of, fit_ply, read_strip_test
-from dbvfiv.materials import MaterialError, fibre_ply, ply_from_constituents
+from dbvfiv.materials import MaterialError, OrthotropicPly, fibre_ply, ply_from_constituents
 
 APP_A = {
     "fibre_fraction": 0.45,
@@ -61,6 +61,16 @@ def test_ply_constants_come_back_from_strips(constants):
         assert getattr(found.ply, name) == pytest.approx(getattr(ply, name), rel=1e-8), name
     assert found.measured == ("e1", "e2", "nu12", "g12")
     assert np.abs(tests[1].residuals).max() < 1e-9 * tests[1].test.stress.max()
+
+
+@pytest.mark.parametrize("nu12", [0.42, 0.001])
+def test_a_poisson_ratio_that_no_constituents_give_is_that_of_the_ply_all_the_same(nu12):
+    ply = OrthotropicPly(1500e6, 8e6, nu12, 3e6, 2e6, 2e6, 1270.0)
+    found = fit_ply((_strip("warp", ply.e1, nu12), _strip("weft", ply.e2), _strip("bias", _bias_modulus(ply))))
+    for name in ("e1", "e2", "nu12", "g12"):
+        assert getattr(found.ply, name) == pytest.approx(getattr(ply, name), rel=1e-8), name
+    assert f"No matrix gives a ply the Poisson ratio {nu12:.4g} with 0.21 of the fibre" in found.missed
+    assert found.constituents.matrix_poisson == pytest.approx(0.499 if nu12 > 0.4 else 1e-3)
 
 
 def test_a_strip_answers_as_the_law_of_the_wall_does():

@@ -46,6 +46,16 @@ def test_moduli_of_a_series_give_the_series_whatever_the_slow_modulus(strengths,
     np.testing.assert_allclose(found.prony.strengths, made.strengths, rtol=0, atol=1e-8 * (1 + sum(strengths)) ** 2)
 
 
+def test_a_storage_modulus_that_a_series_misses_is_told():
+    """One point of half as much again, with the loss factor of the others."""
+    made = series([0.3, 0.5, 0.2])
+    modulus = 1e6 * made.modulus(2j * np.pi * FREQUENCY)
+    modulus[30] *= 1.5
+    found = fit_moduli(FREQUENCY, modulus.real, modulus.imag, made.times)
+    assert found.error.shape == (2 * len(FREQUENCY),)
+    assert found.error[[30, 90]] == pytest.approx(1 / 1.5 - 1, abs=0.02) and found.largest_error > 0.3
+
+
 @given(STRENGTHS, st.floats(1e3, 1e9))
 def test_relaxation_of_a_series_gives_the_series(strengths, slow):
     made = series(strengths)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+import tomllib
 from pathlib import Path
 
 import jax
@@ -12,12 +13,14 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from dbvfiv.errors import CaseError
 from dbvfiv.fit import TensionTest, fit_rubber, form_of
 from dbvfiv.fit.curves import MODES, loading_tests, read_curves, read_tests
-from dbvfiv.fit.report import describe_fits
+from dbvfiv.fit.report import describe_fits, toml_table
 from dbvfiv.fit.rubber import LEAST_MARGIN, RAYS
 from dbvfiv.materials import MaterialError, published_rubber, rubber_names, strain_levels
 from dbvfiv.materials.stability import hill_margin
+from dbvfiv.studies.case import load_case
 
 TRELOAR = Path(__file__).parent / "treloar.csv"
 REACH = {"uniaxial": 4.0, "planar": 3.0, "biaxial": 2.0}
@@ -246,6 +249,35 @@ def test_a_workbook_is_read_like_its_table(tmp_path, monkeypatch):
         read_curves(path)
     monkeypatch.setitem(sys.modules, "openpyxl", None)
     with pytest.raises(MaterialError, match=r"needs the package openpyxl \(pip install 'dbvfiv\[fit\]'\)"):
+        read_curves(path)
+
+
+def test_the_table_of_a_rubber_without_a_knee_is_read_by_a_case():
+    """Of neo-Hookean curves the softening form keeps mu_inf alone."""
+    strain = np.linspace(0.02, 0.6, 20)
+    tests = [TensionTest(strain, form_of("neo-hookean").columns("uniaxial", strain)[:, 0] * 0.3e6)]
+    fit = fit_rubber(tests, form_of("softening"))
+    assert fit.law(1300.0).small_strain_shear_modulus == pytest.approx(0.6e6, rel=1e-6)
+    given = tomllib.loads("\n".join(toml_table(fit, "SOFT", 1300.0)))["materials"]["SOFT"]
+    card = load_case(None).replace({"materials.SOFT": given}).materials.named["SOFT"]
+    assert card.mu_inf + card.mu_0 == pytest.approx(0.6e6, rel=1e-6)
+    with pytest.raises(CaseError, match="mu_0 is 0 Pa beside mu_inf = 0 Pa; mu_inf . mu_0 must be greater than 0"):
+        load_case(None).replace({"materials.SOFT": given | {"mu_0": 0.0, "mu_inf": 0.0}})
+
+
+def test_a_cell_of_a_workbook_that_shows_a_per_cent_is_one(tmp_path):
+    """It holds a fraction, which the unit of the column must not divide by 100 once more."""
+    from openpyxl import Workbook
+
+    book, path = Workbook(), tmp_path / "tension.xlsx"
+    for row in (("engineering_strain [%]", "nominal_stress [MPa]"), (0.05, 1.0), (10.0, 2.0), (15.0, 3.0)):
+        book.active.append(row)
+    book.active["A2"].number_format, book.active["A4"].number_format = "0.0%", '0" %"'
+    book.save(path)
+    assert read_curves(path)[0].strain == pytest.approx([0.05, 0.1, 0.15], rel=1e-14)
+    book.active["B3"].number_format = "0%"
+    book.save(path)
+    with pytest.raises(MaterialError, match="line 3: column nominal_stress must hold a finite number, but '200%' was"):
         read_curves(path)
 
 

@@ -227,6 +227,19 @@ def test_the_least_damped_mode_is_that_of_a_head_that_has_modes():
     assert on_chatter(with_verdicts(still, still)).text == f"{told}."
 
 
+@pytest.mark.parametrize(
+    "keys, told",
+    [((), "class SS alone (both lips open and close)"), (("mesh.part=half",), "class S alone (both lips open and")],
+)
+def test_a_probability_of_chatter_names_the_class_that_was_looked_at(keys, told):
+    """A valve that sways at the head of samples of which none flutters in the class of the equilibria."""
+    found = with_verdicts(damped("stable", 0.3), damped("flutters", 1.2), keys=keys)
+    point = {"value": 6e3, "probability": 0.0, "interval": [0.0, 0.014]}
+    found.results["chance"] = SimpleNamespace(points=[point], parameter="pressure")
+    (said,) = (line for line in on_chatter(found).uncertainty if "probability" in line)
+    assert said.startswith(f"probability of chatter at 6 kPa: 0 % (0 to 1.4 %), {told}")
+
+
 def test_onsets_are_told_with_their_kind_and_with_what_speaks_against_them():
     found = with_verdicts(damped("stable", np.nan), damped("flutters", np.nan))
     own = {"edge": True, "gains": True, "uncertainty": None, "confirmed": True, "note": None, "criticality": None}

@@ -19,11 +19,13 @@ from dbvfiv.model.forms import ValveForms
 from dbvfiv.model.symmetry import SYMMETRIES
 from dbvfiv.motion.periodic import PeriodicValve
 from dbvfiv.studies.case import require_consistent, thesis_case
+from dbvfiv.studies.measured import MeasuredTaps
 from dbvfiv.studies.onset import search
 from dbvfiv.studies.session import Session
 from dbvfiv.studies.stability import place
 from dbvfiv.studies.stability.place import is_surrounding, models_of, redesigned
 from dbvfiv.studies.state import State
+from dbvfiv.studies.steady.figures import _PANELS
 from tests.model.test_residual_forms import check, difference
 from tests.small_valves import SMALL, load_small, make_valve, settings
 from tests.studies.along import check_map, check_sensitivity, check_sweep, check_walk
@@ -75,6 +77,17 @@ def test_heads_and_jet_of_a_valve_that_discharges_downwards(keys):
     assert state.hydraulics.total_head == pytest.approx(fall / GRAVITY, rel=1e-8)
     assert state.hydraulics.head_loss == pytest.approx(fall / GRAVITY, rel=1e-8)
     assert state.station_pressure[-1] == pytest.approx(state.flange_pressure, rel=1e-8)
+
+
+def test_a_tap_at_the_flange_has_the_pressure_there_with_water_outside():
+    """Still water inside and outside: stations see none over that beside them, taps that over the water at the lips."""
+    z, drive = np.linspace(0.0, 0.56, 9), LEVEL + 2e3
+    state = SimpleNamespace(pressure=drive, station_pressure=np.zeros(9), outlet_pressure=2e3, mass_flow=1.0)
+    result = SimpleNamespace(states=[state], case=thesis_case(UP | WET), mesh=SimpleNamespace(z=z))
+    taps = MeasuredTaps.of([[drive] * 2, [z[0], z[-1]], [2e3, drive - 1e3]], result)
+    assert taps.excess == pytest.approx([0.0, 1e3], abs=1e-6)
+    (_, panel), *_ = _PANELS
+    assert panel(state, result)[-1] == pytest.approx(drive / 1e3, rel=1e-12)
 
 
 def test_forces_balance_and_the_tangent_is_that_of_the_residual():

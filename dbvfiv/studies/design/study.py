@@ -18,6 +18,7 @@ from ...drawing.style import headline, limits, log_axis, new_figure, parameter_l
 from ...errors import SolveError
 from ...model.closed import close_valve
 from ...model.leading import other_end
+from ...model.symmetry import equilibria_of, only_class_of
 from ...record.record import GrowingRecord
 from ...record.table import Column, TableSpec
 from ...texts import digits
@@ -361,6 +362,7 @@ class DesignResult(StudyResult):
             "designs": [told(number, design) for number, design in best.items()],
             "starts": [{k: v for k, v in note.items() if k != "what"} for note in self.found],
             "band": self.band,
+            "symmetry": equilibria_of(self.case.part).name,
             "case": {name: column.tolist() for name, column in started.items() if name not in ("design", "outcome")}
             | {"outcome": [OUTCOMES[i] for i in started["outcome"]]},
             "states": len(self.record.notes(_STATE)),
@@ -369,6 +371,7 @@ class DesignResult(StudyResult):
     def lines(self) -> list[str]:
         aim, *constraints = self.statements
         lines = [f"Aim: {aim.text}; {'; '.join(one.text for one in constraints) or 'no constraints'}."]
+        lines.append(f"Margins and verdicts are of {only_class_of(self.case.part)}.")
         if self.case.uncertainty.inputs:
             lines.append("Margins are those that 95 % of valves with the inputs of [uncertainty] have, to first order.")
         if self.band:

@@ -17,7 +17,7 @@ from scipy.special import logsumexp, ndtr
 
 from ...case.distribution import Distribution
 from ..inputs import Plan, quasi_random
-from .valves import MODES, Measured, Places, follow, least_damping, onsets
+from .valves import MODES, Measured, Places, follow, least_damping, onsets, stretch
 
 #: Share of samples that a step of the tempering leaves as equal ones.
 EQUAL = 0.5
@@ -359,17 +359,26 @@ class Learning:
         return float(worst)
 
     @cached_property
-    def _over_range(self) -> tuple[np.ndarray, np.ndarray]:
-        """Least damping ratio (n, values) of the samples over the range, and True (n,) where all of it is known."""
+    def _over_range(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Values (k,) of the range about the last record at which enough samples are known, their least damping ratio
+        (n, k) there, and True (n,) where all of it is known.
+        """
+        values, least = np.array(self.places.values), len(self.plan.inputs) + MORE
         table = np.stack([least_damping(self.modes[place][0]) for place in self.places.ranged], axis=1)
-        return table, np.isfinite(table).all(axis=1)
+        run = stretch(values, self.places.now, np.isfinite(table), least)
+        return values[run], table[:, run], np.isfinite(table[:, run]).all(axis=1)
+
+    @property
+    def values(self) -> np.ndarray:
+        """Values (k,) of the range over which damping is known: all, unless valves are lost at its ends."""
+        return self._over_range[0]
 
     def damping_over_range(self, z: np.ndarray, seed: int) -> np.ndarray | None:
-        """Least damping ratio (n, values) over the range, with the scatter that emulation leaves; None where too few
-        valves are known.
+        """Least damping ratio (n, k) over `values`, with the scatter that emulation leaves; None where too few valves
+        are known.
         """
-        table, known = self._over_range
-        if known.sum() < len(self.plan.inputs) + MORE:
+        values, table, known = self._over_range
+        if not len(values):
             return None
         emulator = Emulator(coordinates(self.plan, self.scores)[known], table[known])
         scatter = _spread(emulator.left)
@@ -384,8 +393,7 @@ class Learning:
         Between the values of the range damping is interpolated; what that is off by is learned from valves whose
         onsets were found.
         """
-        values, now = np.array(self.places.values), self.places.now
-        table, known = self._over_range
+        now, (values, table, known) = self.places.now, self._over_range
         found, rough = onsets(values, damping, now), onsets(values, table[known], now)
         points, random = coordinates(self.plan, self.scores)[known], np.random.default_rng([seed, 4])
         for side in (0, 1):

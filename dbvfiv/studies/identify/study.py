@@ -18,6 +18,7 @@ from ...case.parameters import PARAMETERS
 from ...case.write import write_case
 from ...drawing.style import ACCENT, COMPUTED, REST, headline, new_figure, parameter_label
 from ...errors import CaseError, SolveError
+from ...model.symmetry import equilibria_of, only_class_of
 from ...record.record import GrowingRecord, Record
 from ...texts import digits
 from ..case import Case
@@ -274,8 +275,13 @@ class IdentifyResult(StudyResult):
         return said
 
     @cached_property
+    def values(self) -> np.ndarray:
+        """Values (k,) of the range over which damping is known, SI."""
+        return self.learning.values
+
+    @cached_property
     def damping(self) -> np.ndarray | None:
-        """Least damping ratio (n, values) of samples over the range; None where too few valves are known."""
+        """Least damping ratio (n, k) of samples over `values`; None where too few valves are known."""
         return self.learning.damping_over_range(self.samples, self.case.identify.seed)
 
     @cached_property
@@ -288,12 +294,13 @@ class IdentifyResult(StudyResult):
     def onset(self) -> dict[str, Any] | None:
         """Onset of flutter below and above the last record, of samples that are stable there, and under ``ends`` its
         end, of those that flutter: median, 95 % interval (None beyond the range) and the probability, among all, that
-        there is one within the range; None where too few valves are known.
+        there is one within the range, of which ``range`` are the ends; None where too few valves are known.
         """
         if self._onsets is None:
             return None
         below, above, present = self._onsets
         found: dict[str, Any] = {"parameter": self.places.parameter, "now": self.places.now}
+        found["range"] = [float(self.values[0]), float(self.values[-1])]
         found |= {"flutters_now": float(np.mean(present < 0)), "ends": {}}
         for kept, among in ((found, present >= 0), (found["ends"], present < 0)):
             for name, at, beyond in (("below", below, -np.inf), ("above", above, np.inf)):
@@ -369,6 +376,7 @@ class IdentifyResult(StudyResult):
             return {"inputs": [], "matches": [], "onset": None, "further": []} | self.ending()
         texts, pairs = self.uncertainty()
         return {
+            "symmetry": equilibria_of(self.case.part).name,
             "records": self.record.notes(_MEASURED)[-1]["records"],
             "matches": self.matches,
             "inputs": self.inputs,
@@ -390,6 +398,8 @@ class IdentifyResult(StudyResult):
         said = [f"At {describe_fixed(self.case, *(one.name for one in self.plan.inputs))}:"]
         for row in self.record.notes(_MEASURED)[-1]["records"]:
             said.append(f"  record {row['record'] + 1} {row['file']}: {row['says']}, modes measured: {row['modes']}")
+        own = only_class_of(self.case.part)
+        said.append(f"Modes are of {own}; a line of another motion is taken for one of these, or left out:")
         for match in self.matches:
             said.append(f"  {_oscillation(match)} at {match['place']} is {_modes_said(match)}")
         said += ["", f"{'input':<34}{'before (95 %)':>28}{'after (95 %)':>28}{'learned':>9}"]
@@ -425,13 +435,16 @@ class IdentifyResult(StudyResult):
         flutters = found["flutters_now"]
         if flutters > RARE:
             said.append(f"It flutters at the last record with a probability of {100 * flutters:.0f} %.")
+        if len(self.values) < len(self.places.values):
+            low, high = map(self._value, found["range"])
+            said.append(f"Damping is known from {low} to {high}: too few valves have modes at all values beyond.")
         for verb, parts, share in (("begins", found, 1 - flutters), ("ends", found["ends"], flutters)):
             said += [self._side_said(name, verb, parts[name]) for name in ("above", "below") if share > RARE]
         return said
 
     def _side_said(self, name: str, verb: str, part: dict[str, Any]) -> str:
         """Sentence on where flutter begins or ends on one side of the last record."""
-        end = self._value(self.places.values[-1 if name == "above" else 0])
+        end = self._value(self.values[-1 if name == "above" else 0])
         if part["probability"] < RARE:
             return f"Flutter {verb} nowhere {name} {self._value(self.places.now)} up to {end}."
         low, middle, high = (
@@ -525,7 +538,7 @@ def onset(result: StudyResult) -> Figure:
     figure = new_figure()
     axes = figure.add_subplot()
     name, damping = result.places.parameter, result.damping
-    x = np.array(result.places.values) / PARAMETERS[name].scale
+    x = result.values / PARAMETERS[name].scale
     low, middle, high = 100 * np.quantile(damping, (0.025, 0.5, 0.975), axis=0)
     axes.fill_between(x, low, high, color=COMPUTED, alpha=0.25, lw=0, label="95 %")
     axes.plot(x, middle, "o-", color=COMPUTED, label="median")

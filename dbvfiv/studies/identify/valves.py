@@ -112,8 +112,9 @@ def _each_once(found: Sequence[Measured], more: Sequence[Measured], error: float
             near.frequency_error + one.frequency_error + error * one.frequency
         ):
             kept.append(one)
-        elif one.frequency_error < near.frequency_error and near in kept:
-            kept[kept.index(near)] = one
+        elif one.frequency_error < near.frequency_error:
+            at = next((i for i, other in enumerate(kept) if other is near), len(kept))
+            kept[at : at + 1] = [one]
     return kept
 
 
@@ -274,9 +275,11 @@ class Valves:
         yield from rows.values()
         if set(self.places.ranged) <= set(asked):
             damping = least_damping(np.array([rows[place].eigenvalues for place in self.places.ranged]))
-            known = np.isfinite(damping).all()
+            values = np.array(self.places.values)
+            run = stretch(values, self.places.now, np.isfinite(damping)[None])
             least = partial(self._least, row, walk)
-            yield Begins(sample, *(self._begins(damping, least) if known else (np.nan, np.nan)))
+            found = self._begins(values[run], damping[run], least) if len(values[run]) else (np.nan, np.nan)
+            yield Begins(sample, *found)
 
     def _modes(self, sample: int, row: np.ndarray, walk: StabilityWalk, place: int) -> Modes:
         if self.known[place] is None:
@@ -299,9 +302,9 @@ class Valves:
         except (SolveError, CaseError, ValueError):
             return np.nan
 
-    def _begins(self, damping: np.ndarray, least: Callable[[float], float]) -> Iterator[float]:
-        """Onsets below and above, each between the two values of the range that enclose it (Brent's method)."""
-        values, now = np.array(self.places.values), self.places.now
+    def _begins(self, values: np.ndarray, damping: np.ndarray, least: Callable[[float], float]) -> Iterator[float]:
+        """Onsets below and above, each between the two of the values that enclose it (Brent's method)."""
+        now = self.places.now
         axis, back = (np.log(values), np.exp) if values[0] > 0 else (values, float)
         for guess in (side[0] for side in onsets(values, damping[None], now)[:2]):
             if not np.isfinite(guess):
@@ -319,6 +322,35 @@ class Valves:
                 yield float(back(found))
             except ValueError:  # a valve that was lost on the way
                 yield np.nan
+
+
+def stretch(values: np.ndarray, now: float, known: np.ndarray, least: int = 1) -> slice:
+    """Run of values (k,), rising, about the present one, as far as all of it is known of so many samples.
+
+    Parameters
+    ----------
+    known : (n, k) bool array
+        Whether a sample has a mode at a value.
+    least : int
+
+    Returns
+    -------
+    slice
+        Empty where there are no two such values.
+    """
+    near = 1e-9 * abs(now)
+    low = max(int(np.searchsorted(values, now + near, "right")) - 1, 0)
+    high = min(int(np.searchsorted(values, now - near)), len(values) - 1)
+
+    def holds(low: int, high: int) -> bool:
+        within = 0 <= low and high < len(values)
+        return within and known[:, low : high + 1].all(axis=1).sum() >= least
+
+    if not holds(low, high):
+        return slice(0, 0)
+    while (up := holds(low, high + 1)) or holds(low - 1, high):
+        low, high = (low, high + 1) if up else (low - 1, high)
+    return slice(low, high + 1) if high > low else slice(0, 0)
 
 
 def _kept(eigenvalues: np.ndarray, q: np.ndarray, shapes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -48,7 +48,7 @@ class Keys(RangeSection):
             level = self.noise**2 / self.max_frequency
             return [(0.0, level), (self.max_frequency, level)]
         try:
-            rows = read_pairs(self.spectrum, (Quantity("Hz"), Quantity("")), "a frequency and a power density")
+            rows = read_pairs(self.spectrum, (Quantity("Hz"), Quantity("Pa^2/Hz")), "a frequency and a power density")
             for (before, _), (after, _) in zip(rows, rows[1:]):
                 if not after > before:
                     raise ValueError(f"whose frequencies do not increase at {after:g} Hz")

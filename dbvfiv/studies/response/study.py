@@ -28,9 +28,11 @@ from eigen.pairs import all_eigenvalues
 from ...case.parameters import PARAMETERS, PIPES, Mu
 from ...drawing.style import ACCENT, COMPUTED, headline, new_figure, parameter_label, some_of
 from ...errors import CaseError, SolveError
+from ...fit.cards import outside_band
 from ...flow.law import FlowMotion
-from ...model.dynamics import LinearisedState
+from ...model.dynamics import LinearisedState, still_channel
 from ...model.state import LipCentre
+from ...model.symmetry import equilibria_of, only_class_of
 from ...record.record import GrowingRecord, Record
 from ...record.table import Column, TableSpec
 from ...texts import digits
@@ -139,15 +141,36 @@ class Transfer:
         rows = jax.jacrev(leaving, argnums=(0, 1, 2))(area, jnp.zeros_like(area), inner)
         self._by_area, self._by_rate = (copies * np.pad(np.asarray(row), (0, m - len(area))) for row in rows[:2])
         self._by_inner, self._copies, self._flange = copies * np.asarray(rows[2]), copies, len(area) - 1
+        self._tail = self._behind(area, inner, given)
         lip = LipCentre(linear.model.mesh, linear.model.shell)
         self._lip = np.array([lip.displacement(row) for row in np.eye(self.pencil.n)])
         self.force = self.pencil.G @ self.pressure
+
+    def _behind(self, area, inner, given) -> list[np.ndarray]:
+        """Derivatives (2, ...) of the pressure around the jet over that at the far end of a pipe behind the valve, by
+        areas, their rates and inner unknowns: of its head, Pa, and of its momentum, Pa s. Nothing without one.
+        """
+        tail, flow, m = self.linear.model.tail, self.linear.model.flow, self.pencil.m
+        if tail is None:
+            return []
+        channel = still_channel(flow)
+
+        def lifted(area, rate, inner):
+            stream = channel.stream(area, rate, flow.speeds_of(area, rate, inner, given), inner)
+            return given["density"] * jnp.array([tail.head(stream, given), tail.momentum(stream, given)])
+
+        rows = jax.jacrev(lifted, argnums=(0, 1, 2))(area, jnp.zeros_like(area), inner)
+        by_area, by_rate = (np.pad(np.asarray(row), ((0, 0), (0, m - len(area)))) for row in rows[:2])
+        return [by_area, by_rate, np.asarray(rows[2])]
 
     def _outputs(self, s: complex, lip, motion, inner) -> np.ndarray:
         """Outputs (4, ...) from the displacement of the lip, areas (m, ...) and inner unknowns (b, ...)."""
         A, B, _, _ = self.pencil.fluid_at(s)
         flow = (self._by_area + s * self._by_rate) @ motion + self._by_inner @ inner
         pressure = A[self._flange] @ motion + B[self._flange] @ inner + self.pressure[self._flange]
+        if self._tail:  # stations have the pressure over that around the jet, a gauge that over the surroundings
+            by_area, by_rate, by_inner = self._tail
+            pressure = pressure + np.array([1.0, s]) @ ((by_area + s * by_rate) @ motion + by_inner @ inner)
         return np.array([lip, self._copies * motion[0], flow, pressure])
 
     def full(self, frequency: float) -> tuple[np.ndarray, np.ndarray]:
@@ -299,15 +322,18 @@ def check(case: Case) -> None:
     left_out(case)
 
 
-def frequencies(case: Case) -> np.ndarray:
-    """Frequencies, Hz, that the response is made for: those of the curves, and some below them."""
+def frequencies(case: Case, resolved: float = np.inf) -> np.ndarray:
+    """Frequencies, Hz, that the response is made for: those of the curves, and some below them; up to where waves are
+    resolved.
+    """
     # down to a little above zero: a long line lets slow pulsation through that it keeps from faster one
-    step = case.response.max_frequency / case.response.count
+    step = min(case.response.max_frequency, resolved) / case.response.count
     return np.append(step * SLOW, step * np.arange(1, case.response.count + 1))
 
 
-def left_out(case: Case) -> list[str]:
-    """Sentences on the power of response.spectrum beyond the frequencies that the response is made for.
+def left_out(case: Case, resolved: float = np.inf) -> list[str]:
+    """Sentences on the power of response.spectrum beyond the frequencies that the response is made for, up to where
+    waves are resolved.
 
     Raises
     ------
@@ -315,7 +341,7 @@ def left_out(case: Case) -> list[str]:
         Without any power within them.
     """
     frequency, power = np.transpose(case.response.density())
-    (low, most), whole = frequencies(case)[[0, -1]], trapezoid(power, frequency)
+    (low, most), whole = frequencies(case, resolved)[[0, -1]], trapezoid(power, frequency)
 
     def up_to(limit: float) -> float:
         within = np.append(frequency[frequency < limit], min(limit, frequency[-1]))
@@ -365,6 +391,22 @@ def run(session: Session, record: GrowingRecord) -> None:
         except (CaseError, SolveError, ArithmeticError) as error:
             record.fail(f"At {PARAMETERS[asked.parameter].text(value)}: {error}")
         record.item(value)
+    for sentence in filter(None, (ended_early(record, case), outside_band(case, record.column(PEAKS, "frequency")))):
+        record.warn(sentence)
+
+
+def ended_early(record: Record, case: Case) -> str | None:
+    """Sentence on curves that end where waves are no longer resolved; None where all go to response.max_frequency."""
+    values, frequency = (record.column(CURVE, name) for name in ("value", "frequency"))
+    most = case.response.max_frequency
+    least = min((frequency[values == value].max() for value in np.unique(values)), default=most)
+    if least >= most * (1.0 - 1e-9):
+        return None
+    return (
+        "The elements of the line, or the rows of the mesh in a fluid that is compressed, resolve waves up to "
+        f"{digits(least, 4)} Hz, so curves, peaks and root mean squares end there, below response.max_frequency = "
+        f"{digits(most, 4)} Hz; more upstream.elements or mesh.along reach further."
+    )
 
 
 def _respond(walk: StabilityWalk, place: Mu, value: float, rows, record: GrowingRecord) -> None:
@@ -373,7 +415,10 @@ def _respond(walk: StabilityWalk, place: Mu, value: float, rows, record: Growing
     if not verdict.stable:
         state = "is not stable" if verdict.stable is False else "is not known to be stable"
         raise SolveError(f"the state {state}, so that motions about it do not stay small. {verdict.reason}")
-    transfer = Transfer(walk.family(place).linear, place, frequencies(walk.case))
+    linear = walk.family(place).linear
+    resolved = linear.resolved(place)
+    left_out(walk.case, resolved)  # a spectrum without power below
+    transfer = Transfer(linear, place, frequencies(walk.case, resolved))
     even = transfer.frequencies[len(SLOW) :]
     curve = transfer.at(even)
     columns: dict[str, Any] = {"value": np.full(len(curve), value), "frequency": even}
@@ -448,7 +493,8 @@ class ResponseResult(StudyResult):
             peaks = [{k: float(v) for k, v in p.items()} for p in self.peaks(point["value"])]
             points.append(point | {"peaks": peaks, "curve": shown})
         fixed = fixed_conditions(self.case, self.parameter)
-        return {"parameter": self.parameter, "points": points, "fixed": fixed} | self.ending()
+        known = {"parameter": self.parameter, "symmetry": equilibria_of(self.case.part).name}
+        return known | {"points": points, "fixed": fixed} | self.ending()
 
     def _missed(self, lost: int) -> str:
         return f"There is no response at {lost} of the states"
@@ -465,6 +511,7 @@ class ResponseResult(StudyResult):
         ]
         if not self.points:
             return [*said, "There is no stable state."]
+        said.append(f"They are stable in {only_class_of(self.case.part)}.")
         last = self.points[-1]
         said += ["", f"Peaks at {row.text(last['value'])}, per kPa at the inlet:"]
         said.append(f"{'frequency, Hz':>14}{'damping, %':>12}{'lip, um':>12}{'flow, L/s':>12}{'flange, Pa':>12}")

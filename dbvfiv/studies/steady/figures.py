@@ -27,6 +27,7 @@ from ...drawing.views import closed_section, deformed, draw_chosen, faces, layer
 from ...flow.terms.pump import from_case as pump_of
 from ..case import Case
 from ..comparing import MEASURED, draw_curve, draw_runs, draw_shapes, labels
+from ..measured import static_pressure
 from ..result import StudyResult
 
 
@@ -262,11 +263,11 @@ def centre_line(result: StudyResult) -> Figure:
     return figure
 
 
-#: What each panel shows of a state, in how many copies of the part that is computed.
+#: What each panel shows of a state of a result.
 _PANELS = (
-    ("Static pressure, kPa", lambda state, copies: (state.station_pressure + state.outlet_pressure) / 1e3),
-    ("Velocity, m/s", lambda state, copies: state.station_velocity),
-    ("Flow area, cm²", lambda state, copies: copies * state.station_area * 1e4),
+    ("Static pressure, kPa", lambda state, result: static_pressure(state, result.case, result.mesh.z) / 1e3),
+    ("Velocity, m/s", lambda state, result: state.station_velocity),
+    ("Flow area, cm²", lambda state, result: result.mesh.part.copies * state.station_area * 1e4),
 )
 
 
@@ -281,7 +282,7 @@ def passage(result: StudyResult) -> Figure:
     colours = pressure_colours([*(s.pressure for s in states), *([] if taps is None else taps.pressure)])
     for axes, (label, value) in zip(panels, _PANELS):
         for state, colour in zip(states, colours):
-            axes.plot(z, value(state, result.mesh.part.copies), color=colour, label=kilopascals(state.pressure))
+            axes.plot(z, value(state, result), color=colour, label=kilopascals(state.pressure))
         axes.set_ylabel(label)
         axes.set_ylim(bottom=min(0.0, axes.get_ylim()[0]))
         axes.set_xlim(0, z[-1])

@@ -11,6 +11,7 @@ import numpy as np
 
 from ...case.parameters import PARAMETERS, Mu
 from ...errors import CaseError, SolveError
+from ...model.symmetry import equilibria_of, only_class_of
 from ...record.record import GrowingRecord, Record
 from ...record.table import Column, TableSpec
 from ...texts import digits, json_value
@@ -464,6 +465,7 @@ class UncertaintyResult(StudyResult):
             both |= {"comparison": self.comparison} if self.case.uncertainty.method == "plain" else {}
         return {
             "parameter": self.parameter,
+            "symmetry": equilibria_of(self.case.part).name,
             "points": self.points,
             "decides": [] if deciding is None else deciding["decides"],
             "inputs": [one.summary() for one in self.plan.inputs],
@@ -489,7 +491,8 @@ class UncertaintyResult(StudyResult):
         fixed = describe_fixed(self.case, self.parameter, *(one.name for one in self.plan.inputs))
         place = f"{self.parameter}, {row.shown_unit}".rstrip(", ")
         head = f"{place:>16}{'flutters':>10}  {'95 % interval':<17}{'not valid':>10}{'undecided':>10}{'samples':>9}"
-        lines = [f"At {fixed}:", *(f"  {one.words()}" for one in self.plan.inputs), f"{head}  least damping ratio, %"]
+        lines = [f"At {fixed}; {only_class_of(self.case.part)}:", *(f"  {one.words()}" for one in self.plan.inputs)]
+        lines.append(f"{head}  least damping ratio, %")
         lines += [*map(self._line, self.points), *self._verdict_lines(), *self.deciding_lines()]
         if self.other_law:
             law, other = self.other_law

@@ -135,6 +135,7 @@ def test_the_aim_of_the_case_stands_beside_that_of_the_design(found, valve):
 def test_the_file_says_the_same_and_draws(found):
     stored = dbvfiv.load_result(found.path)
     assert stored.summary() == found.summary() and stored.lines() == found.lines()
+    assert found.summary()["symmetry"] == "SS" and "of class SS alone" in found.lines()[1]
     assert set(stored.figures()) == {"heads"}
 
 

@@ -124,6 +124,7 @@ def test_a_hidden_valve_is_found(found):
     low, high = document["onset"]["above"]["interval"]
     assert (low or np.inf) <= onset <= (high or np.inf) or abs(onset - low) < 0.02 * onset
     said = "\n".join(found.result.lines())
+    assert document["symmetry"] == "SS" and "Modes are of class SS alone (both lips open and close)" in said
     assert "beta" in said and "flutter begins at" in said and "95 %" in said
 
 

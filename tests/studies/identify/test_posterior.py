@@ -6,12 +6,13 @@ import numpy as np
 import pytest
 from scipy.stats import norm
 
+from dbvfiv.case.axis import parse_point
 from dbvfiv.case.distribution import Distribution
-from dbvfiv.case.quantity import Quantity
-from dbvfiv.studies.identify.learning import Emulator, Learned, expected_variance, sample_posterior
+from dbvfiv.case.quantity import GRAVITY, Quantity
+from dbvfiv.studies.identify.learning import Emulator, Learned, Learning, expected_variance, sample_posterior
 from dbvfiv.studies.identify.search import Search, _some
 from dbvfiv.studies.identify.study import IdentifyResult, distribution_text
-from dbvfiv.studies.identify.valves import follow, least_damping, onsets
+from dbvfiv.studies.identify.valves import Measured, _each_once, follow, least_damping, onsets, stretch
 
 SLOPES = np.array([[1.0, 0.8, 0.0, 0.0], [0.0, 0.3, 1.0, 0.0]])
 DATA = np.array([1.2, -0.4])
@@ -120,7 +121,7 @@ def test_flutter_at_the_last_record_ends_and_does_not_begin(ends):
     values = np.geomspace(1e3, 8e3, 4)
     found = object.__new__(IdentifyResult)
     places = SimpleNamespace(parameter="pressure", now=2e3, values=values, head=lambda *_: "")
-    vars(found).update(_onsets=onsets(values, damping, 2e3), places=places)
+    vars(found).update(_onsets=onsets(values, damping, 2e3), places=places, values=values)
     now, begins, over = found.onset["flutters_now"], found.onset["above"], found.onset["ends"]["above"]
     assert now == over["probability"] == np.mean(np.array(ends) == 4.0) and begins["probability"] == 1 - now
     assert over["interval"] == pytest.approx([4e3, 4e3], rel=1e-2) and found.onset["ends"]["below"]["median"] is None
@@ -132,6 +133,54 @@ def test_flutter_at_the_last_record_ends_and_does_not_begin(ends):
     assert now == 1.0 or 4e3 < begins["median"] < 8e3
 
 
+@pytest.mark.parametrize(
+    ("lost", "now", "run"),
+    [
+        ([], 2.5, (0, 4)),
+        ([3], 2.5, (0, 3)),
+        ([0, 3], 2.0, (1, 3)),
+        ([3], 4.0, (0, 3)),
+        ([1, 3], 4.0, None),
+        ([2], 2.5, None),
+    ],
+)
+def test_a_run_of_values_ends_where_too_few_samples_are_known(lost, now, run):
+    known = np.ones((5, 4), bool)
+    known[1:, lost] = False
+    found = stretch(np.array([1.0, 2.0, 4.0, 8.0]), now, known, 2)
+    assert (found.start, found.stop) == (run or (0, 0))
+
+
+def test_a_value_without_a_state_leaves_the_onset_between_the_others():
+    """Damping of 1 % at 2 kPa and -1 % at 4 kPa, and no valve at 8 kPa."""
+    scores = np.linspace(-2.0, 2.0, 12)[:, None]
+    ratio = np.array([0.01, -0.01, np.nan]) * (1.0 + 0.1 * scores)
+    modes = {
+        place: (np.pad(1j - row[:, None], ((0, 0), (0, 11)), constant_values=np.nan), 0)
+        for place, row in enumerate(ratio.T)
+    }
+    inputs = [SimpleNamespace(distribution=SimpleNamespace(form="normal"))]
+    asked = SimpleNamespace(identify=SimpleNamespace(error=0.0, damping_error=0.0))
+    plan = SimpleNamespace(inputs=inputs, scores_of=lambda z: z, case=asked)
+    places = SimpleNamespace(values=(2e3, 4e3, 8e3), now=2.5e3, ranged=[0, 1, 2])
+    learning = Learning(plan, places, [], scores, np.zeros(12, int), modes, np.full((12, 2), np.nan))
+    z = np.zeros((50, 3))
+    damping = learning.damping_over_range(z, 1)
+    assert damping.shape == (50, 2) and learning.values.tolist() == [2e3, 4e3]
+    _, above, present = learning.onsets(z, damping, 1)
+    assert above == pytest.approx(np.sqrt(8.0) * 1e3, rel=1e-2) and (present > 0).all()
+    found = object.__new__(IdentifyResult)
+    places.parameter, places.head = "pressure", lambda *_: ""
+    vars(found).update(_onsets=learning.onsets(z, damping, 1), places=places, values=learning.values)
+    assert found.onset["range"] == [2e3, 4e3]
+    assert any(line.startswith("Damping is known from 2 kPa to 4 kPa: too few") for line in found._onset_said())
+
+
+def test_two_modes_of_a_later_column_are_two_beside_one_broad_line():
+    broad, first, second = (Measured(0, f, e) for f, e in ((20.0, 1.0), (19.5, 0.05), (20.5, 0.05)))
+    assert _each_once([broad], [first, second], 0.0) == [first, second] == _each_once([first, second], [broad], 0.0)
+
+
 @pytest.mark.parametrize(("present", "names"), [(0.01, ["onset above"]), (-0.01, ["end above"])])
 def test_a_further_measurement_is_sought_for_where_flutter_begins_or_ends(present, names):
     found, above = object.__new__(IdentifyResult), np.array([4.0, 5.0, np.nan])
@@ -140,6 +189,12 @@ def test_a_further_measurement_is_sought_for_where_flutter_begins_or_ends(presen
     vars(found).update(learned=learned, learning=learning, samples=np.zeros((3, 3)), _onsets=onsets_)
     assert list(found.further) == names
     np.testing.assert_array_equal(found.further[names[0]], above)
+
+
+def test_a_head_of_a_record_is_one_of_the_density_beside_it():
+    for text in ("pressure=1 m, density=1025", "density=1025, pressure=1 m"):
+        assert parse_point(text, 1000.0) == {"pressure": pytest.approx(1025 * GRAVITY), "density": 1025.0}
+    assert [*parse_point("pressure=1 m, density=1025", 1000.0)] == ["pressure", "density"]
 
 
 def test_modes_are_followed_by_their_shapes():

@@ -5,12 +5,19 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from scipy.integrate import trapezoid
 
 import dbvfiv
 from dbvfiv.case.parameters import Mu
-from dbvfiv.studies.case import load_case
+from dbvfiv.case.part import QUARTER
+from dbvfiv.errors import CaseError
+from dbvfiv.flow.channel import Channel
+from dbvfiv.flow.terms.tail import Tail
+from dbvfiv.studies.case import load_case, thesis_case
+from dbvfiv.studies.response import study
 from dbvfiv.studies.response.study import OUTPUTS, Transfer
 from dbvfiv.studies.stability.walk import StabilityWalk
+from eigen.operator import CoupledPencil
 from tests.small_valves import SMALL, load_small
 
 RAYLEIGH = {"damping.alpha": 5.0, "damping.beta": 0.001}
@@ -56,6 +63,76 @@ def test_a_lip_that_stops_hold_answers_as_exactly_as_the_rest():
     (found,), (full, _) = transfer.at([33.3]), transfer.full(33.3)
     assert abs(full[0]) < 1e-4 * abs(full[1]) and transfer.error <= 1e-5
     assert found == pytest.approx(full, rel=1e-4)
+
+
+def test_the_pressure_at_a_flange_without_a_line_is_that_which_drives(monkeypatch):
+    """However the wall moves, with a pipe behind the valve too, whose fluid moves the pressure around the jet."""
+    z, area = np.linspace(0.0, 0.56, 6), np.linspace(2e-3, 18e-3, 6)
+    flow = Channel(z, 1e-5, 1.0, terms=[Tail(0.33, 10.0, 1.5)])
+    monkeypatch.setattr(study, "LipCentre", lambda *_: None)
+    transfer, empty = object.__new__(Transfer), np.zeros((0, 6))
+    parts = flow.linearise_still(area, {"inlet": 6e3, "density": 1000.0}).parts()
+    transfer.pencil = CoupledPencil(*np.zeros((3, 0, 0)), empty, empty.T, **parts)
+    model = SimpleNamespace(flow=flow, tail=flow.terms[0], mesh=SimpleNamespace(part=QUARTER), shell=None)
+    transfer.linear = SimpleNamespace(model=model, inlet=6e3, area=area)
+    transfer._drive(flow, Mu(density=1000.0, storage=1.0))
+    random = np.random.default_rng(9)
+    for s in (0.0, 2j * np.pi * 3.0, 2j * np.pi * 20.0):
+        motion = 1e-6 * (random.standard_normal(6) + 1j * random.standard_normal(6))
+        _, _, R, S = transfer.pencil.fluid_at(s)
+        inner = np.linalg.solve(S, -transfer.balance - R @ motion)
+        assert transfer._outputs(s, 0.0, motion, inner)[3] == pytest.approx(1.0, rel=1e-9)
+
+
+class Oscillators(Transfer):
+    """Two modes of closed form, of 5 and 20 Hz."""
+
+    size, error = 2, 0.0
+
+    def __init__(self, _linear, _mu, frequencies):
+        self.frequencies, self.reduced = frequencies, None
+
+    def at(self, frequencies):
+        turns = 2 * np.pi * np.asarray(frequencies)
+        found = sum(1.0 / (abs(v) ** 2 - turns**2 - 2j * v.real * turns) for v in EIGENVALUES)
+        return np.repeat(found[:, None], len(OUTPUTS), axis=1)
+
+
+EIGENVALUES = 2 * np.pi * np.array([5.0, 20.0]) * complex(-0.02, 1.0)
+
+
+@pytest.mark.parametrize(("resolved", "most", "modes"), [(8.0, 8.0, [5.0]), (np.inf, 60.0, [5.0, 20.0])])
+def test_a_response_ends_where_waves_are_no_longer_resolved(monkeypatch, resolved, most, modes):
+    stable = SimpleNamespace(stable=True, growth_rate=-1.0, frequency=5.0)
+    linear = SimpleNamespace(resolved=lambda _place: resolved)
+    keys = {"response.max_frequency": 60.0, "response.count": 240, "damping.band": ["10 Hz", "50 Hz"], **LOSS}
+    valve = load_small(keys)
+    walk = SimpleNamespace(case=valve.case, verdict=lambda _: stable, family=lambda _: SimpleNamespace(linear=linear))
+    monkeypatch.setattr(study, "StabilityWalk", lambda *_: walk)
+    monkeypatch.setattr(study, "Transfer", Oscillators)
+    monkeypatch.setattr(study, "all_eigenvalues", lambda _reduced: EIGENVALUES)
+    found = valve.response()
+    (point,) = found.points
+    assert found.curve(point["value"])["frequency"][-1] == pytest.approx(most)
+    assert [peak["frequency"] for peak in found.peaks(point["value"])] == pytest.approx(modes)
+    ended = [text for text in found.warnings if "resolve waves up to 8 Hz, so curves, peaks and root mean" in text]
+    assert len(ended) == (resolved == 8.0)
+    assert any(text.startswith("5 Hz lies outside damping.band") for text in found.warnings)
+    fine = np.linspace(0.0, most, 200_001)
+    power = np.abs(Oscillators.at(None, fine)[:, 0]) ** 2 * 100.0**2 / 60.0
+    assert point["lip_displacement_rms"] == pytest.approx(np.sqrt(trapezoid(power, fine)), rel=1e-3)
+
+
+def test_a_spectrum_may_name_the_units_of_its_columns(tmp_path):
+    """Power densities in kPa2/Hz are 1e6 times as large as in Pa2/Hz."""
+    case, path, rows = thesis_case(), tmp_path / "spectrum.csv", np.array([[10.0, 4.0], [60.0, 2.0]])
+    for head, unit in (("", 1.0), ("frequency [Hz], density [Pa2/Hz]\n", 1.0), ("f [Hz];power [kPa^2/Hz]\n", 1e-6)):
+        path.write_text(head + "".join(f"{f}{';' if ';' in head else ','}{unit * p}\n" for f, p in rows))
+        found = case.replace({"response.spectrum": str(path)}).response.density()
+        assert np.array(found) == pytest.approx(rows, rel=1e-12)
+    path.write_text("frequency [Hz], density [Pa]\n10, 4\n60, 2\n")
+    with pytest.raises(CaseError, match="names the unit 'Pa', which is not a power density of a pressure"):
+        case.replace({"response.spectrum": str(path)}).response.density()
 
 
 def in_time(case, folder, time, pressure, step, duration):
@@ -116,12 +193,26 @@ def test_the_reduced_operator_is_the_full_one():
         assert np.abs(transfer.at([frequency])[0] / full - 1).max() < 1e-5
 
 
+PIPES = {
+    "upstream.length": 5.0,
+    "upstream.diameter": "300 mm",
+    "upstream.loss": 1.5,
+    "downstream.pipe_diameter": "330 mm",
+    "downstream.length": 5.0,
+    "downstream.loss": 1.5,
+}
+
+
 @pytest.mark.slow
-def test_the_static_response_is_the_slope_of_the_steady_states():
-    case = load_small(STATES["storage-rayleigh"], {"fluid.density": 1000.0}).case
+@pytest.mark.parametrize("pipes", [{}, PIPES])
+def test_the_static_response_is_the_slope_of_the_steady_states(pipes):
+    case = load_small(STATES["storage-rayleigh"], {"fluid.density": 1000.0}, pipes).case
     low, high = (dbvfiv.load(case).steady(pressure=pressure) for pressure in (5990.0, 6010.0))
-    slopes = [(getattr(high, n) - getattr(low, n)) / 20 for n in ("lip_displacement", "volume_flow")]
-    assert transfer_of(case, FREQUENCIES[12:44]).full(0.0)[0][[0, 2]] == pytest.approx(slopes, rel=2e-3)
+    names = "lip_displacement", "volume_flow", "flange_pressure"
+    slopes = [(getattr(high, n) - getattr(low, n)) / 20 for n in names]
+    place = Mu.of(case)
+    transfer = Transfer(StabilityWalk(case).family(place).linear, place, FREQUENCIES[12:44])
+    assert transfer.full(0.0)[0][[0, 2, 3]] == pytest.approx(slopes, rel=2e-3)
 
 
 def test_variance_and_correlation_time_of_one_mode_are_those_of_its_formula(monkeypatch):
@@ -144,6 +235,7 @@ def test_the_command_tells_peaks_precursors_and_states_that_flutter(tmp_path, co
     document = json.loads(told.out)
     assert told.status == 1 and len(document["failures"]) == 1 and "is not stable" in document["failures"][0]
     first, second = document["points"]
+    assert document["symmetry"] == "SS"
     assert first["value"] == 550 and second["value"] == 1000
     assert first["lip_displacement_rms"] > second["lip_displacement_rms"]  # the onset lies at lower densities
     assert len(first["curve"]["frequency"]) == 64 and first["peaks"][0]["frequency"] > 0

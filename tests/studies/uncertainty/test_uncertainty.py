@@ -129,6 +129,7 @@ def test_flow_models_are_compared_by_the_same_samples():
 
 def test_the_document_has_probability_interval_and_what_decides(found):
     document = json.loads(json.dumps(found.summary()))
+    assert document["symmetry"] == "SS" and "class SS alone (both lips open and close):" in found.lines()[0]
     (point,) = document["points"]
     hits = sum(OUTCOMES[i] == "flutters" for i in found.at(point["value"])["outcome"])
     assert point["probability"] == hits / 16 and point["interval"][0] < hits / 16 < point["interval"][1]
