@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -32,7 +32,9 @@ from ..stability.scan import Crossing, Scan
 from ..stability.verdict import FLUTTERS, STABLE, Verdict, lowered, oscillates
 from ..stability.walk import StabilityWalk, ValveFamily, name_state_in_failures
 from ..state import State
-from . import Keys
+
+if TYPE_CHECKING:
+    from . import Keys
 
 #: Structural modes in the basis behind the independent count.
 _BASIS = 24

@@ -236,7 +236,9 @@ def number_of(case: Case, name: str, key: str) -> tuple[FieldInfo, Any]:
 
 
 def _card(materials: Materials, name: str) -> Section:
-    """What may change of a material without a table; rubbers whose levels are sought have one once these are found."""
+    """Section of numbers that may change of a material without a table; rubbers whose levels are sought have one once
+    these are found.
+    """
     return materials.card(name) if name in RUBBERS and materials.strain_level == AUTO else BuiltIn()
 
 
