@@ -251,6 +251,24 @@ def test_the_margin_of_the_case_is_told_less_its_reserve():
     assert _changed(-0.012, 0.049) == ""
 
 
+def test_a_constraint_with_the_bound_0_holds_a_design_back():
+    """Counted in the value of the case itself."""
+    state = {"what": "state", "values": [1.0], "pressure": 9e3, "margin": True, "found": {"margin": 0.05}}
+    state |= {"slopes": {"margin": [0.1]}, "reserve": 0.0, "band": None}
+    design = {"what": "design", "design": 0, "start": 0, "values": [1.1], "aim": 1.0, "violation": 0.0}
+    for value, held in ((1e-7, ["margin at 9 kPa at least 0 %"]), (1e-3, [])):
+        notes = [state, design | {"constraints": [value]}]
+        assert kept("flow at 6 kPa up", "margin at 9 kPa at least 0 %", notes=notes).active() == held
+
+
+def test_a_design_without_oscillations_has_no_margin_to_tell(recwarn):
+    rows = [{"pressure": p, "outcome": OUTCOMES.index("stable"), "margin": np.nan} for p in (6e3, 9e3)]
+    result = kept("flow at 6 kPa up", rows=rows)
+    assert result.evidence(0) == "stable at 2 heads, no mode oscillates" and not recwarn.list
+    rows[0]["margin"] = 0.02
+    assert kept("flow at 6 kPa up", rows=rows).evidence(0) == "stable at 2 heads, margin at least 2 %"
+
+
 @pytest.mark.parametrize(
     ("outcomes", "failures", "said"),
     [
