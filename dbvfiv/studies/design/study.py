@@ -346,8 +346,9 @@ class DesignResult(StudyResult):
         ]
         if unstable:
             return ", ".join(unstable) + gaps
-        margin = 100 * np.nanmin(rows["margin"])
-        return f"stable at {len(rows['pressure'])} heads, margin at least {margin:.3g} %{gaps}"
+        margins = rows["margin"][np.isfinite(rows["margin"])]
+        said = f"margin at least {100 * margins.min():.3g} %" if len(margins) else "no mode oscillates"
+        return f"stable at {len(rows['pressure'])} heads, {said}{gaps}"
 
     def summary(self) -> dict[str, Any]:
         aim, *constraints = self.statements

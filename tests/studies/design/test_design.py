@@ -229,7 +229,8 @@ def test_a_robust_design_keeps_its_reserve(valve):
 
 def kept(aim, *constraints, notes=(), rows=(), failures=()):
     """A complete result of a record with these notes and rows of verdicts."""
-    columns = {name: np.array([row.get(name, 0) for row in rows]) for name in ("design", "pressure", "outcome")}
+    names = ("design", "pressure", "outcome", "margin")
+    columns = {name: np.array([row.get(name, 0) for row in rows]) for name in names}
     record = SimpleNamespace(
         complete=True,
         failures=failures,
