@@ -181,17 +181,15 @@ class Neighbourhood:
         """
         require_number(self.model, name)
         value = _value(self.model, self.pressure, self.mu, name)
-        h = self.step * (abs(value) or 1.0)
-        inward = _inward(self.model.case, name, value, h)
-        if inward == 0:
-            return self._between(name, value, value - h, value + h)
-        reach = [sorted((value, value + inward * k * h)) for k in (1, 2)]
-        near, far = (self._between(name, value, *ends) for ends in reach)
+        spans = spans_about(self.model.case, name, value, self.step * (abs(value) or 1.0))
+        near, *far = (self._between(name, value, *ends) for ends in spans)
+        if not far:
+            return near
         values = [mode.eigenvalue for mode in self.modes]
         sizes = np.array([*(np.abs(self.sums) @ np.abs(values) if values else ()), *self.performance.values()])
-        if not near.is_like(far, np.abs(sizes) / (abs(value) or 1.0)):
+        if not near.is_like(*far, np.abs(sizes) / (abs(value) or 1.0)):
             raise SolveError(f"Nothing can be differentiated by {name} at {value:g}: next to it is another valve.")
-        return near.towards(far)
+        return near.towards(*far)
 
     def _between(self, name: str, value: float, low: float, high: float) -> Sensitivity:
         """Differences between two values of a parameter."""
@@ -339,6 +337,16 @@ def unit_of(case: Case, name: str) -> str:
     if quantity.startswith(("nu", "poisson", "x_0")):
         return ""
     return {"thickness": "m", "angle": "deg", "density": "kg/m^3"}.get(quantity, "Pa")
+
+
+def spans_about(case: Case, name: str, value: float, h: float) -> list[tuple[float, float]]:
+    """Pairs of values that a derivative by a parameter is taken between: one, a step h to both sides; at an end of what
+    the parameter may be two, of one step and of two towards its inside, twice the first difference less the second.
+    """
+    inward = _inward(case, name, value, h)
+    if inward == 0:
+        return [(value - h, value + h)]
+    return [(min(value, end), max(value, end)) for end in (value + inward * h, value + 2 * inward * h)]
 
 
 def _inward(case: Case, name: str, value: float, h: float) -> int:

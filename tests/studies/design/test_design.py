@@ -11,7 +11,10 @@ from dbvfiv.case.parameters import Mu
 from dbvfiv.case.statement import parse_statement
 from dbvfiv.errors import CaseError, NotValidError
 from dbvfiv.materials.shipped import shipped_loss
+from dbvfiv.model.closed import ClosedValve
+from dbvfiv.model.sizes import ValveSizes
 from dbvfiv.studies.case import thesis_case
+from dbvfiv.studies.design import problem as problem_module
 from dbvfiv.studies.design.problem import SHARPNESS, DesignProblem, Variable, statements_of, together
 from dbvfiv.studies.design.study import CASE, DesignResult, _changed, draw_heads
 from dbvfiv.studies.inputs import Plan, quasi_random
@@ -304,6 +307,19 @@ def test_seals_is_what_closure_finds():
     ends = [problem.at(problem.values_at(np.array([0.5, x, 0.5])), -50.0, False).values for x in (0.4995, 0.5005)]
     direct = (ends[1]["gap left"] - ends[0]["gap left"]) / 0.001
     assert 15e-3 * open_.slopes["gap left"][1] == pytest.approx(direct, rel=1e-3)
+
+
+def test_a_variable_at_the_end_of_its_key_has_derivatives_under_back_pressure(monkeypatch):
+    """Towards its inside: lips rise no less than 0. Of a state that stays at rest."""
+    keys = {"design.variables": {"valve.lip_rise": "0 mm:5 mm"}, "design.constraints": ["seals at 1 kPa"]}
+    at_rest = lambda case, _: (ClosedValve(case), np.zeros(ClosedValve(case).size))  # noqa: E731
+    monkeypatch.setattr(problem_module, "close_valve", at_rest)
+    monkeypatch.setattr(problem_module, "Neighbourhood", lambda *_: SimpleNamespace(tangent=lambda *_: None))
+    problem = DesignProblem(load_small(KEYS, ASKED, keys).case)
+    at, step = problem.at((0.0,), -1e3, False), 2.5e-5
+    near, far = (ValveSizes.of(ClosedValve(problem.case_at((k * step,)))).wall_mass for k in (1, 2))
+    direct = (4 * near - far - 3 * at.values["mass"]) / (2 * step)
+    assert at.slopes["mass"][0] == pytest.approx(direct, rel=1e-3) and direct != 0
 
 
 def test_several_heads_of_an_aim_count_together(valve):
