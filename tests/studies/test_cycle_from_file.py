@@ -189,6 +189,54 @@ def test_the_cycle_of_a_number_is_that_of_its_row(number, value):
     assert _cycle_of(thesis_case(keys), result).value == value
 
 
+def stored(kind, case, **more):
+    """A result of a case as `given_motion` reads it."""
+    return SimpleNamespace(kind=kind, case=case, mesh=SimpleNamespace(nodes=np.zeros((3, 3))), **more)
+
+
+@pytest.mark.parametrize(
+    ("over", "changes", "value"),
+    [
+        ("thickness=0.5:1.5:3", {"valve.thickness_factor": 0.9}, 0.9 / 1.2),
+        ("angle=30:60:4", {"layers.2.angle": 40.0, "layers.3.angle": -40.0}, 40.0),
+        ("strain=0.1:0.6:6", {"materials.strain_level": 0.2}, 0.2),
+        ("pipe_length=1:9:3", {"upstream.length": 5.0, "upstream.diameter": 0.3}, 5.0),
+        ("pipe_length=1:9:3", {}, None),
+    ],
+)
+def test_a_motion_starts_at_the_value_that_its_own_valve_has(monkeypatch, over, changes, value):
+    """Parameters of the wall and of pipes too; a factor on the thickness counts from this case."""
+    line = {"upstream__length": 2.0, "upstream__diameter": 0.3} if "pipe" in over else {}
+    keys = {"cycle__start": "file", "cycle__start_file": "run.h5", "cycle__over": over, "valve__thickness_factor": 1.2}
+    case = session_of(**keys | line).case
+    monkeypatch.setattr(start, "load_result", lambda _: stored("transient", thesis_case(changes)))
+    monkeypatch.setattr(start, "_last_period", lambda model, *_: model)
+    monkeypatch.setattr(start, "ValveModel", lambda case: case.upstream.length)
+    model = SimpleNamespace(mesh=SimpleNamespace(nodes=np.zeros((3, 3))), pump=None, case=case)
+    walk = SimpleNamespace(built=lambda _: SimpleNamespace(model=model))
+    if value is None:
+        with pytest.raises(CaseError, match="has no one pipe_length to start from"):
+            start.given_motion(case, walk)
+        return
+    given = start.given_motion(case, walk)
+    assert given.value == pytest.approx(value) and given.place[case.cycle.axis.parameter] == given.value
+    assert given.motion == (value if line else model)  # the line that the run had
+
+
+def test_the_cycle_nearest_to_this_wall_is_taken():
+    """Of a branch over the thickness, which counts from the wall of its own case; one over a line that is not there
+    needs a number.
+    """
+    points = [SimpleNamespace(number=k, value=value) for k, value in enumerate((0.8, 1.0, 1.2))]
+    result = stored("cycle", thesis_case({"valve.thickness_factor": 0.5}), points=points, parameter="thickness")
+    result.nearest = lambda value: min(points, key=lambda point: abs(point.value - value))
+    case = thesis_case({"cycle.over": "pressure=5 kPa:6 kPa:2", "valve.thickness_factor": 0.58})
+    assert _cycle_of(case, result).value == 1.2
+    result.parameter = "pipe_length"
+    with pytest.raises(CaseError, match="of which this valve has no one value; give cycle.start_cycle"):
+        _cycle_of(case, result)
+
+
 def test_files_that_nothing_starts_from(file, tmp_path):
     with pytest.raises(CaseError, match=r"cycle.start_file.*none with start = 'file'"):
         session_of(cycle__start="file")
