@@ -399,8 +399,10 @@ def _goes_on(rest: float, first: float, second: float, ratio: float) -> bool:
     """True where values a r^2 + b r^4 over those at rest, of cycles with amplitudes of a ratio, have no extreme up to
     the second one.
     """
-    square = ratio**2
-    return (2 * square - 1) * (second - rest) * np.sign(first - rest) > square**2 * abs(first - rest)
+    square, first, second = ratio**2, first - rest, second - rest
+    # slopes by r^2 at rest and at the second cycle, over a factor: of one sign, and so are those between
+    at_rest, at_second = square**2 * first - second, (2 * square - 1) * second - square**2 * first
+    return at_rest * at_second > 0
 
 
 class _AtRest:

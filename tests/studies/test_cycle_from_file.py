@@ -117,7 +117,8 @@ def test_a_branch_that_turns_round_at_once_begins_with_its_smaller_cycles():
 @pytest.mark.parametrize("side", [1.0, -1.0])
 @pytest.mark.parametrize("ratio", [2.0, 1.25])
 def test_a_fold_up_to_the_second_cycle_is_seen_by_its_value(side, ratio):
-    for fold, goes_on in ((0.9 * ratio, False), (1.1 * ratio, True)):
+    """Also one so far below the first cycle that both lie beyond the onset."""
+    for fold, goes_on in ((0.5, False), (0.65, False), (0.9 * ratio, False), (1.1 * ratio, True)):
         values = [5.0 + side * r**2 * (1 - 0.5 * (r / fold) ** 2) for r in (0.0, 1.0, ratio)]
         assert _goes_on(*values, ratio) == goes_on
 
