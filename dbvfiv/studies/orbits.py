@@ -16,7 +16,7 @@ from continuation.options import ContinuationError, ContinuationOptions, OrbitOp
 from continuation.periodic import PeriodicMotion, peak
 
 from ..case.parameters import PARAMETERS, Mu
-from ..errors import SolveError
+from ..errors import CaseError, SolveError
 from ..flow.law import FlowLaw
 from ..flow.stepping import MovingFluid
 from ..flow.terms.pump import with_static_lift
@@ -180,8 +180,26 @@ STEP = 0.2
 HARMONICS = 4
 #: Amplitude of the second cycle over that of the first, and where a fold lies between these two.
 SECOND, NEARER = 2.0, 1.25
+#: Amplitudes tried, each half the one before, until the first cycles lie within the range.
+HALVINGS = 6
 #: The lips just touch at their middle.
 TOUCHING = "lips touch"
+
+
+class _Refused(OutOfDomain):
+    """A value that the case does not allow."""
+
+
+def _refusing(models: Callable[[Mapping[str, float]], ValveModel]) -> Callable[[Mapping[str, float]], ValveModel]:
+    """Models for parameters that say to a branch where there is none."""
+
+    def model(mu: Mapping[str, float]) -> ValveModel:
+        try:
+            return models(mu)
+        except CaseError as error:
+            raise _Refused(str(error)) from error
+
+    return model
 
 
 class Follower:
@@ -210,7 +228,7 @@ class Follower:
         self._flows: dict[float, FlowLaw] = {}
         models = models_of(case, walk.built(Mu.of(case)).model)
         flow = self._flow if models(place.for_system()).pump is not None else None
-        self.system = PeriodicValve(models, place.for_system(), flow)
+        self.system = PeriodicValve(_refusing(models), place.for_system(), flow)
         self.solver = CycleSolver(self.system, _basis(self.system, spectrum))
         self.name = PARAMETERS[parameter].system_name or parameter
         model = self.system.model(place.for_system())
@@ -252,16 +270,41 @@ class Follower:
         motion = PeriodicMotion.of_waves((rest, np.zeros_like(rest)), HARMONICS, abs(onset.eigenvalue.imag))
         return Cycle(motion, mu, 0.0, 0, 0)
 
-    def from_onset(self, onset: Onset) -> tuple[Cycle, Cycle, Cycle, bool]:
+    def from_onset(self, onset: Onset, values: Sequence[float]) -> tuple[Cycle, Cycle, Cycle, bool]:
         """The steady state at an onset, as a cycle at rest, and two small cycles beside it, of the amplitude asked for
-        and somewhat more; and whether the branch goes on from the onset without a fold up to the second one.
+        and somewhat more, or of as much less as it takes that they lie within ascending values; and whether the branch
+        goes on from the onset without a fold up to the second one.
 
         Raises
         ------
         SolveError
         """
+        for amplitude in self.case.cycle.amplitude * 0.5 ** np.arange(HALVINGS):
+            why = "cycles lie beyond the range"
+            try:
+                found = self._beside_rest(onset, amplitude)
+                if all(values[0] <= cycle.mu[self.name] <= values[-1] for cycle in found[1:3]):
+                    return found
+            except _Refused as error:
+                why = str(error)
+            except ContinuationError as error:
+                why = str(error)
+                break
+        raise SolveError(
+            f"The oscillation that starts at {self.parameter} = {onset.value:.6g} was not found with an amplitude "
+            f"of {amplitude * 1e3:.3g} mm (cycle.amplitude): {why.rstrip('.')}."
+        )
+
+    def _beside_rest(self, onset: Onset, amplitude: float) -> tuple[Cycle, Cycle, Cycle, bool]:
+        """As `from_onset`, with the amplitude, m, of the first cycle, wherever cycles lie.
+
+        Raises
+        ------
+        SolveError
+        ContinuationError
+        """
         mu, mode = onset.place.for_system(), onset.mode
-        still, amplitude = self.at_rest(onset).motion.coefficients[0], self.case.cycle.amplitude
+        still = self.at_rest(onset).motion.coefficients[0]
         shape = np.concatenate([mode.q, mode.u])
         if abs(shape[self.lip]) < 1e-6 * np.abs(mode.q).max():
             raise SolveError(
@@ -271,17 +314,11 @@ class Follower:
         small = PeriodicMotion.of_waves(waves, HARMONICS, abs(onset.eigenvalue.imag))
         row = np.zeros_like(small.coefficients)
         row[1, self.lip] = 1.0
-        try:
-            for ratio in (SECOND, NEARER):
-                rest, first, second = cycles_beside_onset(self.solver, small, mu, self.name, row, ratio)
-                if rises := _goes_on(*(cycle.mu[self.name] for cycle in (rest, first, second)), ratio):
-                    break
-            return rest, first, second, rises
-        except ContinuationError as error:
-            raise SolveError(
-                f"The oscillation that starts at {self.parameter} = {onset.value:.6g} was not found with an amplitude "
-                f"of {amplitude * 1e3:.3g} mm (cycle.amplitude): {error}"
-            ) from error
+        for ratio in (SECOND, NEARER):
+            rest, first, second = cycles_beside_onset(self.solver, small, mu, self.name, row, ratio)
+            if rises := _goes_on(*(cycle.mu[self.name] for cycle in (rest, first, second)), ratio):
+                break
+        return rest, first, second, rises
 
     def amplitude(self, onset: Onset) -> tuple[AmplitudeEquation, float]:
         """Amplitude equation of the mode of an onset, or of a nearly neutral one beside it, for the displacement of the
@@ -346,7 +383,7 @@ class Follower:
         The first cycles are two small ones, and those at the values nearer to the onset. The second value returned is
         why some of the latter were not found. `known` are special points as `CycleTracer` has them.
         """
-        rest, first, second, rises = self.from_onset(onset)
+        rest, first, second, rises = self.from_onset(onset, values)
         last, cycles, missed = second if rises else first, [first, second], []
         if not rises:
             missed.append(

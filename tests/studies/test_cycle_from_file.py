@@ -18,7 +18,7 @@ from dbvfiv.record.record import GrowingRecord
 from dbvfiv.studies.case import thesis_case
 from dbvfiv.studies.cycle import start, study
 from dbvfiv.studies.cycle.start import _cycle_of
-from dbvfiv.studies.orbits import Follower, _goes_on
+from dbvfiv.studies.orbits import Follower, _goes_on, _Refused
 from dbvfiv.studies.session import load_result, resume_result
 from tests.observers import Stop
 from tests.studies.test_cycle import session_of
@@ -107,11 +107,31 @@ def test_a_branch_that_turns_round_at_once_begins_with_its_smaller_cycles():
     follower, taken, tracer = object.__new__(Follower), [], SimpleNamespace()
     tracer.extend = lambda cycle, asked, *_: taken.append((cycle.mu["density"], asked))
     vars(follower).update(name="density", parameter="density", lip=0, tracer=lambda *_: tracer)
-    follower.from_onset = lambda _: (made_cycle(0.0, 240.0), made_cycle(1.0, 238.0), made_cycle(1.25, 239.0), False)
+    follower.from_onset = lambda *_: (made_cycle(0.0, 240.0), made_cycle(1.0, 238.0), made_cycle(1.25, 239.0), False)
     follower.beside = lambda _onset, _first, value: made_cycle(0.5, value)
     _, missed = follower.begin(SimpleNamespace(value=240.0), [200.0, 239.5], None)
     assert taken == [(239.5, True), (238.0, False), (239.0, False)]
     assert len(missed) == 1 and "turns round beside the onset" in missed[0]
+
+
+@pytest.mark.parametrize(("end", "taken"), [(250.0, 1e-3), (240.2, 1.25e-4)])
+def test_first_cycles_lie_within_the_range(end, taken):
+    """Smaller ones than asked for beside an end of it, where larger ones would lie beyond."""
+    follower, tried = object.__new__(Follower), []
+    case = SimpleNamespace(cycle=SimpleNamespace(amplitude=1e-3))
+    vars(follower).update(name="density", parameter="density", case=case)
+
+    def beside(_onset, amplitude):
+        tried.append(amplitude)
+        if amplitude == 5e-4:
+            raise _Refused("It must be at most 241.")
+        return *(made_cycle(k * amplitude, 240.0 + 2e6 * (k * amplitude) ** 2) for k in (0, 1, 2)), True
+
+    follower._beside_rest = beside
+    rest, first, second, _ = follower.from_onset(SimpleNamespace(value=240.0), [200.0, end])
+    assert tried[-1] == taken and rest.mu["density"] < first.mu["density"] < second.mu["density"] <= end
+    with pytest.raises(SolveError, match=r"cycle.amplitude\): cycles lie beyond the range"):
+        follower.from_onset(SimpleNamespace(value=240.0), [200.0, 240.0])
 
 
 @pytest.mark.parametrize("side", [1.0, -1.0])
