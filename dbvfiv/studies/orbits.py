@@ -18,7 +18,6 @@ from continuation.periodic import PeriodicMotion, peak
 from ..case.parameters import PARAMETERS, Mu
 from ..errors import CaseError, SolveError
 from ..flow.law import FlowLaw
-from ..flow.stepping import MovingFluid
 from ..flow.terms.pump import with_static_lift
 from ..model.forms import ValveForms
 from ..model.state import LipCentre
@@ -146,24 +145,21 @@ class Orbit:
 
     @cached_property
     def flow(self) -> tuple[np.ndarray, np.ndarray]:
-        """Mass flow at the lip, kg/s of the whole valve, at the samples of the series, and the least speed at any row
-        then, m/s; (N,) each.
-        """
-        model, density = self.model, self.mu["density"]
-        rates, samples = self.motion.rates, self.motion.samples
-        n = model.size
-        area = np.stack([model.rows.areas(model.nodal(x)) for x in samples[:, :n]])
-        opening, inlet = rates.apply(1, area), samples[:, n]
-        if model.flow.own_velocities(samples[0, n:]) is not None:
-            speeds = np.stack([model.flow.own_velocities(x) for x in samples[:, n:]])
-        elif not model.flow.unsteady:
-            speeds = np.stack([model.flow.velocities(a, u) for a, u in zip(area, inlet)])
-        else:
-            fluid = MovingFluid(model.flow, density)
-            speeds = np.stack([fluid.speeds(a, r, x) for a, r, x in zip(area, opening, samples[:, n:])])
-        open_area = np.array([model.flow.open_area(a) for a in area[:, 0]])
-        out = model.mesh.part.copies * density * speeds[:, 0] * open_area
+        """(k,) mass flow at the lip, kg/s of the whole valve, and least speed at any row, m/s."""
+        model, density, n = self.model, self.mu["density"], self.model.size
+        samples, rates, _ = self.motion.with_rates(self.phases)
+        nodal = [model.nodal(x) for x in samples[:, :n]]
+        area = np.stack([model.rows.areas(x) for x in nodal])
+        opening = np.stack([model.rows.jacobian(x) @ v for x, v in zip(nodal, rates[:, :n])])
+        speeds = model.flow.moving_velocities(area, opening, samples[:, n:], self.mu)
+        out = model.mesh.part.copies * density * speeds[:, 0] * model.flow.open_area(area[:, 0])
         return out, speeds.min(axis=1)
+
+    @property
+    def flow_extremes(self) -> tuple[float, float]:
+        """Least and largest mass flow at the lip, kg/s, between instants too."""
+        flow, _ = self.flow
+        return -float(peak(-flow)), float(peak(flow))
 
     def opening(self) -> float:
         """Least clear opening between the inner faces of both lips at x = z = 0, m; below zero where they cross."""

@@ -9,8 +9,10 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from continuation.periodic import PeriodicMotion
 from dbvfiv.case.parameters import Mu
 from dbvfiv.errors import CaseError, SolveError
+from dbvfiv.flow.channel import Channel
 from dbvfiv.motion.equations import ValveMotion
 from dbvfiv.motion.scheme import scheme
 from dbvfiv.motion.stepper import Stepper, consistent_state
@@ -120,6 +122,24 @@ def test_a_record_is_the_run_that_it_is(tmp_path, command_line):
     assert lines[0]["says"].startswith("It is run")
     faster = beside(command_line, tmp_path, (0.5 * time, lip + noise), tmp_path / "run.h5", "--within", "1")
     assert faster[0]["says"].startswith("None of them")
+
+
+def test_the_flow_of_a_cycle_is_that_of_its_parameters_at_all_instants():
+    """What a wall displaces leaves by the blend of the flow models that a cycle has, and its largest flow lies between
+    the samples of the series.
+    """
+    model = SimpleNamespace(size=7, nodal=lambda x: x, flow=Channel(np.linspace(0.0, 0.6, 7), 1e-9))
+    model.rows = SimpleNamespace(areas=lambda x: x, jacobian=lambda _: np.eye(7))
+    model.mesh = SimpleNamespace(part=SimpleNamespace(copies=4))
+    mean, swing = np.linspace(1e-3, 5e-3, 7), np.append(np.full(6, 1e-4), 0.0)  # at 2 m/s 0.01 m3/s flow in
+    waves = np.append(mean, 2.0), np.append(0.5 * np.exp(0.4j) * swing, 0.0)
+    motion, turn = PeriodicMotion.of_waves(waves, 1, 200.0), 2 * np.pi * np.linspace(0.0, 1.0, 5000)
+    for storage in (0.0, 0.25, 1.0):
+        orbit = Orbit(model, {"inlet": 1e3, "density": 800.0, "storage": storage}, motion)
+        moved = storage * 200.0 * 0.1 * (0.5 + 5.0) * 1e-4  # by trapezoids over the length
+        assert orbit.flow_extremes == pytest.approx((3200 * (0.01 - moved), 3200 * (0.01 + moved)), rel=1e-6)
+        at_lip = (0.01 + moved * np.sin(turn)) / (1e-3 + 1e-4 * np.cos(turn))
+        assert orbit.flow[1].min() == pytest.approx(min(2.0, at_lip.min()), rel=1e-3)
 
 
 def test_lips_that_stand_apart_touch_where_their_faces_meet():
