@@ -149,7 +149,7 @@ class Neighbourhood:
     @cached_property
     def performance(self) -> dict[str, float]:
         """Values by the names of `PERFORMANCE`."""
-        return _performance(self.model, self.q, self.pressure)
+        return _performance(self.model, self.q, self.pressure, self.mu)
 
     @cached_property
     def _factor(self):
@@ -197,7 +197,7 @@ class Neighbourhood:
         places, moved = [self.q, self.q], self.tangent([end[:2] for end in ends], high - low)
         if moved is not None:
             places = [self.q + (end - value) * moved for end in (low, high)]
-        below, above = (_performance(model, q, pressure) for (model, pressure, _), q in zip(ends, places))
+        below, above = (_performance(model, q, pressure, mu) for (model, pressure, mu), q in zip(ends, places))
         performance = {key: (above[key] - below[key]) / (high - low) for key in below}
         return Sensitivity(name, value, self._eigenvalues(ends, places, high - low), performance)
 
@@ -269,13 +269,16 @@ class Neighbourhood:
         return self.model.outside.panels(self.q)
 
 
-def _performance(model: ValveModel, q: np.ndarray, pressure: float) -> dict[str, float]:
-    """Values by the names of `PERFORMANCE`; NaN for those of a flow where nothing flows."""
+def _performance(model: ValveModel, q: np.ndarray, pressure: float, mu: Mu) -> dict[str, float]:
+    """Values by the names of `PERFORMANCE`, the flow in the fluid of the parameter point; NaN for those of a flow where
+    nothing flows.
+    """
     known = {"converged": True, "iterations": 0, "load_steps": 0, "residual": 0.0, "rounding": 0.0, "reason": ""}
     state = describe_state(model, q, pressure, **known)
     loss = state.hydraulics.loss_coefficient if state.hydraulics else np.nan
     mass = ValveSizes.of(model).wall_mass
-    return dict(zip(PERFORMANCE, (state.volume_flow, state.outlet_area, loss, mass)))
+    flow = state.volume_flow_of(mu["density"])
+    return dict(zip(PERFORMANCE, (flow, state.outlet_area, loss, mass)))
 
 
 def parameters_of(model: ValveModel) -> tuple[str, ...]:
