@@ -225,7 +225,9 @@ class Follower:
         models = models_of(case, walk.built(Mu.of(case)).model)
         flow = self._flow if models(place.for_system()).pump is not None else None
         self.system = PeriodicValve(_refusing(models), place.for_system(), flow)
-        self.solver = CycleSolver(self.system, _basis(self.system, spectrum))
+        modes = (spectrum.mode(i) for i in range(len(spectrum.eigenvalues)))
+        basis = _basis(self.system, [walk.unknowns(place, mode) for mode in modes])
+        self.solver = CycleSolver(self.system, basis)
         self.name = PARAMETERS[parameter].system_name or parameter
         model = self.system.model(place.for_system())
         #: Number of the displacement in y of the lip at x = z = 0 among the unknowns.
@@ -301,7 +303,7 @@ class Follower:
         """
         mu, mode = onset.place.for_system(), onset.mode
         still = self.at_rest(onset).motion.coefficients[0]
-        shape = np.concatenate([mode.q, mode.u])
+        shape = self.walk.unknowns(onset.place, mode)
         if abs(shape[self.lip]) < 1e-6 * np.abs(mode.q).max():
             raise SolveError(
                 "The mode that becomes unstable does not move the middle of the lips, by which cycles are told."
@@ -330,7 +332,7 @@ class Follower:
         weight = np.append(np.ones(n), np.full(self.system.inner, self.system.flow_weight))
         row, rest = np.zeros(self.system.size), forms.rest[self.lip]
         row[self.lip] = 1.0
-        mode = np.concatenate([onset.mode.q, onset.mode.u])
+        mode = self.walk.unknowns(onset.place, onset.mode)
         try:
             found = amplitude_equation(
                 forms, lambda motion: self.system.residual(motion, mu) / weight, onset.eigenvalue, mode, row, abs(rest)
@@ -446,13 +448,9 @@ class _AtRest:
         self.rest = np.concatenate([forms.q, forms.rest[2 * len(forms.q) :]])
 
 
-def _basis(system: PeriodicValve, spectrum) -> np.ndarray:
-    """(n + l, r) leading modes, and each of the flow's unknowns, over their sizes."""
-    columns = []
-    for i in range(len(spectrum.eigenvalues)):
-        mode = spectrum.mode(i)
-        vector = np.concatenate([mode.q, mode.u])
-        columns += [vector.real, vector.imag]
+def _basis(system: PeriodicValve, modes: Sequence[np.ndarray]) -> np.ndarray:
+    """(n + l, r) leading modes, complex (n + l,), and each of the flow's unknowns, over their sizes."""
+    columns = [part for mode in modes for part in (mode.real, mode.imag)]
     columns += list(np.eye(system.inner, system.size, system.size - system.inner))
     sizes = [np.linalg.norm(x / system.scales) for x in columns]
     return np.array([x / s for x, s in zip(columns, sizes) if s > 0]).T

@@ -428,4 +428,4 @@ def normal_form(case: Case, walk: StabilityWalk, place: Mu, mode, parameter: str
     name = PARAMETERS[parameter].system_name or None if follows else None
     own = walk.built(place.only(*(name for name in place if name not in DESIGN))).model
     forms = ValveForms(models_of(case, own)(mu), walk.equilibrium(place), mu)
-    return hopf_normal_form_of(forms, abs(complex(mode.eigenvalue).imag), np.concatenate([mode.q, mode.u]), name)
+    return hopf_normal_form_of(forms, abs(complex(mode.eigenvalue).imag), walk.unknowns(place, mode), name)
