@@ -13,7 +13,9 @@ from dbvfiv.case import CaseError
 from dbvfiv.case.parameters import Mu
 from dbvfiv.case.quantity import GRAVITY
 from dbvfiv.errors import SolveError
+from dbvfiv.flow.terms import pump
 from dbvfiv.studies.case import thesis_case
+from dbvfiv.studies.cycle import start
 from dbvfiv.studies.orbits import Follower
 from dbvfiv.studies.stability.walk import StabilityWalk
 from tests.small_valves import SMALL, load_small, settings
@@ -99,6 +101,28 @@ def test_cycles_begin_at_the_state_that_spectra_are_of(operating):
     rest = follower.at_rest(SimpleNamespace(place=place, eigenvalue=10j))
     left, scale = follower.system.residual(rest.motion, rest.mu), walk.built(place).model.force_scale
     assert np.linalg.norm(left[0]) < 1e-6 * scale(walk.equilibrium(place), pressure)
+
+
+def test_the_last_period_of_a_run_is_behind_the_pump_of_the_run(monkeypatch):
+    """At the pressure of the case a pump has its own head; at another one, which a branch may be at, one more."""
+    case, asked = load(PUMP, {"drive.pressure": 20e3}).case, []
+    state = SimpleNamespace(nodal=np.zeros(2), nodal_rate=np.zeros(2), station_velocity=[1.0])
+    now = SimpleNamespace(q=np.zeros(2), fluid=SimpleNamespace(velocity=1.0))
+    shell = SimpleNamespace(dofs=SimpleNamespace(restrict=lambda nodal: nodal))
+    model = SimpleNamespace(pump=pump.from_case(case), flow=SimpleNamespace(inner=1), shell=shell)
+    monkeypatch.setattr(start, "ValveMotion", lambda *_: None)
+    monkeypatch.setattr(
+        start, "consistent_state", lambda _motion, _time, q, v, inlet, inner: asked.append(inlet) or now
+    )
+    step = SimpleNamespace(step=lambda *_: SimpleNamespace(state=now))
+    monkeypatch.setattr(start, "Stepper", lambda _motion, _scheme, inlet: asked.append(inlet(0.0)) or step)
+    run = SimpleNamespace(states=[state], verdict={"verdict": "limit cycle", "mass_flow": {}})
+    run.verdict["lip_displacement"] = {"verdict": "limit cycle", "frequency": 10.0}
+    start._last_period(model, case, Mu.of(case).at(pressure=15e3), run)
+    assert [model.pump.pressure(inlet, 0.03) for inlet in asked] == pytest.approx([1000 * GRAVITY * 2.6] * 2)
+    model.pump = None
+    start._last_period(model, case, Mu.of(case).at(pressure=15e3), run)
+    assert asked[2:] == [15e3, 15e3]
 
 
 def test_a_flow_beyond_the_table_is_told():

@@ -193,7 +193,8 @@ def _last_period(model: ValveModel, case: Case, place: Mu, result) -> PeriodicMo
             "states do not hold the waves; start it from an onset, or from a cycle.",
             key="cycle.start_file",
         )
-    state, inlet, period = result.states[-1], place.pressure, 1.0 / frequency
+    state, period = result.states[-1], 1.0 / frequency
+    inlet = place.pressure if model.pump is None else case.drive.pressure  # at which a pump has no lift on top
     motion = ValveMotion(model, place)
     dofs = model.shell.dofs
     speed = float(state.station_velocity[-1])
