@@ -406,6 +406,13 @@ class FlowLaw(Traceable, ABC):
         """
         return None
 
+    def moving_velocities(self, area, area_rate, inner, given: Mapping[str, float]) -> np.ndarray:
+        """Velocities (k, m) at all stations, m/s, in passages with areas and rates (k, m) and the law's unknowns (k, l)
+        under given parameters.
+        """
+        parameters = self.values(given)
+        return np.asarray(jax.vmap(lambda *at: self.speeds_of(*at, parameters))(area, area_rate, inner))
+
     def velocities(self, area: np.ndarray, velocity: float) -> np.ndarray:
         """Steady velocities (m,) of a fluid of constant density at all stations from the inlet velocity; zero without a
         fluid.

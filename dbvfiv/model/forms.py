@@ -8,6 +8,7 @@ Steady stresses, pressures and lip stops do not relax.
 from __future__ import annotations
 
 from collections.abc import Mapping
+from copy import copy
 from functools import cached_property
 from itertools import product
 
@@ -18,6 +19,7 @@ from continuation.system import expand
 from eigen.factor import Workspace, first_regular
 from eigen.operator import CoupledPencil, real_apply
 
+from ..flow.terms.pump import with_static_lift
 from .dynamics import linearise
 from .residual import ValveResidual
 from .valve import ValveModel
@@ -33,15 +35,19 @@ class ValveForms:
     ----------
     model : ValveModel
     q : (n,) array
-        Displacements of the steady state.
+        Displacements of the steady state; behind a pump a static lift gives it the pressure of `mu`, as in spectra.
     mu : mapping
         Parameters by their names in the equations (`Mu.for_system`), `loss_factor` among them where the wall relaxes.
     """
 
     def __init__(self, model: ValveModel, q: np.ndarray, mu: Mapping[str, float]):
-        self.model, self.q, self.mu = model, np.asarray(q, float), dict(mu)
-        self._analytic = ValveResidual(model)
-        inner = model.flow.steady_inner(model.rows.areas(model.nodal(self.q)), self.mu)
+        self.q, self.mu = np.asarray(q, float), dict(mu)
+        area = model.rows.areas(model.nodal(self.q))
+        inner = model.flow.steady_inner(area, self.mu)
+        if model.pump is not None:
+            model = copy(model)
+            model.flow = with_static_lift(model.flow, area, inner, self.mu)
+        self.model, self._analytic = model, ValveResidual(model)
         zero = np.zeros(model.size)
         self._motion = (self.q, zero, zero, inner, np.zeros_like(inner))
         self._coupled = linearise(model, self.q, self.mu["inlet"], self.mu, inner).pencil(self.mu)

@@ -110,6 +110,12 @@ class SteadyState:
         """True where the faces of a bill that is moulded shut let nothing pass."""
         return not self.mass_flow > 0
 
+    def volume_flow_of(self, density: float) -> float:
+        """Volume flow, m3/s, of a fluid of another density, kg/m3, at the same state: pressures stay, and the speeds go
+        with the inverse root of the density.
+        """
+        return float(np.sqrt(self.mass_flow * self.volume_flow / density))
+
     @property
     def hydraulics(self) -> Hydraulics | None:
         """Heads, loss and coefficients; None where nothing flows."""

@@ -17,9 +17,8 @@ from continuation.options import ContinuationError, ContinuationOptions, OrbitOp
 from continuation.periodic import PeriodicMotion, peak
 
 from ..case.parameters import PARAMETERS, Mu
-from ..errors import SolveError
+from ..errors import CaseError, SolveError
 from ..flow.law import FlowLaw
-from ..flow.stepping import MovingFluid
 from ..flow.terms.pump import with_static_lift
 from ..model.forms import ValveForms
 from ..model.state import LipCentre
@@ -147,24 +146,21 @@ class Orbit:
 
     @cached_property
     def flow(self) -> tuple[np.ndarray, np.ndarray]:
-        """Mass flow at the lip, kg/s of the whole valve, at the samples of the series, and the least speed at any row
-        then, m/s; (N,) each.
-        """
-        model, density = self.model, self.mu["density"]
-        rates, samples = self.motion.rates, self.motion.samples
-        n = model.size
-        area = np.stack([model.rows.areas(model.nodal(x)) for x in samples[:, :n]])
-        opening, inlet = rates.apply(1, area), samples[:, n]
-        if model.flow.own_velocities(samples[0, n:]) is not None:
-            speeds = np.stack([model.flow.own_velocities(x) for x in samples[:, n:]])
-        elif not model.flow.unsteady:
-            speeds = np.stack([model.flow.velocities(a, u) for a, u in zip(area, inlet)])
-        else:
-            fluid = MovingFluid(model.flow, density)
-            speeds = np.stack([fluid.speeds(a, r, x) for a, r, x in zip(area, opening, samples[:, n:])])
-        open_area = np.array([model.flow.open_area(a) for a in area[:, 0]])
-        out = model.mesh.part.copies * density * speeds[:, 0] * open_area
+        """(k,) mass flow at the lip, kg/s of the whole valve, and least speed at any row, m/s."""
+        model, density, n = self.model, self.mu["density"], self.model.size
+        samples, rates, _ = self.motion.with_rates(self.phases)
+        nodal = [model.nodal(x) for x in samples[:, :n]]
+        area = np.stack([model.rows.areas(x) for x in nodal])
+        opening = np.stack([model.rows.jacobian(x) @ v for x, v in zip(nodal, rates[:, :n])])
+        speeds = model.flow.moving_velocities(area, opening, samples[:, n:], self.mu)
+        out = model.mesh.part.copies * density * speeds[:, 0] * model.flow.open_area(area[:, 0])
         return out, speeds.min(axis=1)
+
+    @property
+    def flow_extremes(self) -> tuple[float, float]:
+        """Least and largest mass flow at the lip, kg/s, between instants too."""
+        flow, _ = self.flow
+        return -float(peak(-flow)), float(peak(flow))
 
     def opening(self) -> float:
         """Least clear opening between the inner faces of both lips at x = z = 0, m; below zero where they cross."""
@@ -181,8 +177,26 @@ STEP = 0.2
 HARMONICS = 4
 #: Amplitude of the second cycle over that of the first, and where a fold lies between these two.
 SECOND, NEARER = 2.0, 1.25
+#: Amplitudes tried, each half the one before, until the first cycles lie within the range.
+HALVINGS = 6
 #: The lips just touch at their middle.
 TOUCHING = "lips touch"
+
+
+class _Refused(OutOfDomain):
+    """A value that the case does not allow."""
+
+
+def _refusing(models: Callable[[Mapping[str, float]], ValveModel]) -> Callable[[Mapping[str, float]], ValveModel]:
+    """Models for parameters that say to a branch where there is none."""
+
+    def model(mu: Mapping[str, float]) -> ValveModel:
+        try:
+            return models(mu)
+        except CaseError as error:
+            raise _Refused(str(error)) from error
+
+    return model
 
 
 class Follower:
@@ -211,8 +225,10 @@ class Follower:
         self._flows: dict[float, FlowLaw] = {}
         models = models_of(case, walk.built(Mu.of(case)).model)
         flow = self._flow if models(place.for_system()).pump is not None else None
-        self.system = PeriodicValve(models, place.for_system(), flow)
-        self.solver = CycleSolver(self.system, _basis(self.system, spectrum))
+        self.system = PeriodicValve(_refusing(models), place.for_system(), flow)
+        modes = (spectrum.mode(i) for i in range(len(spectrum.eigenvalues)))
+        basis = _basis(self.system, [walk.unknowns(place, mode) for mode in modes])
+        self.solver = CycleSolver(self.system, basis)
         self.name = PARAMETERS[parameter].system_name or parameter
         model = self.system.model(place.for_system())
         #: Number of the displacement in y of the lip at x = z = 0 among the unknowns.
@@ -253,17 +269,42 @@ class Follower:
         motion = PeriodicMotion.of_waves((rest, np.zeros_like(rest)), HARMONICS, abs(onset.eigenvalue.imag))
         return Cycle(motion, mu, 0.0, 0, 0)
 
-    def from_onset(self, onset: Onset) -> tuple[Cycle, Cycle, Cycle, bool]:
+    def from_onset(self, onset: Onset, values: Sequence[float]) -> tuple[Cycle, Cycle, Cycle, bool]:
         """The steady state at an onset, as a cycle at rest, and two small cycles beside it, of the amplitude asked for
-        and somewhat more; and whether the branch goes on from the onset without a fold up to the second one.
+        and somewhat more, or of as much less as it takes that they lie within ascending values; and whether the branch
+        goes on from the onset without a fold up to the second one.
 
         Raises
         ------
         SolveError
         """
+        for amplitude in self.case.cycle.amplitude * 0.5 ** np.arange(HALVINGS):
+            why = "cycles lie beyond the range"
+            try:
+                found = self._beside_rest(onset, amplitude)
+                if all(values[0] <= cycle.mu[self.name] <= values[-1] for cycle in found[1:3]):
+                    return found
+            except _Refused as error:
+                why = str(error)
+            except ContinuationError as error:
+                why = str(error)
+                break
+        raise SolveError(
+            f"The oscillation that starts at {self.parameter} = {onset.value:.6g} was not found with an amplitude "
+            f"of {amplitude * 1e3:.3g} mm (cycle.amplitude): {why.rstrip('.')}."
+        )
+
+    def _beside_rest(self, onset: Onset, amplitude: float) -> tuple[Cycle, Cycle, Cycle, bool]:
+        """As `from_onset`, with the amplitude, m, of the first cycle, wherever cycles lie.
+
+        Raises
+        ------
+        SolveError
+        ContinuationError
+        """
         mu, mode = onset.place.for_system(), onset.mode
-        still, amplitude = self.at_rest(onset).motion.coefficients[0], self.case.cycle.amplitude
-        shape = np.concatenate([mode.q, mode.u])
+        still = self.at_rest(onset).motion.coefficients[0]
+        shape = self.walk.unknowns(onset.place, mode)
         if abs(shape[self.lip]) < 1e-6 * np.abs(mode.q).max():
             raise SolveError(
                 "The mode that becomes unstable does not move the middle of the lips, by which cycles are told."
@@ -272,17 +313,11 @@ class Follower:
         small = PeriodicMotion.of_waves(waves, HARMONICS, abs(onset.eigenvalue.imag))
         row = np.zeros_like(small.coefficients)
         row[1, self.lip] = 1.0
-        try:
-            for ratio in (SECOND, NEARER):
-                rest, first, second = cycles_beside_onset(self.solver, small, mu, self.name, row, ratio)
-                if rises := _goes_on(*(cycle.mu[self.name] for cycle in (rest, first, second)), ratio):
-                    break
-            return rest, first, second, rises
-        except ContinuationError as error:
-            raise SolveError(
-                f"The oscillation that starts at {self.parameter} = {onset.value:.6g} was not found with an amplitude "
-                f"of {amplitude * 1e3:.3g} mm (cycle.amplitude): {error}"
-            ) from error
+        for ratio in (SECOND, NEARER):
+            rest, first, second = cycles_beside_onset(self.solver, small, mu, self.name, row, ratio)
+            if rises := _goes_on(*(cycle.mu[self.name] for cycle in (rest, first, second)), ratio):
+                break
+        return rest, first, second, rises
 
     def amplitude(self, onset: Onset) -> tuple[AmplitudeEquation, float]:
         """Amplitude equation of the mode of an onset, or of a nearly neutral one beside it, for the displacement of the
@@ -301,7 +336,7 @@ class Follower:
         weight = np.append(np.ones(n), np.full(self.system.inner, self.system.flow_weight))
         row, rest = np.zeros(self.system.size), forms.rest[self.lip]
         row[self.lip] = 1.0
-        mode = np.concatenate([onset.mode.q, onset.mode.u])
+        mode = self.walk.unknowns(onset.place, onset.mode)
         try:
             found = amplitude_equation(
                 forms, lambda motion: self.system.residual(motion, mu) / weight, onset.eigenvalue, mode, row, abs(rest)
@@ -350,7 +385,7 @@ class Follower:
         The first cycles are two small ones, and those at the values nearer to the onset. The second value returned is
         why some of the latter were not found. `known` are special points as `CycleTracer` has them.
         """
-        rest, first, second, rises = self.from_onset(onset)
+        rest, first, second, rises = self.from_onset(onset, values)
         last, cycles, missed = second if rises else first, [first, second], []
         if not rises:
             missed.append(
@@ -404,17 +439,15 @@ def _goes_on(rest: float, first: float, second: float, ratio: float) -> bool:
     """True where values a r^2 + b r^4 over those at rest, of cycles with amplitudes of a ratio, have no extreme up to
     the second one.
     """
-    square = ratio**2
-    return (2 * square - 1) * (second - rest) * np.sign(first - rest) > square**2 * abs(first - rest)
+    square, first, second = ratio**2, first - rest, second - rest
+    # slopes by r^2 at rest and at the second cycle, over a factor: of one sign, and so are those between
+    at_rest, at_second = square**2 * first - second, (2 * square - 1) * second - square**2 * first
+    return at_rest * at_second > 0
 
 
-def _basis(system: PeriodicValve, spectrum) -> np.ndarray:
-    """(n + l, r) leading modes, and each of the flow's unknowns, over their sizes."""
-    columns = []
-    for i in range(len(spectrum.eigenvalues)):
-        mode = spectrum.mode(i)
-        vector = np.concatenate([mode.q, mode.u])
-        columns += [vector.real, vector.imag]
+def _basis(system: PeriodicValve, modes: Sequence[np.ndarray]) -> np.ndarray:
+    """(n + l, r) leading modes, complex (n + l,), and each of the flow's unknowns, over their sizes."""
+    columns = [part for mode in modes for part in (mode.real, mode.imag)]
     columns += list(np.eye(system.inner, system.size, system.size - system.inner))
     sizes = [np.linalg.norm(x / system.scales) for x in columns]
     return np.array([x / s for x, s in zip(columns, sizes) if s > 0]).T

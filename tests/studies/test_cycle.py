@@ -9,11 +9,15 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from continuation.periodic import PeriodicMotion
+from dbvfiv.case.parameters import Mu
 from dbvfiv.errors import CaseError, SolveError
+from dbvfiv.flow.channel import Channel
 from dbvfiv.studies.case import thesis_case
 from dbvfiv.studies.life import Life, motion_of
 from dbvfiv.studies.orbits import Orbit
 from dbvfiv.studies.session import Session, load_result, resume_result
+from dbvfiv.studies.stability.walk import StabilityWalk
 from tests.observers import Stop
 from tests.verification.test_cycles_in_time import run
 
@@ -105,6 +109,39 @@ def test_a_record_is_the_run_that_it_is(tmp_path, command_line):
     assert lines[0]["says"].startswith("It is run")
     faster = beside(command_line, tmp_path, (0.5 * time, lip + noise), tmp_path / "run.h5", "--within", "1")
     assert faster[0]["says"].startswith("None of them")
+
+
+def test_the_flow_of_a_cycle_is_that_of_its_parameters_at_all_instants():
+    """What a wall displaces leaves by the blend of the flow models that a cycle has, and its largest flow lies between
+    the samples of the series.
+    """
+    model = SimpleNamespace(size=7, nodal=lambda x: x, flow=Channel(np.linspace(0.0, 0.6, 7), 1e-9))
+    model.rows = SimpleNamespace(areas=lambda x: x, jacobian=lambda _: np.eye(7))
+    model.mesh = SimpleNamespace(part=SimpleNamespace(copies=4))
+    mean, swing = np.linspace(1e-3, 5e-3, 7), np.append(np.full(6, 1e-4), 0.0)  # at 2 m/s 0.01 m3/s flow in
+    waves = np.append(mean, 2.0), np.append(0.5 * np.exp(0.4j) * swing, 0.0)
+    motion, turn = PeriodicMotion.of_waves(waves, 1, 200.0), 2 * np.pi * np.linspace(0.0, 1.0, 5000)
+    for storage in (0.0, 0.25, 1.0):
+        orbit = Orbit(model, {"inlet": 1e3, "density": 800.0, "storage": storage}, motion)
+        moved = storage * 200.0 * 0.1 * (0.5 + 5.0) * 1e-4  # by trapezoids over the length
+        assert orbit.flow_extremes == pytest.approx((3200 * (0.01 - moved), 3200 * (0.01 + moved)), rel=1e-6)
+        at_lip = (0.01 + moved * np.sin(turn)) / (1e-3 + 1e-4 * np.cos(turn))
+        assert orbit.flow[1].min() == pytest.approx(min(2.0, at_lip.min()), rel=1e-3)
+
+
+def test_modes_of_a_flow_without_inertia_have_its_unknowns():
+    """Those by which periodic motions and normal forms are started: the pressures of a mode are the same with its inlet
+    velocity as without unknowns.
+    """
+    law, random = Channel(np.linspace(0.0, 0.6, 5), 1e-9, unsteady=False), np.random.default_rng(1)
+    area, slope, place = np.linspace(1e-3, 5e-3, 5), random.standard_normal((5, 3)), Mu(pressure=6e3, density=800.0)
+    linear = SimpleNamespace(area=area, slope=slope, model=SimpleNamespace(flow=law))
+    walk = SimpleNamespace(built=lambda _: linear, family=lambda _: SimpleNamespace(linear=linear))
+    mode = SimpleNamespace(q=random.standard_normal(3) + 1j * random.standard_normal(3), u=np.zeros(0))
+    x, parts = StabilityWalk.unknowns(walk, place, mode), law.linearise_still(area, place.for_system()).parts()
+    pressures = parts["A0"] @ slope @ x[:3] + parts["B0"] @ x[3:]
+    assert len(x) == 4 and np.allclose(x[:3], mode.q)
+    assert np.allclose(pressures, law.steady_operator(area, 6e3)[1] @ slope @ mode.q, rtol=1e-9)
 
 
 def test_lips_that_stand_apart_touch_where_their_faces_meet():

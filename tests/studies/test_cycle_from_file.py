@@ -18,7 +18,7 @@ from dbvfiv.record.record import GrowingRecord
 from dbvfiv.studies.case import thesis_case
 from dbvfiv.studies.cycle import start, study
 from dbvfiv.studies.cycle.start import _cycle_of
-from dbvfiv.studies.orbits import Follower, _goes_on
+from dbvfiv.studies.orbits import Follower, _goes_on, _Refused
 from dbvfiv.studies.session import load_result, resume_result
 from tests.observers import Stop
 from tests.studies.test_cycle import session_of
@@ -107,17 +107,38 @@ def test_a_branch_that_turns_round_at_once_begins_with_its_smaller_cycles():
     follower, taken, tracer = object.__new__(Follower), [], SimpleNamespace()
     tracer.extend = lambda cycle, *_: taken.append(cycle.mu["density"])
     vars(follower).update(name="density", parameter="density", lip=0, tracer=lambda *_: tracer)
-    follower.from_onset = lambda _: (made_cycle(0.0, 240.0), made_cycle(1.0, 238.0), made_cycle(1.25, 239.0), False)
+    follower.from_onset = lambda *_: (made_cycle(0.0, 240.0), made_cycle(1.0, 238.0), made_cycle(1.25, 239.0), False)
     follower.beside = lambda _onset, _first, value: made_cycle(0.5, value)
     _, missed = follower.begin(SimpleNamespace(value=240.0), [200.0, 239.5], None)
     assert taken == [239.5, 238.0, 239.0]
     assert len(missed) == 1 and "turns round beside the onset" in missed[0]
 
 
+@pytest.mark.parametrize(("end", "taken"), [(250.0, 1e-3), (240.2, 1.25e-4)])
+def test_first_cycles_lie_within_the_range(end, taken):
+    """Smaller ones than asked for beside an end of it, where larger ones would lie beyond."""
+    follower, tried = object.__new__(Follower), []
+    case = SimpleNamespace(cycle=SimpleNamespace(amplitude=1e-3))
+    vars(follower).update(name="density", parameter="density", case=case)
+
+    def beside(_onset, amplitude):
+        tried.append(amplitude)
+        if amplitude == 5e-4:
+            raise _Refused("It must be at most 241.")
+        return *(made_cycle(k * amplitude, 240.0 + 2e6 * (k * amplitude) ** 2) for k in (0, 1, 2)), True
+
+    follower._beside_rest = beside
+    rest, first, second, _ = follower.from_onset(SimpleNamespace(value=240.0), [200.0, end])
+    assert tried[-1] == taken and rest.mu["density"] < first.mu["density"] < second.mu["density"] <= end
+    with pytest.raises(SolveError, match=r"cycle.amplitude\): cycles lie beyond the range"):
+        follower.from_onset(SimpleNamespace(value=240.0), [200.0, 240.0])
+
+
 @pytest.mark.parametrize("side", [1.0, -1.0])
 @pytest.mark.parametrize("ratio", [2.0, 1.25])
 def test_a_fold_up_to_the_second_cycle_is_seen_by_its_value(side, ratio):
-    for fold, goes_on in ((0.9 * ratio, False), (1.1 * ratio, True)):
+    """Also one so far below the first cycle that both lie beyond the onset."""
+    for fold, goes_on in ((0.5, False), (0.65, False), (0.9 * ratio, False), (1.1 * ratio, True)):
         values = [5.0 + side * r**2 * (1 - 0.5 * (r / fold) ** 2) for r in (0.0, 1.0, ratio)]
         assert _goes_on(*values, ratio) == goes_on
 
@@ -187,6 +208,54 @@ def test_the_cycle_of_a_number_is_that_of_its_row(number, value):
     points = [SimpleNamespace(number=row, value=value) for row, value in ((2, 250.0), (0, 230.0), (1, 240.0))]
     result = SimpleNamespace(points=points, parameter="density")
     assert _cycle_of(thesis_case(keys), result).value == value
+
+
+def stored(kind, case, **more):
+    """A result of a case as `given_motion` reads it."""
+    return SimpleNamespace(kind=kind, case=case, mesh=SimpleNamespace(nodes=np.zeros((3, 3))), **more)
+
+
+@pytest.mark.parametrize(
+    ("over", "changes", "value"),
+    [
+        ("thickness=0.5:1.5:3", {"valve.thickness_factor": 0.9}, 0.9 / 1.2),
+        ("angle=30:60:4", {"layers.2.angle": 40.0, "layers.3.angle": -40.0}, 40.0),
+        ("strain=0.1:0.6:6", {"materials.strain_level": 0.2}, 0.2),
+        ("pipe_length=1:9:3", {"upstream.length": 5.0, "upstream.diameter": 0.3}, 5.0),
+        ("pipe_length=1:9:3", {}, None),
+    ],
+)
+def test_a_motion_starts_at_the_value_that_its_own_valve_has(monkeypatch, over, changes, value):
+    """Parameters of the wall and of pipes too; a factor on the thickness counts from this case."""
+    line = {"upstream__length": 2.0, "upstream__diameter": 0.3} if "pipe" in over else {}
+    keys = {"cycle__start": "file", "cycle__start_file": "run.h5", "cycle__over": over, "valve__thickness_factor": 1.2}
+    case = session_of(**keys | line).case
+    monkeypatch.setattr(start, "load_result", lambda _: stored("transient", thesis_case(changes)))
+    monkeypatch.setattr(start, "_last_period", lambda model, *_: model)
+    monkeypatch.setattr(start, "ValveModel", lambda case: case.upstream.length)
+    model = SimpleNamespace(mesh=SimpleNamespace(nodes=np.zeros((3, 3))), pump=None, case=case)
+    walk = SimpleNamespace(built=lambda _: SimpleNamespace(model=model))
+    if value is None:
+        with pytest.raises(CaseError, match="has no one pipe_length to start from"):
+            start.given_motion(case, walk)
+        return
+    given = start.given_motion(case, walk)
+    assert given.value == pytest.approx(value) and given.place[case.cycle.axis.parameter] == given.value
+    assert given.motion == (value if line else model)  # the line that the run had
+
+
+def test_the_cycle_nearest_to_this_wall_is_taken():
+    """Of a branch over the thickness, which counts from the wall of its own case; one over a line that is not there
+    needs a number.
+    """
+    points = [SimpleNamespace(number=k, value=value) for k, value in enumerate((0.8, 1.0, 1.2))]
+    result = stored("cycle", thesis_case({"valve.thickness_factor": 0.5}), points=points, parameter="thickness")
+    result.nearest = lambda value: min(points, key=lambda point: abs(point.value - value))
+    case = thesis_case({"cycle.over": "pressure=5 kPa:6 kPa:2", "valve.thickness_factor": 0.58})
+    assert _cycle_of(case, result).value == 1.2
+    result.parameter = "pipe_length"
+    with pytest.raises(CaseError, match="of which this valve has no one value; give cycle.start_cycle"):
+        _cycle_of(case, result)
 
 
 def test_files_that_nothing_starts_from(file, tmp_path):

@@ -13,7 +13,14 @@ from dbvfiv.case import CaseError
 from dbvfiv.case.parameters import Mu
 from dbvfiv.case.quantity import GRAVITY
 from dbvfiv.errors import SolveError
+from dbvfiv.flow.law import FlowMotion
+from dbvfiv.flow.terms import pump
+from dbvfiv.model import ValveModel
+from dbvfiv.model import forms as forms_module
+from dbvfiv.model.forms import ValveForms
 from dbvfiv.studies.case import thesis_case
+from dbvfiv.studies.cycle import start
+from dbvfiv.studies.onset import search
 from dbvfiv.studies.orbits import Follower
 from dbvfiv.studies.stability.walk import StabilityWalk
 from tests.small_valves import SMALL, load_small, settings
@@ -99,6 +106,53 @@ def test_cycles_begin_at_the_state_that_spectra_are_of(operating):
     rest = follower.at_rest(SimpleNamespace(place=place, eigenvalue=10j))
     left, scale = follower.system.residual(rest.motion, rest.mu), walk.built(place).model.force_scale
     assert np.linalg.norm(left[0]) < 1e-6 * scale(walk.equilibrium(place), pressure)
+
+
+def test_normal_forms_have_the_pressure_that_spectra_have(monkeypatch):
+    """Off the pump's curve too, of a valve held at rest; their linearisation is about it as well."""
+    model, about = ValveModel(load(PUMP, {"drive.pressure": 30e3}).case), []
+    linear = SimpleNamespace(pencil=lambda _: None)
+    monkeypatch.setattr(forms_module, "linearise", lambda model, *_: about.append(model.flow) or linear)
+    q, mu = np.zeros(model.size), Mu.of(model.case).for_system()
+    area, forms = model.rows.areas(model.nodal(q)), ValveForms(model, q, mu)
+    motion = FlowMotion.still(area, forms.rest[2 * len(q) :])
+    pressure, left = forms.model.flow.evaluate(motion, mu)
+    assert pressure == pytest.approx(model.flow.steady_pressure(area, 30e3), rel=1e-9, abs=1e-6)
+    assert left == pytest.approx([0.0], abs=1e-6) and about == [forms.model.flow]
+    assert abs(model.flow.evaluate(motion, mu)[1][0]) > 500.0  # a lift makes up for this
+
+
+@pytest.mark.parametrize(("parameter", "told"), [("beta", True), ("pressure", False)])
+def test_a_normal_form_behind_a_pump_has_no_speed_where_the_lift_would_follow(monkeypatch, parameter, told):
+    case, asked = load(PUMP).case, []
+    built = SimpleNamespace(model=SimpleNamespace(flow=SimpleNamespace(names=())))
+    walk = SimpleNamespace(built=lambda _: built, equilibrium=lambda _: None, unknowns=lambda *_: None)
+    monkeypatch.setattr(search, "ValveForms", lambda *_: None)
+    monkeypatch.setattr(search, "hopf_normal_form_of", lambda _forms, _omega, _mode, name: asked.append(name))
+    search.normal_form(case, walk, Mu.of(case), SimpleNamespace(eigenvalue=10j), parameter)
+    assert asked == [parameter if told else None]
+
+
+def test_the_last_period_of_a_run_is_behind_the_pump_of_the_run(monkeypatch):
+    """At the pressure of the case a pump has its own head; at another one, which a branch may be at, one more."""
+    case, asked = load(PUMP, {"drive.pressure": 20e3}).case, []
+    state = SimpleNamespace(nodal=np.zeros(2), nodal_rate=np.zeros(2), station_velocity=[1.0])
+    now = SimpleNamespace(q=np.zeros(2), fluid=SimpleNamespace(velocity=1.0))
+    shell = SimpleNamespace(dofs=SimpleNamespace(restrict=lambda nodal: nodal))
+    model = SimpleNamespace(pump=pump.from_case(case), flow=SimpleNamespace(inner=1), shell=shell)
+    monkeypatch.setattr(start, "ValveMotion", lambda *_: None)
+    monkeypatch.setattr(
+        start, "consistent_state", lambda _motion, _time, q, v, inlet, inner: asked.append(inlet) or now
+    )
+    step = SimpleNamespace(step=lambda *_: SimpleNamespace(state=now))
+    monkeypatch.setattr(start, "Stepper", lambda _motion, _scheme, inlet: asked.append(inlet(0.0)) or step)
+    run = SimpleNamespace(states=[state], verdict={"verdict": "limit cycle", "mass_flow": {}})
+    run.verdict["lip_displacement"] = {"verdict": "limit cycle", "frequency": 10.0}
+    start._last_period(model, case, Mu.of(case).at(pressure=15e3), run)
+    assert [model.pump.pressure(inlet, 0.03) for inlet in asked] == pytest.approx([1000 * GRAVITY * 2.6] * 2)
+    model.pump = None
+    start._last_period(model, case, Mu.of(case).at(pressure=15e3), run)
+    assert asked[2:] == [15e3, 15e3]
 
 
 def test_a_flow_beyond_the_table_is_told():

@@ -8,7 +8,7 @@ import numpy as np
 
 from continuation.periodic import PeriodicMotion
 
-from ...case.parameters import PARAMETERS, Mu
+from ...case.parameters import DESIGN, PARAMETERS, PIPES, Mu
 from ...errors import CaseError, SolveError
 from ...model.equilibria import operating_pressure
 from ...model.valve import ValveModel
@@ -21,6 +21,7 @@ from ..case import Case
 from ..orbits import Onset, onset_at
 from ..session import load_result
 from ..stability.line import ParameterLine
+from ..stability.place import design_value
 from ..stability.scan import Scan
 from ..stability.walk import StabilityWalk
 
@@ -111,40 +112,60 @@ def given_motion(case: Case, walk: StabilityWalk) -> Given:
             "time.",
             key="cycle.start_file",
         )
-    model = walk.built(Mu.of(case)).model
+    model, name = walk.built(Mu.of(case)).model, axis.parameter
     if result.mesh.nodes.shape != model.mesh.nodes.shape:
         raise CaseError(
             f"The motion of {str(path)!r} belongs to a mesh of {len(result.mesh.nodes)} nodes and this case's has "
             f"{len(model.mesh.nodes)}.",
             key="cycle.start_file",
         )
-    value = Mu.of(result.case)[axis.parameter]
-    if result.kind == "transient" and axis.parameter == "pressure":
+    value = _value_of(result.case, case, name)
+    if value is None:
+        raise CaseError(f"The valve of {str(path)!r} has no one {name} to start from.", key="cycle.start_file")
+    if result.kind == "transient" and name == "pressure":
         value = Drive.of(result.case)(float(result.history["time"][-1]))
         if model.pump is not None:  # whatever pressure it began at, a run moves about the operating point
             value = operating_pressure(model)
     point = _cycle_of(case, result) if result.kind == "cycle" else None
-    if point is not None and result.parameter == axis.parameter:
-        value = float(point.value)
+    if point is not None and result.parameter == name:
+        value = float(point.value) * (value if name == "thickness" else 1.0)
     low, high = axis.values[0], axis.values[-1]
     if not low <= value <= high:
-        row = PARAMETERS[axis.parameter]
+        row = PARAMETERS[name]
         raise CaseError(
             f"The motion of {str(path)!r} is at {row.text(value)}, beyond the range from {row.text(low)} to "
             f"{row.text(high)}.",
             key="cycle.start_file",
         )
-    place = Mu.of(case).at(**{axis.parameter: value})
+    place = Mu.of(case).at(**{name: value})
     if point is not None:
         return Given(value, place, point.orbit.motion)
-    return Given(value, place, _last_period(walk.built(place).model, case, place, result))
+    model = walk.built(place).model
+    if name in ("storage", *PIPES) and value != Mu.of(model.case).get(name):  # steps take them from a model's case
+        given = result.case.fluid.continuity if name == "storage" else value
+        model = ValveModel(model.case.replace({PARAMETERS[name].key: given}))
+    return Given(value, place, _last_period(model, case, place, result))
+
+
+def _value_of(other: Case, case: Case, name: str) -> float | None:
+    """Value that another case has of a parameter, as a case counts it; None where it has no one value."""
+    if name == "thickness":  # a factor on the wall of the case
+        return other.valve.thickness_factor / case.valve.thickness_factor
+    return design_value(other, name) if name in DESIGN else Mu.of(other).get(name)
 
 
 def _cycle_of(case: Case, result):
     """Cycle `cycle.start_cycle` of a result, counted in the order of its table."""
     number, points = case.cycle.start_cycle, sorted(result.points, key=lambda point: point.number)
     if number is None and result.parameter != case.cycle.axis.parameter and points:
-        return result.nearest(Mu.of(case)[result.parameter])
+        value = _value_of(case, result.case, result.parameter)
+        if value is None:
+            raise CaseError(
+                f"{str(case.cycle.start_file)!r} holds cycles over {result.parameter}, of which this valve has no one "
+                "value; give cycle.start_cycle.",
+                key="cycle.start_cycle",
+            )
+        return result.nearest(value)
     number = -1 if number is None else number
     if not -len(points) <= number < len(points):
         raise CaseError(
@@ -172,7 +193,8 @@ def _last_period(model: ValveModel, case: Case, place: Mu, result) -> PeriodicMo
             "states do not hold the waves; start it from an onset, or from a cycle.",
             key="cycle.start_file",
         )
-    state, inlet, period = result.states[-1], place.pressure, 1.0 / frequency
+    state, period = result.states[-1], 1.0 / frequency
+    inlet = place.pressure if model.pump is None else case.drive.pressure  # at which a pump has no lift on top
     motion = ValveMotion(model, place)
     dofs = model.shell.dofs
     speed = float(state.station_velocity[-1])

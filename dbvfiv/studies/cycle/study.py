@@ -89,7 +89,7 @@ def tables_of(mesh: MeshData) -> tuple[TableSpec, ...]:
 def cycle_row(point: CyclePoint, orbit: Orbit, leg: int) -> dict[str, Any]:
     """A cycle of a leg of the branch as a row of its table."""
     flow, speeds = orbit.flow
-    low, high = orbit.lip_extremes
+    (low, high), (least_flow, largest_flow) = orbit.lip_extremes, orbit.flow_extremes
     exponents, wide = point.exponents, np.full((3, KEPT), np.nan)
     if exponents is not None:
         count = min(len(exponents.values), KEPT)
@@ -102,7 +102,7 @@ def cycle_row(point: CyclePoint, orbit: Orbit, leg: int) -> dict[str, Any]:
         "lip_largest": high,
         "lip_mean": float(orbit.lip.mean()),
         "flow_mean": float(flow.mean()),
-        "flow_amplitude": 0.5 * float(np.ptp(flow)),
+        "flow_amplitude": 0.5 * (largest_flow - least_flow),
         "least_speed": float(speeds.min()),
         "unstable": -1 if exponents is None else exponents.unstable,
         "growth_rates": wide[0],

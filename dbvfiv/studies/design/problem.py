@@ -38,7 +38,7 @@ from ...model.sizes import ValveSizes
 from ...observer import Observer
 from ..case import Case
 from ..inputs import Input, correlation_of, inputs_of
-from ..stability.derivatives import Neighbourhood
+from ..stability.derivatives import Neighbourhood, spans_about
 from ..stability.place import design_value, key_of, redesigned, require_parameter
 from ..stability.verdict import oscillates
 from ..stability.walk import StabilityWalk, name_state_in_failures
@@ -261,12 +261,19 @@ class DesignProblem:
         def measured(model: ClosedValve, q: np.ndarray) -> np.ndarray:
             return np.array([model.passage(q).left, ValveSizes.of(model).wall_mass])
 
-        for step in np.diag([STEP * (one.high - one.low) for one in self.variables]):
-            ends = [ClosedValve(self.case_at(np.array(values) + sign * step)) for sign in (-1, 1)]
-            moved = hood.tangent([(end, pressure) for end in ends], 2 * step.sum())
-            shift = 0.0 if moved is None else step.sum() * moved
-            below, above = (measured(end, q + sign * shift) for end, sign in zip(ends, (-1, 1)))
-            slopes.append((above - below) / (2 * step.sum()))
+        def slope(number: int, low: float, high: float) -> np.ndarray:
+            """From a difference between two values of a variable."""
+            own, apart = values[number], high - low
+            ends = [ClosedValve(self.case_at((*values[:number], x, *values[number + 1 :]))) for x in (low, high)]
+            moved = hood.tangent([(end, pressure) for end in ends], apart)
+            places = [q if moved is None else q + (x - own) * moved for x in (low, high)]
+            below, above = map(measured, ends, places)
+            return (above - below) / apart
+
+        for number, (one, own) in enumerate(zip(self.variables, values)):
+            spans = spans_about(self.case, one.name, own, STEP * (one.high - one.low))
+            near, *far = (slope(number, *span) for span in spans)
+            slopes.append(2 * near - far[0] if far else near)
         return AtHead(dict(zip(names, map(float, measured(model, q)))), dict(zip(names, np.array(slopes).T)))
 
     def _solved(self, values: tuple[float, ...], pressure: float, margin: bool) -> AtHead:

@@ -274,14 +274,21 @@ class DesignResult(StudyResult):
         """Aim of the case itself, on the mesh of the search, margins less their reserve; None where it has no
         state.
         """
-        aim, starts = self.statements[0], [one.start for one in self.variables]
+        aim, here = self.statements[0], self._of_case(self.statements[0])
+        return together(aim, here, [one.reserve for one in here])[0] if here else None
+
+    def _of_case(self, asked: Statement) -> list[AtHead]:
+        """What the case itself does at the heads of a statement, on the mesh of the search; nothing where it has no
+        state.
+        """
+        starts = [one.start for one in self.variables]
         known = {
             pressure: found
             for (values, pressure, _), found in _known(self.record).items()
-            if isinstance(found, AtHead) and aim.quantity in found.values and np.allclose(values, starts, 1e-12, 0.0)
+            if isinstance(found, AtHead) and asked.quantity in found.values and np.allclose(values, starts, 1e-12, 0.0)
         }
-        here = [known.get(p) for p in aim.pressures] or [*known.values()][:1]
-        return together(aim, here, [one.reserve for one in here])[0] if here and None not in here else None
+        here = [known.get(p) for p in asked.pressures] or [*known.values()][:1]
+        return [] if None in here else here
 
     def optima(self, number: int = 0) -> list[tuple[float, int]]:
         """Aims at which starts ended with all constraints held, the best first, and the number of starts for each."""
@@ -303,7 +310,8 @@ class DesignResult(StudyResult):
                     found.append(f"{one.name} at its {word}")
         for one, value in zip(self.statements[1:], design.constraints):
             bound = self.bounds[number] if len(one.bounds) > 1 else one.bounds[0]
-            if abs(value - bound) <= ACTIVE * max(abs(bound), abs(value)):
+            sizes = [abs(at.values[one.quantity]) for at in self._of_case(one)]  # a bound may be 0
+            if abs(value - bound) <= ACTIVE * max([abs(bound), abs(value), *sizes]):
                 found.append(one.text)
         return found
 
@@ -332,8 +340,9 @@ class DesignResult(StudyResult):
         ]
         if unstable:
             return ", ".join(unstable) + gaps
-        margin = 100 * np.nanmin(rows["margin"])
-        return f"stable at {len(rows['pressure'])} heads, margin at least {margin:.3g} %{gaps}"
+        margins = rows["margin"][np.isfinite(rows["margin"])]
+        said = f"margin at least {100 * margins.min():.3g} %" if len(margins) else "no mode oscillates"
+        return f"stable at {len(rows['pressure'])} heads, {said}{gaps}"
 
     def summary(self) -> dict[str, Any]:
         aim, *constraints = self.statements

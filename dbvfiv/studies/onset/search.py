@@ -24,7 +24,7 @@ from ...texts import digits
 from ..case import Case
 from ..stability.dimensions import Variant, own_variant
 from ..stability.line import ParameterLine
-from ..stability.place import models_of
+from ..stability.place import is_surrounding, models_of
 from ..stability.samples import Sample, SampleKey
 from ..stability.scan import Crossing
 from ..stability.verdict import not_valid_at
@@ -389,8 +389,11 @@ def normal_form(case: Case, walk: StabilityWalk, place: Mu, mode, parameter: str
         If the eigenvalue is not simple.
     """
     mu = place.for_system()
-    follows = parameter and not (parameter == "density" and case.gravity.is_there)  # whose levels it would leave out
-    name = PARAMETERS[parameter].system_name or None if follows else None
+    # the levels of a fluid with gravity would be left out, and how the lift of a pump follows a moving steady state
+    left_out = parameter and (
+        (parameter == "density" and case.gravity.is_there) or (case.has_pump and not is_surrounding(case, parameter))
+    )
+    name = PARAMETERS[parameter].system_name or None if parameter and not left_out else None
     own = walk.built(place.only(*(name for name in place if name not in DESIGN))).model
     forms = ValveForms(models_of(own.case, own)(mu), walk.equilibrium(place), mu)
-    return hopf_normal_form_of(forms, abs(complex(mode.eigenvalue).imag), np.concatenate([mode.q, mode.u]), name)
+    return hopf_normal_form_of(forms, abs(complex(mode.eigenvalue).imag), walk.unknowns(place, mode), name)

@@ -149,7 +149,7 @@ class Neighbourhood:
     @cached_property
     def performance(self) -> dict[str, float]:
         """Values by the names of `PERFORMANCE`."""
-        return _performance(self.model, self.q, self.pressure)
+        return _performance(self.model, self.q, self.pressure, self.mu)
 
     @cached_property
     def _factor(self):
@@ -181,17 +181,15 @@ class Neighbourhood:
         """
         require_number(self.model, name)
         value = _value(self.model, self.pressure, self.mu, name)
-        h = self.step * (abs(value) or 1.0)
-        inward = _inward(self.model.case, name, value, h)
-        if inward == 0:
-            return self._between(name, value, value - h, value + h)
-        reach = [sorted((value, value + inward * k * h)) for k in (1, 2)]
-        near, far = (self._between(name, value, *ends) for ends in reach)
+        spans = spans_about(self.model.case, name, value, self.step * (abs(value) or 1.0))
+        near, *far = (self._between(name, value, *ends) for ends in spans)
+        if not far:
+            return near
         values = [mode.eigenvalue for mode in self.modes]
         sizes = np.array([*(np.abs(self.sums) @ np.abs(values) if values else ()), *self.performance.values()])
-        if not near.is_like(far, np.abs(sizes) / (abs(value) or 1.0)):
+        if not near.is_like(*far, np.abs(sizes) / (abs(value) or 1.0)):
             raise SolveError(f"Nothing can be differentiated by {name} at {value:g}: next to it is another valve.")
-        return near.towards(far)
+        return near.towards(*far)
 
     def _between(self, name: str, value: float, low: float, high: float) -> Sensitivity:
         """Differences between two values of a parameter."""
@@ -199,7 +197,7 @@ class Neighbourhood:
         places, moved = [self.q, self.q], self.tangent([end[:2] for end in ends], high - low)
         if moved is not None:
             places = [self.q + (end - value) * moved for end in (low, high)]
-        below, above = (_performance(model, q, pressure) for (model, pressure, _), q in zip(ends, places))
+        below, above = (_performance(model, q, pressure, mu) for (model, pressure, mu), q in zip(ends, places))
         performance = {key: (above[key] - below[key]) / (high - low) for key in below}
         return Sensitivity(name, value, self._eigenvalues(ends, places, high - low), performance)
 
@@ -271,13 +269,16 @@ class Neighbourhood:
         return self.model.outside.panels(self.q)
 
 
-def _performance(model: ValveModel, q: np.ndarray, pressure: float) -> dict[str, float]:
-    """Values by the names of `PERFORMANCE`; NaN for those of a flow where nothing flows."""
+def _performance(model: ValveModel, q: np.ndarray, pressure: float, mu: Mu) -> dict[str, float]:
+    """Values by the names of `PERFORMANCE`, the flow in the fluid of the parameter point; NaN for those of a flow where
+    nothing flows.
+    """
     known = {"converged": True, "iterations": 0, "load_steps": 0, "residual": 0.0, "rounding": 0.0, "reason": ""}
     state = describe_state(model, q, pressure, **known)
     loss = state.hydraulics.loss_coefficient if state.hydraulics else np.nan
     mass = ValveSizes.of(model).wall_mass
-    return dict(zip(PERFORMANCE, (state.volume_flow, state.outlet_area, loss, mass)))
+    flow = state.volume_flow_of(mu["density"])
+    return dict(zip(PERFORMANCE, (flow, state.outlet_area, loss, mass)))
 
 
 def parameters_of(model: ValveModel) -> tuple[str, ...]:
@@ -339,6 +340,16 @@ def unit_of(case: Case, name: str) -> str:
     if quantity.startswith(("nu", "poisson", "x_0")):
         return ""
     return {"thickness": "m", "angle": "deg", "density": "kg/m^3"}.get(quantity, "Pa")
+
+
+def spans_about(case: Case, name: str, value: float, h: float) -> list[tuple[float, float]]:
+    """Pairs of values that a derivative by a parameter is taken between: one, a step h to both sides; at an end of what
+    the parameter may be two, of one step and of two towards its inside, twice the first difference less the second.
+    """
+    inward = _inward(case, name, value, h)
+    if inward == 0:
+        return [(value - h, value + h)]
+    return [(min(value, end), max(value, end)) for end in (value + inward * h, value + 2 * inward * h)]
 
 
 def _inward(case: Case, name: str, value: float, h: float) -> int:

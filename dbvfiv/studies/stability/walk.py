@@ -16,7 +16,7 @@ from eigen.columns import Cell, Column, ColumnSolver
 from eigen.factor import Workspace
 from eigen.family import PencilFamily, Reach
 from eigen.operator import CoupledPencil, Relaxation, edge_of
-from eigen.spectrum import SearchOptions, Spectrum
+from eigen.spectrum import Mode, SearchOptions, Spectrum
 
 from ...case.parameters import Mu
 from ...case.quantity import GRAVITY
@@ -492,6 +492,17 @@ class StabilityWalk:
         family = self.family(place)
         with name_state_in_failures(place.pressure):
             return self.built(place).solver.direct(family, place, count)
+
+    def unknowns(self, place: Mu, mode: Mode) -> np.ndarray:
+        """Displacements and the flow's unknowns (n + l,) of a mode at a place; those of a flow without inertia, which
+        modes do not hold, follow from the areas.
+        """
+        u = mode.u
+        if not self.built(place).model.flow.unsteady:
+            linear = self.family(place).linear
+            parts = linear.model.flow.linearise_still(linear.area, place.for_system()).parts()
+            u = -np.linalg.solve(parts["S0"], parts["R0"] @ (linear.slope @ mode.q))
+        return np.concatenate([mode.q, u])
 
     def column(self, places: list[Mu], snapshots: int = 3, edges: bool = False, spectra=None, count: int = 2) -> Column:
         """Cells that share a steady state; those whose rubber has lost stability are left blank.

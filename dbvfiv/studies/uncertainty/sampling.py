@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -12,6 +12,7 @@ from eigen.columns import Cell, ColumnSolver
 
 from ...case.parameters import Mu
 from ...errors import CaseError, NotValidError, SolveError
+from ...model.state import SteadyState
 from ..inputs import CONFIDENCE, Plan, Probability, quasi_random
 from ..stability.neighbours import At, Beside, Neighbours
 from ..stability.verdict import OUTCOMES, Verdict
@@ -50,9 +51,17 @@ class Found(NamedTuple):
     why: str = ""
 
     @classmethod
-    def of(cls, sample: int, value: float, verdict: Verdict, state: Any = None, apart: bool = False) -> Found:
-        """Row of a verdict and its steady state."""
-        read = (np.nan, np.nan) if state is None else (state.outlet_area, state.volume_flow)
+    def of(
+        cls,
+        sample: int,
+        value: float,
+        verdict: Verdict,
+        state: SteadyState | None = None,
+        density: float = np.nan,
+        apart: bool = False,
+    ) -> Found:
+        """Row of a verdict and its steady state, in a fluid of a density, kg/m3."""
+        read = (np.nan, np.nan) if state is None else (state.outlet_area, state.volume_flow_of(density))
         numbers = verdict.growth_rate, verdict.frequency, verdict.damping_ratio
         why = "" if verdict.stable is not None else verdict.reason
         return cls(sample, value, OUTCOMES.index(verdict.outcome), *numbers, *read, apart, why)
@@ -122,13 +131,13 @@ class Sampler:
             verdicts = [walk.sample(*pair, value).verdict for pair in zip(places, cells)]
         except (SolveError, CaseError) as error:
             state, verdicts = None, [Verdict.undecided(str(error))] * len(places)
-        for k, verdict in enumerate(verdicts):
-            yield Found.of(first + k, value, verdict, state)
+        for k, (place, verdict) in enumerate(zip(places, verdicts)):
+            yield Found.of(first + k, value, verdict, state, place.density)
 
     def _one(self, sample: int, row: np.ndarray) -> Iterator[Found]:
         walk = None
         for i, value in enumerate(self.plan.values):
-            state, near = None, self._neighbours.get(i)
+            state, density, near = None, np.nan, self._neighbours.get(i)
             apart = near is not None
             try:
                 walk = walk or self.plan.walk(row, self._solver)
@@ -136,13 +145,13 @@ class Sampler:
                 q = q if near is None else near.state(row)
                 place = walk.meet_pump(self.plan.place(walk.case, row, value), lift, q)
                 walk.settle(place, q)
-                state = walk.state(place)
+                state, density = walk.state(place), place.density
                 verdict = self._beside(i).verdicts(walk, [place], row)[0] if near else None
                 apart = apart and verdict is None
                 verdict = verdict or walk.verdict(place)
             except (SolveError, CaseError, ValueError) as error:
                 verdict = Verdict.undecided(str(error))
-            yield Found.of(sample, value, verdict, state, apart)
+            yield Found.of(sample, value, verdict, state, density, apart)
 
     def walks(self, i: int) -> At:
         """Function from values of the inputs to the walk of a sample and its parameter point at a value of the range,

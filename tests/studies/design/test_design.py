@@ -11,7 +11,10 @@ from dbvfiv.case.parameters import Mu
 from dbvfiv.case.statement import parse_statement
 from dbvfiv.errors import CaseError, NotValidError
 from dbvfiv.materials.shipped import shipped_loss
+from dbvfiv.model.closed import ClosedValve
+from dbvfiv.model.sizes import ValveSizes
 from dbvfiv.studies.case import thesis_case
+from dbvfiv.studies.design import problem as problem_module
 from dbvfiv.studies.design.problem import SHARPNESS, DesignProblem, Variable, statements_of, together
 from dbvfiv.studies.design.study import CASE, DesignResult, _changed, draw_heads
 from dbvfiv.studies.inputs import Plan, quasi_random
@@ -220,7 +223,8 @@ def test_a_robust_design_keeps_its_reserve(valve):
 
 def kept(aim, *constraints, notes=(), rows=(), failures=()):
     """A complete result of a record with these notes and rows of verdicts."""
-    columns = {name: np.array([row.get(name, 0) for row in rows]) for name in ("design", "pressure", "outcome")}
+    names = ("design", "pressure", "outcome", "margin")
+    columns = {name: np.array([row.get(name, 0) for row in rows]) for name in names}
     record = SimpleNamespace(
         complete=True,
         failures=failures,
@@ -240,6 +244,24 @@ def test_the_margin_of_the_case_is_told_less_its_reserve():
     aim = kept("margin at 6 kPa up", notes=[state]).aim_of_case
     assert aim == pytest.approx(0.041, rel=1e-12) and _changed(aim, 0.049) == "+19.5 %"
     assert _changed(-0.012, 0.049) == ""
+
+
+def test_a_constraint_with_the_bound_0_holds_a_design_back():
+    """Counted in the value of the case itself."""
+    state = {"what": "state", "values": [1.0], "pressure": 9e3, "margin": True, "found": {"margin": 0.05}}
+    state |= {"slopes": {"margin": [0.1]}, "reserve": 0.0, "band": None}
+    design = {"what": "design", "design": 0, "start": 0, "values": [1.1], "aim": 1.0, "violation": 0.0}
+    for value, held in ((1e-7, ["margin at 9 kPa at least 0 %"]), (1e-3, [])):
+        notes = [state, design | {"constraints": [value]}]
+        assert kept("flow at 6 kPa up", "margin at 9 kPa at least 0 %", notes=notes).active() == held
+
+
+def test_a_design_without_oscillations_has_no_margin_to_tell(recwarn):
+    rows = [{"pressure": p, "outcome": OUTCOMES.index("stable"), "margin": np.nan} for p in (6e3, 9e3)]
+    result = kept("flow at 6 kPa up", rows=rows)
+    assert result.evidence(0) == "stable at 2 heads, no mode oscillates" and not recwarn.list
+    rows[0]["margin"] = 0.02
+    assert kept("flow at 6 kPa up", rows=rows).evidence(0) == "stable at 2 heads, margin at least 2 %"
 
 
 @pytest.mark.parametrize(
@@ -276,6 +298,19 @@ def test_seals_is_what_closure_finds():
     ends = [problem.at(problem.values_at(np.array([0.5, x, 0.5])), -50.0, False).values for x in (0.4995, 0.5005)]
     direct = (ends[1]["gap left"] - ends[0]["gap left"]) / 0.001
     assert 15e-3 * open_.slopes["gap left"][1] == pytest.approx(direct, rel=1e-3)
+
+
+def test_a_variable_at_the_end_of_its_key_has_derivatives_under_back_pressure(monkeypatch):
+    """Towards its inside: lips rise no less than 0. Of a state that stays at rest."""
+    keys = {"design.variables": {"valve.lip_rise": "0 mm:5 mm"}, "design.constraints": ["seals at 1 kPa"]}
+    at_rest = lambda case, _: (ClosedValve(case), np.zeros(ClosedValve(case).size))  # noqa: E731
+    monkeypatch.setattr(problem_module, "close_valve", at_rest)
+    monkeypatch.setattr(problem_module, "Neighbourhood", lambda *_: SimpleNamespace(tangent=lambda *_: None))
+    problem = DesignProblem(load_small(KEYS, ASKED, keys).case)
+    at, step = problem.at((0.0,), -1e3, False), 2.5e-5
+    near, far = (ValveSizes.of(ClosedValve(problem.case_at((k * step,)))).wall_mass for k in (1, 2))
+    direct = (4 * near - far - 3 * at.values["mass"]) / (2 * step)
+    assert at.slopes["mass"][0] == pytest.approx(direct, rel=1e-3) and direct != 0
 
 
 def test_several_heads_of_an_aim_count_together(valve):

@@ -171,6 +171,17 @@ def test_the_pressure_has_the_derivatives_of_its_key(valve):
     assert (key.value, key.eigenvalues, key.performance) == (own.value, own.eigenvalues, own.performance)
 
 
+def test_the_flow_goes_with_the_inverse_root_of_the_density():
+    """By the parameter, which leaves the model alone, and by the key, with which it is built anew; of a valve held at
+    rest.
+    """
+    model = ValveModel(thesis_case(SMALL))
+    near = Neighbourhood(model, np.zeros(model.size), 6e3, Mu.of(model.case))
+    for name in ("density", "fluid.density"):
+        found = near.slope(name)
+        assert found.performance["flow"] * found.value == pytest.approx(-0.5 * near.performance["flow"], rel=1e-6)
+
+
 def test_only_what_a_valve_has_is_a_parameter(valve):
     assert {"angle", "strain", "storage", "layer 3 angle", "valve.saddle_length"} <= set(parameters_of(valve.model))
     own = {"kind": "neo-hookean", "shear_modulus": "1 MPa", "density": 1200}

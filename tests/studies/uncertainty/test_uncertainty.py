@@ -173,10 +173,12 @@ def test_surroundings_are_asked_side_by_side(valve):
     for value in found.plan.values:
         samples = found.at(value)
         assert np.ptp(samples["opening"]) == 0 and len(samples["outcome"]) == 16
+        assert np.ptp(samples["flow"] * np.sqrt(samples["inputs"][:, 1])) < 1e-12 < np.ptp(samples["flow"])
         beta, density = samples["inputs"][3]
         alone = valve.modes(value, beta=beta, density=density)
         assert alone.verdict.outcome == OUTCOMES[samples["outcome"][3]]
         assert alone.verdict.growth_rate == pytest.approx(samples["growth_rate"][3], rel=1e-5, abs=1e-5)
+        assert alone.state.volume_flow == pytest.approx(samples["flow"][3], rel=1e-9)
 
 
 @pytest.mark.parametrize("name", ["pressure", "drive.pressure"])
