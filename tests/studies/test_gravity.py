@@ -173,8 +173,9 @@ def test_each_density_has_a_model_of_its_levels(monkeypatch):
     light = SimpleNamespace(case=redesigned(case, {"density": 300.0}), flow=own.flow)
     monkeypatch.setattr(search, "ValveForms", lambda model, *_: taken.append(model.case))
     monkeypatch.setattr(search, "hopf_normal_form_of", lambda *_: None)
-    walk = SimpleNamespace(built=lambda _: SimpleNamespace(model=light), equilibrium=lambda _: None)
-    search.normal_form(case, walk, there, SimpleNamespace(eigenvalue=30j, q=np.zeros(2), u=np.zeros(1)))
+    built = SimpleNamespace(model=light)
+    walk = SimpleNamespace(built=lambda _: built, equilibrium=lambda _: None, unknowns=lambda *_: None)
+    search.normal_form(case, walk, there, SimpleNamespace(eigenvalue=30j))
     assert taken == [redesigned(case, there.only("density", "thickness"))]
 
 

@@ -125,7 +125,7 @@ def test_normal_forms_have_the_pressure_that_spectra_have(monkeypatch):
 @pytest.mark.parametrize(("parameter", "told"), [("beta", True), ("pressure", False)])
 def test_a_normal_form_behind_a_pump_has_no_speed_where_the_lift_would_follow(monkeypatch, parameter, told):
     case, asked = load(PUMP).case, []
-    built = SimpleNamespace(model=SimpleNamespace(flow=SimpleNamespace(names=())))
+    built = SimpleNamespace(model=SimpleNamespace(case=case, flow=SimpleNamespace(names=())))
     walk = SimpleNamespace(built=lambda _: built, equilibrium=lambda _: None, unknowns=lambda *_: None)
     monkeypatch.setattr(search, "ValveForms", lambda *_: None)
     monkeypatch.setattr(search, "hopf_normal_form_of", lambda _forms, _omega, _mode, name: asked.append(name))
