@@ -219,9 +219,11 @@ def compare(
             )
     found = find_study(kind).compare(results)
     path = save_figure(found.draw, output)
-    told = zip(files, found.labels, results) if as_json else ()  # summaries read whole files
-    runs = [{"file": str(file), "label": name} | result.summary() for file, name, result in told]
-    print_either({"runs": runs, **found.document(), "figure": str(path)}, [*found.lines(), f"Wrote {path}."], as_json)
+    if as_json:  # summaries read whole files
+        runs = [{"file": str(f), "label": n} | r.summary() for f, n, r in zip(files, found.labels, results)]
+        print_json({"runs": runs, **found.document(), "figure": str(path)})
+        return
+    print("\n".join([*found.lines(), f"Wrote {path}."]))
 
 
 def _recognise(files: list[Path], columns: Sequence[str], within: float) -> Recognition:

@@ -35,8 +35,13 @@ def write_page(found: Gathered, path: Path) -> Path:
         If the file cannot be written.
     """
     told = answers(found)
-    first = {"sheet": sheet(found), "answers": told, "trade": trade(found), "open": unanswered(found, told)}
-    first |= {"pictures": first_pictures(found)}
+    first = {
+        "sheet": sheet(found),
+        "answers": told,
+        "trade": trade(found),
+        "open": unanswered(found, told),
+        "pictures": first_pictures(found),
+    }
     parts = _told_once([part for part in (make(found) for make in MAKERS) if part is not None])
     return write_parts(path, found.name, setting(found), _in_units(found, parts), case_toml(found.case), first)
 

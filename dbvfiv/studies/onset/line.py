@@ -267,9 +267,10 @@ def intervals_of(
     for (a, state, first), (b, other, second) in pairwise(rows):
         between = [e for e in edges if a < e < b]
         known = first and second and (state != other) == (len(between) % 2 == 1)
-        for number, part in enumerate(pairwise([a, *between, b] if known else [a, b])):
-            if (state != number % 2 if known else None) is unstable:
-                found.append(part)
+        if not known and unstable is None:
+            found.append((a, b))
+        elif known and unstable is not None:  # the state changes at each edge
+            found += list(pairwise([a, *between, b]))[int(state != unstable) :: 2]
     return joined_stretches([found])
 
 
