@@ -253,7 +253,7 @@ def test_a_workbook_is_read_like_its_table(tmp_path, monkeypatch):
 
 
 def test_the_table_of_a_rubber_without_a_knee_is_read_by_a_case():
-    """Of neo-Hookean curves the softening form keeps mu_inf alone."""
+    """The softening form of neo-Hookean curves keeps mu_inf alone."""
     strain = np.linspace(0.02, 0.6, 20)
     tests = [TensionTest(strain, form_of("neo-hookean").columns("uniaxial", strain)[:, 0] * 0.3e6)]
     fit = fit_rubber(tests, form_of("softening"))

@@ -112,7 +112,7 @@ def test_a_record_is_the_run_that_it_is(tmp_path, command_line):
 
 
 def test_the_flow_of_a_cycle_is_that_of_its_parameters_at_all_instants():
-    """What a wall displaces leaves by the blend of the flow models that a cycle has, and its largest flow lies between
+    """Fluid that a wall displaces leaves by the blend of the flow models of a cycle, whose largest flow lies between
     the samples of the series.
     """
     model = SimpleNamespace(size=7, nodal=lambda x: x, flow=Channel(np.linspace(0.0, 0.6, 7), 1e-9))
@@ -130,8 +130,8 @@ def test_the_flow_of_a_cycle_is_that_of_its_parameters_at_all_instants():
 
 
 def test_modes_of_a_flow_without_inertia_have_its_unknowns():
-    """Those by which periodic motions and normal forms are started: the pressures of a mode are the same with its inlet
-    velocity as without unknowns.
+    """Modes by which periodic motions and normal forms are started have the same pressures with their inlet velocity as
+    without unknowns.
     """
     law, random = Channel(np.linspace(0.0, 0.6, 5), 1e-9, unsteady=False), np.random.default_rng(1)
     area, slope, place = np.linspace(1e-3, 5e-3, 5), random.standard_normal((5, 3)), Mu(pressure=6e3, density=800.0)

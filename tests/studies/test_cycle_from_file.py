@@ -245,7 +245,7 @@ def test_a_motion_starts_at_the_value_that_its_own_valve_has(monkeypatch, over, 
 
 
 def test_the_cycle_nearest_to_this_wall_is_taken():
-    """Of a branch over the thickness, which counts from the wall of its own case; one over a line that is not there
+    """Values of a branch over the thickness count from the wall of its own case; one over a line that is not there
     needs a number.
     """
     points = [SimpleNamespace(number=k, value=value) for k, value in enumerate((0.8, 1.0, 1.2))]

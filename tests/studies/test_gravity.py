@@ -161,7 +161,7 @@ def test_studies_over_the_density_follow_the_steady_state():
 
 
 def test_each_density_has_a_model_of_its_levels(monkeypatch):
-    """Of periodic motions and normal forms, with the other parameters of the design that are asked for."""
+    """Models of periodic motions and normal forms, with the other parameters of the design that are asked for."""
     monkeypatch.setattr(place, "ValveModel", lambda case: SimpleNamespace(case=case, flow=own.flow))
     case, lying = thesis_case(DOWN), thesis_case()
     own = SimpleNamespace(case=case, flow=SimpleNamespace(names=("inlet",)))

@@ -278,7 +278,7 @@ class DesignResult(StudyResult):
         return together(aim, here, [one.reserve for one in here])[0] if here else None
 
     def _of_case(self, asked: Statement) -> list[AtHead]:
-        """What the case itself does at the heads of a statement, on the mesh of the search; nothing where it has no
+        """Values of the case itself at the heads of a statement, on the mesh of the search; none where it has no
         state.
         """
         starts = [one.start for one in self.variables]

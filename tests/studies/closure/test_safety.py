@@ -136,7 +136,7 @@ def test_leak_is_that_of_a_laminar_film_and_of_a_jet_at_its_ends():
 
 
 def test_the_leak_of_a_state_goes_through_its_least_opening():
-    """Of the inner face: round the side edge of the lip it has less width than the middle of the wall."""
+    """The inner face has less width than the middle of the wall round the side edge of the lip."""
     case = thesis_case(dict(SMALL))
     model = ClosedValve(case)
     pressed = Pressed(model, 2e-5 * np.random.default_rng(0).standard_normal(model.size), 2e3)

@@ -402,7 +402,7 @@ def test_samples_are_told_at_the_median_of_their_pressures(pressure, told):
 
 @pytest.mark.parametrize("level", ["10 %", "auto"])
 def test_numbers_that_are_taken_as_inputs_can_be_set(level):
-    """Of built-in materials, before and after their strain levels are found."""
+    """Numbers of built-in materials, before and after their strain levels are found."""
     case = load_case(None, [f"materials.strain_level={level}"])
     settled = case.replace(case.materials.at_levels(dict.fromkeys(RUBBERS, 0.2) if level == "auto" else {}))
     taken = []
