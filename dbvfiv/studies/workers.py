@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import multiprocessing
 import os
 import pickle
@@ -11,7 +12,7 @@ from collections.abc import Callable, Hashable, Iterable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Executor, ProcessPoolExecutor, wait
 from dataclasses import dataclass
 from pathlib import Path
-from tempfile import TemporaryDirectory, mkstemp
+from tempfile import TemporaryDirectory
 from typing import Annotated, Any
 
 from pydantic import BeforeValidator
@@ -24,6 +25,7 @@ from ..runtime import mpi_size, prepare
 TRIES = 3
 #: Processes of this machine at most, and seconds in which a scheduler has to answer.
 MOST, PATIENCE = 1024, 10
+_numbers = itertools.count()
 _SCHEMES = ("tcp://", "tls://", "ucx://")
 
 
@@ -123,6 +125,8 @@ class Workers:
 
     def give(self, start: Callable[..., Any], *data: Any, here: Any = None) -> None:
         """Context of the tasks that are shared from now on."""
+        if self._file is not None:
+            self._file.unlink()
         self._file, self._here = None, here
         self._context = None if self._works_alone else pickle.dumps((start, data))
 
@@ -168,7 +172,9 @@ class Workers:
             lost: list[Any] = []
             finished = False
             try:
-                for task, result in self._round(left, ask):
+                # what was in flight when a worker died goes alone: a task that kills all workers takes no other along
+                suspects = [task for task in left if tries[task]]
+                for task, result in self._round(suspects[:1] or left, ask):
                     if result is Lost:
                         lost.append(task)
                         continue
@@ -238,7 +244,7 @@ class Workers:
             return self._context
         if self._file is None:
             self._folder = self._folder or TemporaryDirectory(prefix="dbvfiv-")
-            self._file = Path(mkstemp(dir=self._folder.name)[1])
+            self._file = Path(self._folder.name, str(next(_numbers)))  # a worker tells contexts by their names
             self._file.write_bytes(self._context)
         return self._file
 

@@ -81,8 +81,17 @@ def test_processes_killed_between_two_calls_are_started_again():
 
 def test_a_task_that_kills_every_worker_is_given_up(monkeypatch):
     monkeypatch.setattr(module, "TRIES", 2)
-    found = shared(1, dies, (1, 2))
-    assert found[2] is Lost and found[1] in (Lost, expected()[1])
+    assert shared(1, dies, (2, 1, 3)) == {2: Lost, 1: expected()[1], 3: expected()[3]}
+
+
+def test_contexts_that_are_over_leave_nothing_behind():
+    found = []
+    with Workers(1, start, (1,), print) as team:
+        for power in range(1, 8):
+            team.give(start, power)
+            assert dict(team.share((8,), lambda task: Work(root_of, (task,)))) == {8: 8 ** (1 / power)}
+            found.append((len(os.listdir("/proc/self/fd")), len([*team._sent.parent.iterdir()])))
+    assert found == found[:1] * 7
 
 
 def test_what_is_known_is_not_asked_of_workers():
