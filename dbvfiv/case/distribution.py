@@ -182,7 +182,10 @@ class Distribution:
 def samples_file(text: str) -> Path | None:
     """File that the text of a distribution names for its samples; None for any other text."""
     match = _FORM.fullmatch(text)
-    return None if match is None or match[1] != "samples" or "," in match[2] else Path(match[2].strip())
+    if match is None or match[1] != "samples":
+        return None
+    inside = match[2].strip()  # numbers begin with no slash, full names do
+    return None if "," in inside and not inside.startswith("/") else Path(inside)
 
 
 def with_full_names(text: str, folder: Path | None) -> str:

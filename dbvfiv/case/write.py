@@ -72,7 +72,7 @@ def case_toml(case: Section, comments: bool = True, about: str = "") -> str:
 def write_case(case: Section, path: Path) -> None:
     """Write a case without comments into a file, whose folder is made where there is none."""
     path.parent.mkdir(parents=True, exist_ok=True)
-    path.write_text(case_toml(case, comments=False) + "\n")
+    path.write_text(case_toml(case, comments=False) + "\n", encoding="utf-8")
 
 
 def _defaults_said(case: Section) -> str:

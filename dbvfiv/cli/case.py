@@ -175,7 +175,7 @@ def _write_key_points(valve, file: Path, points: int, profiles: int, as_json: bo
 def _write(target: str, text: str) -> None:
     """Write a new file."""
     try:
-        with Path(target).open("x") as file:
+        with Path(target).open("x", encoding="utf-8") as file:
             file.write(text)
     except FileExistsError:
         raise CaseError(f"{target!r} exists already and is not overwritten; choose another name.") from None

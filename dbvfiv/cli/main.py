@@ -20,6 +20,7 @@ import typer
 from .. import __version__
 from ..errors import CaseError, DiskFull, SolveError
 from . import case, materials, pages, results, studies
+from .terminal import Stopped
 
 # Typer brings its own Click in newer versions and uses the separate package in older ones.
 _UsageProblem = typer.BadParameter.__mro__[2]
@@ -141,9 +142,9 @@ def _outcome(arguments: Sequence[str], ending: Ending) -> int:
         return _report(str(error), 2)
     except (SolveError, DiskFull) as error:
         return _report(str(error), 1)
-    except (KeyboardInterrupt, typer.Abort):
+    except (KeyboardInterrupt, typer.Abort, Stopped) as error:
         how, status = ("Terminated", 143) if ending.terminated else ("Interrupted", 130)
-        return _report(f"{how}; what was finished before has been kept.", status)
+        return _report(f"{how}; {error}." if isinstance(error, Stopped) else f"{how}.", status)
     except typer.Exit as leave:
         return leave.exit_code
     except _UsageProblem as problem:

@@ -11,7 +11,7 @@ import typer
 
 from ..errors import CaseError, SolveError
 from ..observer import Progress
-from .terminal import AsJson, CaseFile, Override, in_units, print_either, print_json
+from .terminal import AsJson, CaseFile, Override, Stopped, in_units, print_either, print_json
 
 
 def report(
@@ -79,8 +79,12 @@ def report(
     name = case_file.stem if case_file else "dbv12"
     page = output or Path(f"{name}-report.html")
     leave_out = (*(without or ()), *(() if cycle else ("cycle",)))
+    folder = runs or page.with_suffix("")
     with in_units(case.units):
-        found = gather(case, name, runs or page.with_suffix(""), leave_out, workers or min(4, processors()), as_json)
+        try:
+            found = gather(case, name, folder, leave_out, workers or min(4, processors()), as_json)
+        except KeyboardInterrupt:
+            raise Stopped(f"the same command goes on with what was found before, in {folder}") from None
     write_page(found, page)
     written = [page, *([write_pdf(page, page.with_suffix(".pdf"))] if pdf else [])]
     answered = answers(found)

@@ -55,8 +55,8 @@ def info(
         facts["complete"] = result.complete
         around, along = mesh.shape
         facts["mesh"] = {"around": around, "along": along, "layers": list(mesh.layer_names)}
-        facts["case"] = header.case.to_dict() if case else None
-        print_json(facts | result.summary())
+        asked = {"case": header.case.to_dict()} if case else {}  # of a design its summary has verdicts by that name
+        print_json(facts | {"case": None} | result.summary() | asked)
     elif case:
         print(case_toml(header.case, comments=False), end="")
     else:

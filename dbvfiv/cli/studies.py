@@ -15,7 +15,18 @@ from ..errors import CaseError, SolveError
 from ..observer import Progress
 from ..studies import KINDS
 from ..studies.request import AnimationOption, is_sheet
-from .terminal import AsJson, CaseFile, Output, Override, PlotFolder, ResultFile, in_units, print_answer, print_figures
+from .terminal import (
+    AsJson,
+    CaseFile,
+    Output,
+    Override,
+    PlotFolder,
+    ResultFile,
+    Stopped,
+    in_units,
+    print_answer,
+    print_figures,
+)
 
 #: Arguments that the command of a study may take from those that all share.
 _SHARED = ("case", "plots", "output")
@@ -166,7 +177,7 @@ def _report(
 
     Raises
     ------
-    KeyboardInterrupt
+    Stopped
         If a run was interrupted.
     SolveError
         If something was not reached.
@@ -190,7 +201,8 @@ def _report(
         print_figures(draw(), plots)
     results = [result, *others]
     if any(each.interrupted for each in results):
-        raise KeyboardInterrupt
+        kept = f"what was finished before has been kept in {output}"
+        raise Stopped(kept if output else "nothing was kept, as no -o was given")
     missed = [clause for each in results if (clause := each.shortfall()) is not None]
     if missed:
         raise SolveError(f"{'; '.join(missed)}.")  # why was said when it happened

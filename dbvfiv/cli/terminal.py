@@ -65,6 +65,10 @@ PlotFolder = Annotated[
 ]
 
 
+class Stopped(Exception):
+    """End of a command from outside; the text says what was kept."""
+
+
 @contextmanager
 def in_units(units: Units) -> Iterator[None]:
     """Context whose failures are told in the units of a case."""

@@ -240,6 +240,12 @@ class Record(ABC):
         """Notes of one kind."""
         return [note for note in self.log if note["what"] == what]
 
+    def latest(self, what: str) -> list[dict[str, Any]]:
+        """Notes of one kind of the last attempt: whoever goes on from an earlier one says again what still holds."""
+        log = self.log
+        last = max((i for i, note in enumerate(log) if note["what"] == "begin"), default=0)
+        return [note for note in log[last:] if note["what"] == what]
+
     @property
     def warnings(self) -> tuple[str, ...]:
         """Sentences, each once."""
@@ -256,10 +262,7 @@ class Record(ABC):
         return next((note["text"] for note in reversed(self.log) if note["what"] == "settled"), "")
 
     def _said(self, what: str) -> tuple[str, ...]:
-        """Sentences of the last attempt: whoever goes on from an earlier one says again what still holds."""
-        log = self.log
-        last = max((i for i, note in enumerate(log) if note["what"] == "begin"), default=0)
-        return tuple(dict.fromkeys(note["text"] for note in log[last:] if note["what"] == what))
+        return tuple(dict.fromkeys(note["text"] for note in self.latest(what)))
 
     @property
     def complete(self) -> bool:
@@ -430,7 +433,7 @@ class StoredRecord(Record):
             self.tables = {table.name: table for table in tables(self.mesh)}
             self._log = read_log(file)
             for table in self.tables.values():
-                group = file["tables"][table.name]
+                group = file["tables"].get(table.name, ())
                 if any(column.name not in group for column in table.columns):
                     raise older_program(self.path, file)
             self._count = {name: read_rows(file["tables"][name]) for name in self.tables}

@@ -265,6 +265,7 @@ def cycle_run(found: Gathered) -> Iterator[Run]:
         low = max(low, rest + 0.5 * (begins["value"] - rest))
     start = "first" if begins["gains"] else "last"
     keys = {"cycle.over": f"pressure={low:.9g}:{high:.9g}:4", "cycle.start": start}
+    keys |= dict.fromkeys(("cycle.start_file", "cycle.start_cycle"))  # of cycles that the case starts elsewhere
     yield Run("cycle", "cycle", "limit cycle", keys, 200)
 
 
@@ -378,8 +379,9 @@ class _Studies:
 
     def _make(self, run: Run) -> None:
         try:
-            kept_run(run.kind, self._asked(run), self._path(run), self.bar.of(run.name))
+            header = kept_run(run.kind, self._asked(run), self._path(run), self.bar.of(run.name)).header
             result = load_result(self._path(run))  # without the model, which holds as much memory as all results
+            result.record.header = header
             self.found.results[run.name] = result
             for sentence in result.warnings if is_on_own_mesh(run.name) else ():
                 self.bar.warn(sentence)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from importlib import import_module
 from pathlib import Path
@@ -478,15 +478,15 @@ def kept_run(kind: str, session: Session, path: Path, observer: Observer | None 
     """
     session = session.asked(kind, observer)
     kept = _load_if_readable(path)
-    sheet = {name: getattr(session.case, name) for name in ("project", "report")}  # these compute nothing
+    # these compute nothing, and say how it is told
+    sheet = {name: getattr(session.case, name) for name in ("project", "report")}
     if kept is not None and kept.kind == kind and kept.case.model_copy(update=sheet) == session.case:
-        if kept.record.complete:
-            return kept
-        result = resume_result(path, observer, **choices)
+        result = kept if kept.record.complete else resume_result(path, observer, **choices)
     else:
         result = session.perform(kind, path, observer, **choices)
     if not result.record.complete:
         raise KeyboardInterrupt
+    result.record.header = replace(result.header, case=result.case.model_copy(update=sheet))
     return result
 
 

@@ -185,6 +185,20 @@ def states_of(result: StudyResult, table: str) -> tuple[State, ...]:
 UNREACHED = "unreached"
 
 
+def miss(record: GrowingRecord, pressure: float, error: SolveError) -> None:
+    """Keep a pressure, Pa, that is not reached: it is not tried again, and its failure is said again."""
+    record.note(UNREACHED, pressure=pressure, text=str(error))
+    record.fail(str(error))
+
+
+def missed_before(record: GrowingRecord) -> list[dict[str, Any]]:
+    """Notes on pressures that an earlier attempt did not reach, whose failures are said again."""
+    missed = record.notes(UNREACHED)
+    for note in missed:
+        record.fail(note["text"])
+    return missed
+
+
 def reach_states(
     model: ValveModel,
     case: Case,
@@ -219,12 +233,10 @@ def reach_states(
     states.extend(read_states(record, table))
     if states:
         restore_path(path, record, table, len(states) - 1, states[-1])
-    missed, failures = record.notes(UNREACHED), []
+    missed = missed_before(record)
+    failures = [note["text"] for note in missed]
     # each as often as it was met: pressures may come back
     left = Counter([*(state.pressure for state in states), *(note["pressure"] for note in missed)])
-    for note in missed:
-        failures.append(note["text"])
-        record.fail(note["text"])
     for pressure in pressures:
         if left[pressure] > 0:
             left[pressure] -= 1
@@ -236,8 +248,7 @@ def reach_states(
         except SolveError as error:
             path.pressure, path.q, path.slope, path.step = before  # as in a run that goes on without this pressure
             failures.append(str(error))
-            record.note(UNREACHED, pressure=pressure, text=str(error))
-            record.fail(str(error))
+            miss(record, pressure, error)
             continue
         record.append(table, state_row(model, state) | restart_row(path))
         states.append(state)

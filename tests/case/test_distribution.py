@@ -68,6 +68,10 @@ def test_samples_come_from_a_list_or_a_file(tmp_path):
     (tmp_path / "gaps.txt").write_text("# mm\n1 mm\n3 mm\n")
     many = f"samples({', '.join(f'{0.1 + number / 1000:.8g}' for number in range(64))})"
     assert with_full_names(many, tmp_path) == many
+    folder = tmp_path / "Valves, 2024"  # a comma in a name is no list of values
+    folder.mkdir()
+    (folder / "gaps.txt").write_text("0.1\n0.2\n0.3\n")
+    assert Distribution.parse(with_full_names("samples(gaps.txt)", folder), LENGTH).numbers == (0.1, 0.2, 0.3)
     text = with_full_names("samples(gaps.txt)", tmp_path)
     assert Distribution.parse(text, LENGTH).numbers == (1e-3, 3e-3)
     assert listed.share_outside(1.5, 3.0) == 0.25

@@ -417,17 +417,22 @@ def test_cycles_are_followed_from_onsets_that_open_and_close_the_lips(name, coun
     point = {"edge": True, "value": 5e3, "gains": True, "frequency": 30.0, "symmetry": name}
     results = {"onset": SimpleNamespace(points=(point,))}
     found = SimpleNamespace(case=case, get=results.get, modes={6e3: SimpleNamespace(stable=False)})
-    assert len([*cycle_run(found)]) == count
+    runs = [*cycle_run(found)]
+    assert len(runs) == count
+    own = case.replace({"cycle.start": "file", "cycle.start_file": __file__})
+    assert all(own.replace(run.changes).cycle.start_file is None for run in runs)
 
 
 def test_a_second_report_computes_nothing(made):
     found, page = made
     folder = page.parent / "runs"
     before = {path.name: path.stat().st_mtime_ns for path in folder.iterdir()}
-    case = load_case(None, [*KEYS, "project.revision=B"])  # a new sheet is no new computation
+    # a new sheet is no new computation, and everything is told in its units
+    case = load_case(None, [*KEYS, "project.revision=B", "project.units=ft"])
     again = gather(case, "valve", folder, LEFT_OUT, quiet=True)
     assert {path.name: path.stat().st_mtime_ns for path in folder.iterdir()} == before
     assert [one.answer for one in answers(again)] == [one.answer for one in answers(found)]
+    assert {result.case.project for result in again.results.values()} == {case.project}
 
 
 def test_a_study_that_fails_is_named_on_page_one(command_line, one_sentence, tmp_path):

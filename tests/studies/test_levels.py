@@ -9,6 +9,7 @@ import dbvfiv
 from dbvfiv.case import CaseError
 from dbvfiv.case.materials import Materials
 from dbvfiv.case.write import case_toml
+from dbvfiv.errors import SolveError
 from dbvfiv.model.material_stability import tension_of
 from dbvfiv.model.strain_level import settle_levels
 from dbvfiv.studies.case import Case, load_case, thesis_case
@@ -62,6 +63,23 @@ def test_pressures_are_those_asked_for_also_in_a_run_that_goes_on(tmp_path):
     assert resumed.warnings == whole.warnings and any(
         "tests go from 10" in said for said in whole.summary()["warnings"]
     )
+
+
+def test_a_pressure_that_was_missed_is_not_tried_again_where_a_run_goes_on(tmp_path, monkeypatch):
+    tried = []
+
+    def miss(case, pressure, record, levels):
+        tried.append(pressure)
+        if len(tried) == 2:
+            raise KeyboardInterrupt
+        raise SolveError(f"No levels agree at {pressure:g} Pa.")
+
+    monkeypatch.setattr("dbvfiv.studies.levels.study.agree_levels", miss)
+    case = thesis_case(COARSE | {"levels.pressures": [1e3, 2e3]})
+    assert Session(case).perform("levels", tmp_path / "levels.h5").interrupted
+    resumed = dbvfiv.resume(tmp_path / "levels.h5")
+    assert tried == [1e3, 2e3, 2e3]
+    assert resumed.failures == ("No levels agree at 1000 Pa.", "No levels agree at 2000 Pa.")
 
 
 def levels_of(result):

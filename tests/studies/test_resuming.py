@@ -20,6 +20,7 @@ from dbvfiv.studies.map.column import MapColumn
 from dbvfiv.studies.modes.search import FoundModes
 from dbvfiv.studies.session import Session, find_study, kept_run, load_result
 from dbvfiv.studies.stability.samples import Sample
+from dbvfiv.studies.steady.study import LIMIT
 from tests.golden.compare import differences, steady
 from tests.observers import Stop
 from tests.small_valves import FORMER
@@ -192,6 +193,7 @@ def attempts(monkeypatch):
     def run(_session, record, **choices):
         made.append((record.header.case, choices))
         record.begin(record.header.kind, 2)
+        record.note(LIMIT, pressure=1e3 + len(made), highest=True)
         if len(made) == 1:
             record.fail("At 2 kPa: no state.")
             raise KeyboardInterrupt
@@ -209,7 +211,11 @@ def test_a_kept_run_that_missed_a_pressure_and_was_interrupted_goes_on(coarse_ca
     with pytest.raises(KeyboardInterrupt):
         kept_run("steady", session, path)
     for _ in range(2):
-        assert kept_run("steady", session, path).complete and len(attempts) == 2
+        kept = kept_run("steady", session, path)
+        assert kept.complete and len(attempts) == 2
+        assert [limit.pressure for limit in kept.limits] == [1002.0]  # of the attempt that came to its end
+    told = kept_run("steady", session.replace({"project.units": "ft"}), path)
+    assert told.case.project.units == "ft" and len(attempts) == 2
 
 
 def test_what_settled_levels_said_is_said_again(coarse_case, tmp_path, attempts):

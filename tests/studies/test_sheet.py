@@ -1,14 +1,16 @@
 """The catalogue sheet against the states it is made of."""
 
 import csv
+import errno
 from types import SimpleNamespace
 
 import pytest
 
 import dbvfiv
+from dbvfiv.case import CaseError
 from dbvfiv.studies.case import load_case
 from dbvfiv.studies.session import Session
-from dbvfiv.studies.steady import sheet_rows
+from dbvfiv.studies.steady import require_sheet, sheet_rows
 from tests.small_valves import THESIS_SET
 
 OPTIONS = (*THESIS_SET, "--set", "mesh.around=4", "--set", "mesh.along=6")
@@ -43,6 +45,15 @@ def test_a_sheet_of_two_sizes_in_units_of_choice(command_line, tmp_path):
     assert float(rows[2]["bore [in]"]) == pytest.approx(2 * float(rows[0]["bore [in]"]), rel=1e-5)
     # lengths twice as large at the same head: four times the flow
     assert float(rows[2]["flow [gpm]"]) == pytest.approx(4 * float(rows[0]["flow [gpm]"]), rel=1e-4)
+
+
+def test_a_sheet_that_cannot_be_written_is_refused_before_anything_is_solved(tmp_path, monkeypatch):
+    def refuse(folder):
+        raise PermissionError(errno.EACCES, "Permission denied")
+
+    monkeypatch.setattr("dbvfiv.record.files.check_folder", refuse)
+    with pytest.raises(CaseError, match="catalogue.csv' cannot be written .Permission denied"):
+        require_sheet(tmp_path / "catalogue.csv")
 
 
 @pytest.mark.parametrize("length", [None, 20.0])

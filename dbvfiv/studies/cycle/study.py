@@ -379,11 +379,11 @@ class _Keeper:
             return
         orbit = follower.orbit(item.cycle)
         row = cycle_row(item, orbit, self.leg)
-        # the series first: the row vouches for it
+        # the series and the step first: the row vouches for them
         record.extend(SERIES, series_rows(record.rows(CYCLES), item.motion, orbit.model.size))
-        record.append(CYCLES, row)
         if self._tracer is not None:
-            record.note(STEP, leg=self.leg, cycles=record.rows(CYCLES), step=self._tracer.next_step)
+            record.note(STEP, leg=self.leg, cycles=record.rows(CYCLES) + 1, step=self._tracer.next_step)
+        record.append(CYCLES, row)
         if row["least_speed"] < 0:
             record.warn(DRAWN_IN)
         record.item(SimpleNamespace(**row))

@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 
 from ...case.parameters import Mu
 from ...case.statement import QUANTITIES, Statement
-from ...case.write import write_case
+from ...case.write import case_toml, write_case
 from ...drawing.style import headline, limits, log_axis, new_figure, parameter_label
 from ...errors import SolveError
 from ...model.closed import close_valve
@@ -117,9 +117,17 @@ def run(session: Session, record: GrowingRecord, cases: Path | None = None) -> N
                 f"No design holds all constraints{_for(bound, bounds)}: the nearest misses one {_missed(best)}."
             )
         if cases is not None:
-            write_case(problem.case_at(best.values), cases / f"design-{number + 1}.toml")
+            _write_new(problem.case_at(best.values), cases / f"design-{number + 1}.toml", record)
     for number, design in [(CASE, None), *result.best.items()]:
         _verify(problem, case, number, design, result.pressures, record)
+
+
+def _write_new(case: Case, path: Path, record: GrowingRecord) -> None:
+    """Write a case file; one that is there by now stays, with a warning where it is another."""
+    if not path.exists():
+        write_case(case, path)
+    elif path.read_text(encoding="utf-8").rstrip() != case_toml(case, comments=False).rstrip():
+        record.warn(f"The case file {str(path)!r} is there by now, of another case, and is not overwritten.")
 
 
 def _for(bound: float, bounds) -> str:

@@ -16,6 +16,7 @@ from ...record.record import GrowingRecord
 from ...record.table import TEXT, Column, Shown, TableSpec, printed_head, printed_row
 from ..result import StudyResult
 from ..session import Session, Study
+from ..state import miss, missed_before
 
 LEVELS = "levels"
 _LEVEL = "Strain level whose constants it has; NaN of rubbers without levels"
@@ -42,7 +43,8 @@ def run(session: Session, record: GrowingRecord) -> None:
             f"No layer is one of the built-in rubbers {', '.join(RUBBERS)}, which alone have strain levels.", "layers"
         )
     layer, kept = record.column(LEVELS, "layer"), record.column(LEVELS, "pressure")
-    left = Counter(kept[layer == layer[:1]].tolist())  # as often as asked for: pressures may come back
+    missed = [note["pressure"] for note in missed_before(record)]
+    left = Counter([*kept[layer == layer[:1]].tolist(), *missed])  # as often as asked for: pressures may come back
     levels = last_levels(record)
     record.begin("levels", len(case.levels.pressures))
     for pressure in case.levels.pressures:
@@ -53,7 +55,7 @@ def run(session: Session, record: GrowingRecord) -> None:
         try:
             found = agree_levels(case, pressure, record, levels)
         except SolveError as error:
-            record.fail(str(error))
+            miss(record, pressure, error)
             continue
         state = {"pressure": found.state.pressure, "mass_flow": found.state.mass_flow}
         rows = [state | vars(layer) | {"layer": layer.number} for layer in found.layers]

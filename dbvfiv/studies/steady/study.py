@@ -92,28 +92,23 @@ def _note_curve(model: ValveModel, states: Sequence[SteadyState], record: Growin
     the lip has parted.
     """
     path, case = LoadPath(model, SteadyOptions.of(model.case), observer=record), model.case
-
-    def keep(what: str, **found: Any) -> None:
-        if {"what": what} | found not in record.notes(what):  # an interrupted run may have kept it
-            record.note(what, **found)
-
     with suppress(SolveError):
         path.go_to(max(state.pressure for state in states))
     limits = path.curve.limits()
     for limit in limits:
-        keep(LIMIT, **limit._asdict())
+        record.note(LIMIT, **limit._asdict())
     span = [limit.pressure for limit in limits]
     for state in states:
         if case.valve.is_preset and not state.is_sealed and state.pressure > model.flow.back:
             width, pressed = parted_width(model, state.q)
-            keep(PARTED, pressure=state.pressure, width=width, pressed=pressed)
+            record.note(PARTED, pressure=state.pressure, width=width, pressed=pressed)
         if len(span) < 2 or not min(span) <= state.pressure <= max(span):
             continue
         for q in path.curve.passages(state.pressure):
             other = redescribe(model, replace(state, q=q))
             if abs(other.lip_displacement - state.lip_displacement) > _SAME * abs(state.max_displacement):
                 found = {name: getattr(other, name) for name in ("lip_opening", "mass_flow", "max_displacement")}
-                keep(FURTHER, pressure=state.pressure, **found)
+                record.note(FURTHER, pressure=state.pressure, **found)
 
 
 def _met(limits: Sequence[LimitPoint], rising: bool) -> list[float]:
@@ -311,7 +306,7 @@ class SteadyResult(StudyResult):
     @property
     def limits(self) -> list[LimitPoint]:
         """Limit points of the curve of equilibria up to the highest pressure, in its order."""
-        return [LimitPoint(note["pressure"], note["highest"]) for note in self.record.notes(LIMIT)]
+        return [LimitPoint(note["pressure"], note["highest"]) for note in self.record.latest(LIMIT)]
 
     @cached_property
     def measured(self) -> Measured:
@@ -338,7 +333,7 @@ class SteadyResult(StudyResult):
         states = {"points": [state.summary() for state in self.states], "cracking": cracking}
         if self.limits:
             states["limit_points"] = [limit._asdict() for limit in self.limits]
-            further = self.record.notes(FURTHER)
+            further = self.record.latest(FURTHER)
             states["further_equilibria"] = [{name: note[name] for name in _FURTHER} for note in further]
         return states | self.measured.summary() | self.ending()
 
@@ -354,7 +349,7 @@ class SteadyResult(StudyResult):
         return [*lines, *self.measured.sentences()]
 
     def _parted_sentences(self) -> list[str]:
-        part = [note for note in self.record.notes(PARTED) if 0 < note["width"] < note["pressed"] * (1 - 1e-9)]
+        part = [note for note in self.record.latest(PARTED) if 0 < note["width"] < note["pressed"] * (1 - 1e-9)]
         return [
             f"At {digits(note['pressure'], 4)} Pa {1e3 * note['width']:.3g} of the {1e3 * note['pressed']:.3g} mm of "
             "the lips that touch at rest have parted; the rest is pressed."
@@ -379,7 +374,7 @@ class SteadyResult(StudyResult):
             f"Limit points: a pressure that rises leaves the curve of equilibria at {up} and jumps "
             f"to where it goes on{back}. The states are those of a pressure that rises slowly from rest." + rows
         ]
-        for note in self.record.notes(FURTHER):
+        for note in self.record.latest(FURTHER):
             said.append(
                 f"At {digits(note['pressure'], 4)} Pa there is another equilibrium, with a lip opening of "
                 f"{1e3 * note['lip_opening']:.3g} mm, {note['mass_flow']:.4g} kg/s and displacements up to "

@@ -383,21 +383,15 @@ class SweepResult(StudyResult):
 
     kind = "sweep"
 
-    def _latest(self, what: str) -> dict[str, Any]:
-        """Last note of a kind of this attempt, empty without one."""
-        log = self.record.log
-        last = max((i for i, note in enumerate(log) if note["what"] == "begin"), default=0)
-        return next((note for note in log[:last:-1] if note["what"] == what), {})
-
     @cached_property
     def _over(self) -> dict[str, Any]:
         """Closing note of a sweep that is over; empty for one that goes on or was killed."""
-        return self._latest("over")
+        return next(reversed(self.record.latest("over")), {})
 
     def _rows(self, name: str) -> list[dict[str, Any]]:
         """Rows of a table; of a sweep that goes on or was killed, what was kept on the way."""
         if not self._over:
-            return self._latest("kept").get(name, [])
+            return next(reversed(self.record.latest("kept")), {}).get(name, [])
         return self.record.table_rows(next(spec for spec in tables_of(self.mesh) if spec.name == name))
 
     @property

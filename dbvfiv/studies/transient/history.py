@@ -433,18 +433,18 @@ class Keeper:
     def __init__(self, record: GrowingRecord, model: ValveModel):
         self.record, self.model = record, model
         self._sizes = {name: table.row_bytes for name, table in record.tables.items()}
-        self._kept = {name: record.rows(name) for name in record.tables}
-        self._pending: dict[str, list[Any]] = {c.name: [] for c in record.tables[HISTORY].columns}
+        self._names = tuple(c.name for c in record.tables[HISTORY].columns)
+        self._pending: list[Mapping[str, Any]] = []
         self._begun = self._written = self._restarted = monotonic()
 
     @property
     def rows(self) -> int:
         """Rows of the history, those held back included."""
-        return self._kept[HISTORY] + len(self._pending["time"])
+        return self.record.rows(HISTORY) + len(self._pending)
 
     def __contains__(self, name: str) -> bool:
         """True where the history has a column of that name."""
-        return name in self._pending
+        return name in self._names
 
     def __getitem__(self, name: str) -> np.ndarray:
         """A column of the history."""
@@ -453,25 +453,21 @@ class Keeper:
 
     def append(self, row: Mapping[str, Any]) -> None:
         """Take a row of the history; it is written with others within some seconds."""
-        for name, values in self._pending.items():
-            values.append(row[name])
+        self._pending.append(row)
         if monotonic() - self._written > BATCH_SECONDS:
             self.flush()
 
     def flush(self) -> None:
         """Write what was held back."""
-        rows, self._pending = self._pending, {name: [] for name in self._pending}
+        rows, self._pending = self._pending, []
         self._written = monotonic()
-        count = len(rows["time"])
-        if count:
-            self.record.extend(HISTORY, rows)
-            self._kept[HISTORY] += count
+        if rows:
+            self.record.extend(HISTORY, {name: [row[name] for row in rows] for name in self._names})
 
     def state(self, state: MotionState, row: Mapping[str, Any]) -> None:
         """Keep a full state; `row` is that of the history."""
         moved = {"nodal": self.model.nodal(state.q), "nodal_rate": self.model.nodal(state.v)}
         self.record.append(STATES, {**row, **moved})
-        self._kept[STATES] += 1
 
     def restart(self, progress: Progress, needed: bool = False) -> None:
         """Keep a point to go on from, after all that came before it.
@@ -482,12 +478,11 @@ class Keeper:
         self.flush()
         if needed or self._restart_pays():
             self.record.append(RESTART, self.record.tables[RESTART].row(progress))
-            self._kept[RESTART] += 1
             self._restarted = monotonic()
 
     def _restart_pays(self) -> bool:
-        others = sum(self._sizes[name] * self._kept[name] for name in (HISTORY, STATES))
-        if self._sizes[RESTART] * self._kept[RESTART] <= RESTART_SHARE * others:  # the first is always there
+        kept = {name: size * self.record.rows(name) for name, size in self._sizes.items()}
+        if kept[RESTART] <= RESTART_SHARE * (kept[HISTORY] + kept[STATES]):  # the first is always there
             return True
         now = monotonic()
         return now - self._restarted > max(RESTART_SECONDS, RESTART_LOSS * (now - self._begun))

@@ -447,9 +447,9 @@ class Runner:
 
     def _save(self) -> None:
         """Keep the full state of the last row."""
-        self.history.state(self.progress.state, self._row)
-        self._saved_at = self._row["time"]
+        self._saved_at = self._row["time"]  # before: Ctrl-C comes when the state is written
         self.progress.saved += 1
+        self.history.state(self.progress.state, self._row)
 
     def _checkpoint(self, needed: bool = False) -> None:
         """Make the past safe, and the future independent of it but for the state."""

@@ -1,5 +1,6 @@
 """Designs of a small valve: gradients of margin, loss and mass; run, file, interruption, case file, sentences."""
 
+import json
 from types import SimpleNamespace
 
 import numpy as np
@@ -120,7 +121,9 @@ def test_the_design_is_better_and_holds(valve, found):
     assert "stable at 2 heads" in found.evidence(0) and len(found.verified(CASE)["pressure"]) == 2
 
 
-def test_the_case_file_is_the_design(found):
+def test_the_case_file_is_the_design(found, command_line):
+    told = json.loads(command_line("info", found.path, "--json", "--case").out)
+    assert told["case"]["valve"] == found.case.to_dict()["valve"] and told["designs"]
     case = dbvfiv.load(found.path.parent / "design-1.toml").case
     assert case.valve.lip_half_width == pytest.approx(found.best[0].values[1], rel=1e-12)
     assert case.valve.thickness_factor == pytest.approx(found.best[0].values[0], rel=1e-12)

@@ -191,6 +191,19 @@ def test_what_is_said_of_the_rubber_is_said_again(tmp_path, valve, monkeypatch):
     assert "The constants do not hold." in dbvfiv.resume(path).warnings
 
 
+def test_a_state_in_whose_write_a_run_is_interrupted_is_kept_once(tmp_path, valve, monkeypatch):
+    inner = GrowingRecord.append
+
+    def append(record, table, row):
+        inner(record, table, row)
+        if table == STATES and record.rows(STATES) == 2:
+            raise KeyboardInterrupt
+
+    monkeypatch.setattr(GrowingRecord, "append", append)
+    run = transient(valve(SHORT), output=tmp_path / "run.h5")
+    assert run.interrupted and [state.time for state in run.states] == pytest.approx([0, 0.005])
+
+
 def test_torn_restart_points_are_passed_over(tmp_path, valve, all_restart_points):
     path = tmp_path / "run.h5"
     whole = transient(valve(SHORT), output=path)
