@@ -141,7 +141,7 @@ def require_parameter(case: Case, name: str) -> None:
         "wave_speed": not case.has_waves
         and "There is no wave_speed to change: the valve has no elastic line in front; give upstream.length and "
         "upstream.wave_speed.",
-        "sealing": not (case.valve.sealing_pressure or case.valve.cracking_head)
+        "sealing": not case.valve.is_preset
         and "There is no sealing pressure to change: the bill is not moulded shut; give valve.sealing_pressure.",
     }
     unknown = case.damping.lacks(name)
@@ -162,7 +162,8 @@ def design_value(case: Case, name: str) -> float | None:
     if name == "thickness":
         return 1.0
     if name == "sealing":
-        return case.valve.sealing_pressure
+        force = case.valve.sealing_force
+        return force / case.valve.moulded_length if force else case.valve.sealing_pressure
     if name == "angle":  # of all plies at once
         values = {abs(layer.angle) for layer in case.layers if layer.angle}
     else:  # strain, of all rubbers at once
