@@ -25,6 +25,8 @@ from ..case import Case
 PARTS = ("duckbill_length", "saddle_length", "cuff_length", "flare_length", "flange_length")
 #: Sizes of a valve that follow from the others by rules that jump where it is no longer the 12-inch one.
 KEPT = ("lip_radius", "duckbill_wall_deduction", "flange_wall_deduction")
+#: Keys that are turned into a parameter before anything is computed, and that parameter.
+READ_AS = {"drive.head": "pressure", "valve.cracking_head": "sealing"}
 
 
 def flow_law(mu: Mu) -> Mu:
@@ -233,6 +235,8 @@ def number_of(case: Case, name: str, key: str) -> tuple[FieldInfo, Any]:
             f"{more if material in BUILT_IN else ''}.",
             key=key,
         )
+    if other := "strain" if target == AUTO else READ_AS.get(name):
+        raise CaseError(f"{key} names {name!r}, in whose place {other} is used; name that.", key=key)
     return field, target
 
 

@@ -328,6 +328,16 @@ MALFORMED = [
     ('inputs.density = "normal(5 %)"\ninputs."fluid.density" = "normal(2 %)"', "density twice"),
     ('inputs.pressure = "normal(5 %)"\nover = "pressure=0.1 m:1 m:3"', "uncertainty.over moves"),
     ('inputs."fluid.density" = "normal(5 %)"\nover = "density=10:100:3"', "uncertainty.over moves"),
+    ('inputs."valve.cracking_head" = "normal(0.2 m, 0.02 m)"', "in whose place sealing is used"),
+    ('inputs."drive.head" = "normal(1 m, 0.1 m)"', "in whose place pressure is used"),
+    (
+        'inputs.angle = "normal(2 deg)"\ninputs."layers.2.angle" = "normal(2 deg)"',
+        "layers.2.angle, which angle sets",
+    ),
+    (
+        'inputs."materials.strain_level" = "normal(20 %, 2 %)"\nover = "strain=0.1,0.2"',
+        "strain_level, which strain sets",
+    ),
     ('correlation = ["thickness", "angle", 0.5]', "correlation"),
     ('correlation = [["thickness", "angle"]]', "correlation"),
     ('correlation = [["thickness", "angle", 1.2]]', "between -1 and 1"),
@@ -412,6 +422,9 @@ def test_numbers_that_are_taken_as_inputs_can_be_set(level):
             with suppress(CaseError):
                 value = number_of(case, key, "of")[1]
                 taken.append((key, plain_number(case, key, value)))
+    if level == "auto":
+        with pytest.raises(CaseError, match="in whose place strain is used"):
+            number_of(settled, "materials.strain_level", "of")
     for key, number in taken:
         assert settled.replace({key: 0.3 if number is None else number})
     rubber = {"density", "strain_level"} if level == "auto" else set()
