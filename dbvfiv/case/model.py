@@ -281,6 +281,11 @@ class Case(Section):
         return self.downstream.pressure + self.level_pressure if self.drive.kind == "flow" else 0.0
 
     @property
+    def least_drive(self) -> float:
+        """The drive.pressure, Pa, above which the valve is asked: where nothing flows, and 0 for an outlet below."""
+        return max(self.rest_pressure, 0.0)
+
+    @property
     def level_pressure(self) -> float:
         """Hydrostatic pressure, Pa, of the fluid up to an outlet above the inlet; negative for an outlet below it."""
         return self.fluid.density * self.gravity.along * self.valve.length if self.drive.kind == "flow" else 0.0
