@@ -21,7 +21,7 @@ from dbvfiv.studies import workers
 from dbvfiv.studies.case import load_case
 from dbvfiv.studies.inputs import Plan, inputs_of, quasi_random
 from dbvfiv.studies.session import load_result
-from dbvfiv.studies.stability.place import number_of, plain_number
+from dbvfiv.studies.stability.place import number_of, plain_number, redesigned
 from dbvfiv.studies.stability.verdict import OUTCOMES
 from dbvfiv.studies.uncertainty.figures import tornado
 from dbvfiv.studies.uncertainty.study import UncertaintyResult
@@ -432,13 +432,20 @@ def test_numbers_that_are_taken_as_inputs_can_be_set(level):
 
 
 def test_lengths_and_sizes_of_a_sampled_valve_move_as_those_of_a_design():
-    """Steps of the wall with the parts; sizes that follow by rules of the 12-inch valve stay."""
+    """Places along the wall with the parts; sizes that follow by rules of the 12-inch valve stay."""
     inputs = {"valve.duckbill_length": "normal(2 %)", "valve.saddle_length": "normal(2 %)"}
     inputs |= {"valve.lip_half_width": "normal(1 %)", "materials.CR.stiffness_factor": "lognormal(1.1)"}
-    plan = Plan(load_case("cases/dbv12.toml").replace({"uncertainty.inputs": inputs}))
+    rows = [0.0, 0.1, 0.21, 0.3, 0.4, 0.49, 0.52, 0.56]
+    keys = {"valve.patches": [{"end": 0.49, "extra": 0.002}], "valve.moulded_length": 0.21, "layers.0.end": 0.3}
+    keys |= {"mesh.row_positions": rows, "mesh.breaks": [0.525]}
+    plan = Plan(load_case("cases/dbv12.toml").replace({"uncertainty.inputs": inputs} | keys))
     valve, sampled = plan.case.valve, plan.redescribed(np.array([0.22, 0.29, 0.126, 1.2]))
     ends = [step.to for step in sampled.valve.wall_map]
     assert ends == pytest.approx([0.22, 0.22 + 0.29 * 0.09 / 0.28, 0.51, 0.58])
+    assert (sampled.valve.patches[0].end, sampled.valve.moulded_length) == pytest.approx((0.51, 0.22))
+    assert sampled.mesh.breaks == pytest.approx([0.545]) and sampled.mesh.row_positions[5] == pytest.approx(0.51)
+    turned = redesigned(plan.case, {"valve.saddle_length": 0.14, "angle": 30.0})
+    assert (turned.layers[0].end, turned.layers[2].angle) == pytest.approx((0.255, 30.0))
     assert (sampled.valve.lip_half_width, sampled.materials.named["CR"].stiffness_factor) == (0.126, 1.2)
     for name in ("lip_radius", "duckbill_wall_deduction", "flange_wall_deduction"):
         assert getattr(sampled.valve, name) == getattr(valve, name)
