@@ -131,7 +131,7 @@ class Explorer:
         for name in ("pressure", "density", *damped[:1], "pipe_length"):
             own, (low, high) = self.base.get(name, 0.0), OFFERED.get(name, DAMPED)
             if own > 0 and self._can_ask(name):
-                above = max(self.model.flow.back, 0.0) if name == "pressure" else 0.0
+                above = self.case.least_drive if name == "pressure" else 0.0
                 highest = min(above + high * (own - above), PARAMETERS[name].high)
                 if name == "loss_factor":
                     highest = self.model.relaxation.highest(own, highest)

@@ -42,7 +42,7 @@ def arguments_of(case: Any, title: str) -> list[str]:
     """
     damping = ((name, getattr(case.damping, name)) for name in ("loss_factor", "beta", "alpha"))
     name, own = next(((name, own) for name, own in damping if own > 0), ("density", case.fluid.density))
-    back = max(case.rest_pressure, 0.0)
+    back = case.least_drive
     low, high = (back + share * (case.drive.pressure - back) for share in (0.15, 1.5))
     unit, scale = case.units.name("pressure"), case.units.factor("pressure")  # in any other the command would tell all
     heads = {"low": low, "high": high, "shown_low": low / scale, "shown_high": high / scale, "unit": unit}

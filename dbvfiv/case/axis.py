@@ -77,7 +77,7 @@ def parse_axis(text: str, names: Iterable[str] = SWEPT, density: float | None = 
         raise ValueError("whose values do not rise" if listed else "whose start is not below its stop")
     start, stop = values[0], values[-1]
     if start < 0 or (start == 0 and (log or not row.low_included)):
-        raise ValueError("whose start is not greater than 0")
+        raise ValueError(f"whose start is {'below' if row.low_included and not log else 'not greater than'} 0")
     if start < row.low or stop > row.high:
         raise ValueError(f"whose range is not within {row.low:g} to {row.high:g}")
     if listed:
@@ -129,6 +129,8 @@ def parse_point(text: str, density: float | None = None) -> dict[str, float]:
     for name, equals, given in sorted(parts, key=lambda part: part[0] != "density"):
         if name not in PLACES or not equals:
             raise ValueError("which is not of that form")
+        if name in found:
+            raise ValueError(f"which gives {name} twice")
         row = PARAMETERS[name]
         value = _value(row, given, found.get("density", density))
         if not row.low <= value <= row.high:

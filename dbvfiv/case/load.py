@@ -349,6 +349,8 @@ def toml_value(text: str) -> Any:
     try:
         parsed = tomllib.loads(f"value = {text}")
     except (ValueError, RecursionError):
+        if re.fullmatch(r"\s*[+-]?(\d+\.|\.\d+)\s*", text):  # numbers anywhere but in TOML
+            return float(text)
         plain = re.fullmatch(r"\s*\[([^][{}\"'=]*)\]\s*", text)
         return [part.strip() for part in plain[1].split(",")] if plain else text
     return parsed["value"] if set(parsed) == {"value"} else text

@@ -20,7 +20,7 @@ from .physics import Gravity, Outside
 from .pipes import Downstream, Upstream
 from .project import Life, Project, Report
 from .section import BrokenRule, Section, key
-from .units import Units, unit_of
+from .units import Units, read_units, unit_of, with_pressure_in
 from .valve import PRESETS, Valve
 from .wall import edges_of
 
@@ -86,17 +86,25 @@ class Case(Section):
     @classmethod
     def _keep_unit_of_pressure(cls, data: Any) -> Any:
         """Let the unit in which drive.pressure is given, or else report.heads, be that in which results are read, where
-        none is chosen.
+        none of heads or pressures is chosen.
         """
         drive, project = (data.get(name, {}) if isinstance(data, Mapping) else None for name in ("drive", "project"))
-        if not isinstance(drive, Mapping) or not isinstance(project, Mapping) or project.get("units"):
+        if not isinstance(drive, Mapping) or not isinstance(project, Mapping):
+            return data
+        units = project.get("units") or ""
+        try:
+            if {"head", "pressure"} & read_units(units).keys():
+                return data
+        except (AttributeError, ValueError):  # refused where it stands
             return data
         report = data.get("report")
         heads = report.get("heads") if isinstance(report, Mapping) else None
         given = drive.get("pressure", heads[0] if isinstance(heads, (list, tuple)) and heads else heads)
         head = drive.get("head")
         unit = unit_of(given) if head is None else unit_of(head) or "m"
-        return {**data, "project": {**project, "units": unit}} if unit not in ("", "kPa") else data
+        if unit in ("", "kPa"):
+            return data
+        return {**data, "project": {**project, "units": with_pressure_in(units, unit)}}
 
     @model_validator(mode="after")
     def _goes_together(self) -> Case:
@@ -279,6 +287,11 @@ class Case(Section):
     def rest_pressure(self) -> float:
         """The drive.pressure, Pa, at which nothing flows."""
         return self.downstream.pressure + self.level_pressure if self.drive.kind == "flow" else 0.0
+
+    @property
+    def least_drive(self) -> float:
+        """The drive.pressure, Pa, above which the valve is asked: where nothing flows, and 0 for an outlet below."""
+        return max(self.rest_pressure, 0.0)
 
     @property
     def level_pressure(self) -> float:

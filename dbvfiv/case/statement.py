@@ -105,8 +105,11 @@ def parse_statement(text: str, aim: bool, density: float | None = None) -> State
         raise ValueError("whose heads must be greater than 0, and rise")
     if what in BEHIND:
         pressures = sorted(-p for p in pressures)
+    bounds = _bounds(match["bound"], what)
+    if QUANTITIES[what].shown == "%" and max(bounds, default=0.0) >= 1.0:
+        raise ValueError(f"whose bound is {100 * max(bounds):g} %; a share is given as '5 %' or 0.05")
     sign = 1.0 if match["sense"] in ("up", "at least") else -1.0
-    found = Statement(" ".join(text.split()), what, tuple(pressures), span, sign, _bounds(match["bound"], what))
+    found = Statement(" ".join(text.split()), what, tuple(pressures), span, sign, bounds)
     return replace(found, pressures=tuple(found.between(SPAN)))
 
 
@@ -124,8 +127,8 @@ def _bounds(text: str | None, what: str) -> tuple[float, ...]:
     return tuple(first + (last - first) * i / (int(parts[2]) - 1) for i in range(int(parts[2])))
 
 
-def parse_span(text: str, quantity: Quantity) -> tuple[float, float]:
-    """Read the bounds of a variable, ``0.7:1.4`` or ``30 deg:70 deg``.
+def parse_span(text: str, quantity: Quantity, density: float | None = None) -> tuple[float, float]:
+    """Read the bounds of a variable, ``0.7:1.4`` or ``30 deg:70 deg``; heads of a fluid whose density, kg/m3, is given.
 
     Raises
     ------
@@ -135,7 +138,7 @@ def parse_span(text: str, quantity: Quantity) -> tuple[float, float]:
     parts = [part.strip() for part in text.split(":")]
     if len(parts) != 2:
         raise ValueError("which is not LOW:HIGH")
-    low, high = (quantity.parse(number_or_text(part)) for part in parts)
+    low, high = (quantity.parse(number_or_text(part), density) for part in parts)
     if not low < high:
         raise ValueError("whose bounds do not rise")
     return low, high

@@ -83,9 +83,9 @@ def _check(case, name: str) -> None:
     CaseError
         With all that contradicts what.
     """
-    from ..studies.case import contradictions, oddities
+    from ..studies.case import contradictions, oddities, unanswered_rating
 
-    found = list(contradictions(case))
+    found = [*contradictions(case), *unanswered_rating(case)]
     if found:
         raise CaseError(" ".join(found))
     from ..model.equilibria import model_warnings  # compilers, which a mistake need not wait for

@@ -158,7 +158,7 @@ def heads_of(case: Case) -> tuple[float, ...]:
     """Pressures, Pa, that a report examines: those of report.heads, else shares of the largest one of the case."""
     if case.report.heads:
         return tuple(sorted(set(case.report.heads)))
-    rest = case.rest_pressure
+    rest = case.least_drive
     given = case.steady.pressures if "pressures" in case.steady.model_fields_set else ()
     top = max([case.drive.pressure, *given])
     return (*(float(f"{rest + share * (top - rest):.9g}") for share in _HEADS[:-1]), top)

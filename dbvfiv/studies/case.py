@@ -94,7 +94,7 @@ class _CaseOfStudies(PhysicsCase):
     def meets_pump(self, kind: str) -> bool:
         """True where a study has to find the operating point of valve and pump."""
         listed = kind == "steady" and "pressures" in self.steady.model_fields_set
-        return self.seeks_operating_point and kind != "closure" and not listed
+        return self.seeks_operating_point and kind not in ("closure", "levels") and not listed
 
     def replace(self, changes: Mapping[str, Any]) -> Self:
         made = super().replace(changes)
@@ -192,8 +192,6 @@ def _contradictions(case: Case, kind: str | None) -> Iterator[str]:
     if case.drive.kind == "flow" and not case.seeks_operating_point:
         yield from _nothing_flows(case, kind)
     yield from _slivers(case)
-    if kind is None:  # a run may ask for less, and says how far it has looked
-        yield from _unanswered_rating(case)
 
 
 def require_consistent(case: Case, kind: str | None = None) -> None:
@@ -256,11 +254,11 @@ def _slivers(case: Case) -> Iterator[str]:
         begin = piece.to
 
 
-def _unanswered_rating(case: Case) -> Iterator[str]:
-    """Back pressures that end below the rated one."""
+def unanswered_rating(case: Case) -> Iterator[str]:
+    """Sentence on back pressures of `closure` that end below the rated one; a report goes beyond both by itself."""
     rated, largest = case.closure.rated_pressure, max(case.closure.pressures)
     if rated is not None and largest < rated:
-        yield (
+        yield case.units.say(
             f"closure.rated_pressure is {_pascal(rated)} and closure.pressures end at {_pascal(largest)}, so whether "
             f'the valve holds would stay open; give -p "{rated / 1e3:g} kPa" or closure.pressures up to it.'
         )

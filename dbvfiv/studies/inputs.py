@@ -6,6 +6,7 @@ import warnings
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import product
 
 import numpy as np
 
@@ -36,6 +37,12 @@ HARDNESS = 1.2 ** (1 / 1.96)
 #: ISO 3302-1:2014, class M3, dimensions across the mould's closure: up to, mm, and tolerance, mm; beyond, a share.
 CLOSURE = ((4.0, 0.40), (6.3, 0.40), (10.0, 0.50), (16.0, 0.60), (25.0, 0.80), (40.0, 1.0), (63.0, 1.3), (100.0, 1.6))
 CLOSURE_BEYOND = 0.013
+#: How keys end that parameters of the design set.
+HELD_BY = {
+    "sealing": ("valve.sealing_pressure", "valve.sealing_force", "valve.overlap"),
+    "angle": (".angle",),
+    "strain": (".strain_level",),
+}
 #: Confidence of intervals.
 CONFIDENCE = 0.95
 
@@ -94,12 +101,12 @@ def inputs_of(case: Case, over: Sequence[str] = ()) -> list[Input]:
     """
     asked = case.uncertainty
     axis, by = asked.axis, "the map" if over else "uncertainty.over"
-    names = over or ([axis.parameter] if axis is not None else [])
+    varied = over or ([axis.parameter] if axis is not None else [])
     if asked.inputs:
         found = [_input(case, name, text, "given") for name, text in asked.inputs.items()]
     else:
         found = [_input(case, name, text, source) for name, text, source in _shipped(case)]
-    moved = [one for one in found if one.name in names]
+    moved = [one for one in found if one.name in varied]
     if moved and asked.inputs:
         raise CaseError(
             f"uncertainty.inputs holds {moved[0].name!r}, which {by} moves; one of them has to go.",
@@ -113,6 +120,10 @@ def inputs_of(case: Case, over: Sequence[str] = ()) -> list[Input]:
             "has to go.",
             key="uncertainty.inputs",
         )
+    for key, name in product(names, (*varied, *names)):
+        if key.endswith(HELD_BY.get(name, ())):
+            said = f"uncertainty.inputs holds {key}, which {name} sets too; one of them has to go."
+            raise CaseError(said, key="uncertainty.inputs")
     if not found:
         raise CaseError(
             "Nothing of this case is known to be uncertain; give uncertainty.inputs, such as "

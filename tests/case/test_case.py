@@ -15,6 +15,7 @@ import pytest
 
 from dbvfiv.case import Case as PhysicsCase
 from dbvfiv.case import CaseError, make_case, parse_axis
+from dbvfiv.case.axis import parse_point
 from dbvfiv.case.describe import SYNONYMS, explain, page, walk
 from dbvfiv.case.key_points import read_key_points
 from dbvfiv.case.materials import shear_modulus_of
@@ -309,6 +310,11 @@ def test_parameter_ranges():
     assert axis.key == "fluid.density" and axis.values == pytest.approx((1, 10, 100, 1000))
     assert parse_axis("pressure=0.5 kPa:50 kPa:3").values == (500.0, 25250.0, 50000.0)
     assert parse_axis("alpha=0:5:2").values == (0.0, 5.0)
+    with pytest.raises(ValueError, match="start is below 0"):
+        parse_axis("alpha=-1:5:3")
+    with pytest.raises(ValueError, match="gives pressure twice"):
+        parse_point("pressure=1 kPa, pressure=2 kPa")
+    assert load_case(None, ["damping.alpha=.5", "drive.pressure=5."]).damping.alpha == 0.5
     assert parse_axis("pressure=0.5 kPa, 2 kPa,1 m", density=1000.0).values == (500.0, 2000.0, 1000.0 * 9.80665)
 
 

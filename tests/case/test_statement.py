@@ -2,6 +2,7 @@
 
 import pytest
 
+from dbvfiv.case.parameters import PARAMETERS
 from dbvfiv.case.quantity import GRAVITY
 from dbvfiv.case.statement import Quantity, parse_span, parse_statement
 
@@ -18,6 +19,7 @@ def test_an_aim_and_constraints_are_read():
     assert front.bounds == pytest.approx((0.01, 0.015, 0.02)) and len(front.pressures) == 3
     assert parse_statement("mass at most 12 kg", False).bounds == (12.0,)
     assert parse_span("30 deg:70 deg", Quantity("deg")) == (30.0, 70.0)
+    assert parse_span("0.1 m:0.2 m", PARAMETERS["sealing"].quantity, 1000.0) == pytest.approx((980.665, 1961.33))
 
 
 @pytest.mark.parametrize(
@@ -32,6 +34,7 @@ def test_an_aim_and_constraints_are_read():
         ("flow at 2 m at least 3 m", False, "not a volume flow"),
         ("flow at 2 m at least 1 L/s:2 L/s", False, "FIRST:LAST:COUNT"),
         ("flow at 2 m at least", False, "cannot be read"),
+        ("margin at 2 m at least 5", False, "bound is 500 %; a share"),
     ],
 )
 def test_what_cannot_be_read_is_said(text, aim, words):

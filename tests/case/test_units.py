@@ -34,6 +34,8 @@ def test_texts_that_are_said_twice_keep_their_digits():
 def test_units_of_choice_stand_before_that_of_the_pressure():
     case = load_case(None, ["drive.pressure=2 m", "project.units=kPa, gpm"])
     assert case.units.pressure(2e3) == "2 kPa"
+    other = load_case(None, ["drive.pressure=2 m", "project.units=gpm"]).units
+    assert other.pressure(2e3) == "0.2039 m" and other.text == "m, gpm"
     assert case.units.text_of("flow", 3.785411784e-3 / 60) == "1 gpm"
 
 

@@ -32,7 +32,7 @@ from dbvfiv.motion.start import steady_positions
 from dbvfiv.motion.stepper import StepOptions
 from dbvfiv.studies.case import load_case, thesis_case
 from dbvfiv.studies.stability.derivatives import parameters_of
-from dbvfiv.studies.stability.place import redesigned
+from dbvfiv.studies.stability.place import design_value, redesigned, require_parameter
 from dbvfiv.studies.transient.run import Runner
 from eigen import SearchOptions, leading_modes
 from tests.systems.pressed import ShellOnPlane
@@ -487,6 +487,13 @@ def test_faces_of_few_elements_press_on_each_other_before_the_back_pressure(size
 def test_sealing_pressure_is_a_parameter_of_a_bill_that_is_moulded_shut_alone(model):
     assert "sealing" in parameters_of(model) and "sealing" not in parameters_of(ValveModel(thesis_case(COARSE)))
     assert redesigned(model.case, {"sealing": 5e2}).valve.sealing_pressure == 5e2
+    by_force = load_case(CASES / "dbv36-moulded.toml")  # 945 N/m
+    require_parameter(by_force, "sealing")
+    assert design_value(by_force, "sealing") == pytest.approx(1500.0)
+    by_overlap = thesis_case(COARSE | {"valve.overlap": "1 mm"})
+    require_parameter(by_overlap, "sealing")
+    assert design_value(by_overlap, "sealing") is None
+    assert redesigned(by_overlap, {"sealing": 5e2}).valve.overlap is None
 
 
 def test_a_pump_whose_curve_meets_a_jump_of_the_flow_has_no_operating_point(monkeypatch):

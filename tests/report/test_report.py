@@ -588,6 +588,8 @@ def test_heads_are_those_asked_or_shares_of_the_largest_pressure():
     assert heads_of(load_case(None, ["report.heads=1 m:2 m:3"])) == pytest.approx([9806.65, 14709.975, 19613.3])
     heads = heads_of(load_case(None, ["drive.pressure=1 m"]))
     assert heads[-1] == pytest.approx(9806.65) and heads[0] < 0.05 * heads[-1]
+    downwards = heads_of(load_case(None, ["drive.pressure=1 m", "gravity.direction=-z"]))
+    assert min(downwards) > 0 and downwards == heads
 
 
 def test_without_a_printer_the_pdf_says_what_is_missing(made, monkeypatch, one_sentence, tmp_path):

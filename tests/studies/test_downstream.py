@@ -5,12 +5,15 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from dbvfiv.case.materials import HIGHEST_LEVEL
 from dbvfiv.case.parameters import Mu
 from dbvfiv.case.quantity import GRAVITY
 from dbvfiv.errors import CaseError, SolveError
 from dbvfiv.model import ValveModel, linearise, select_search
 from dbvfiv.model.equilibria import LoadPath
-from dbvfiv.studies.case import require_consistent, thesis_case
+from dbvfiv.model.sizes import hoop_strain
+from dbvfiv.studies.case import load_case, require_consistent, thesis_case
+from dbvfiv.studies.session import Session
 from dbvfiv.studies.stability.walk import StabilityWalk
 from eigen import SearchOptions, TransferBasis, certified_spectrum
 from tests.small_valves import FORMER, load_small
@@ -51,6 +54,16 @@ def test_a_pressure_downstream_shifts_the_drive():
     assert other.flange_pressure == 10e3 and other.outlet_pressure == 4e3
     growth = [found.modes(count=3).modes[0].growth_rate for found in (one, other)]
     assert growth[1] == pytest.approx(growth[0], rel=1e-6)
+
+
+def test_the_pressure_downstream_bears_the_wall():
+    """Of an outfall 45 m deep, whose pipe one metre of drive strains."""
+    deep = {"drive.pressure": "46 m", "downstream.pressure": "45 m", "materials.strain_level": "10 %"}
+    keys = [f"{name}={value}" for name, value in {**deep, "mesh.around": 6, "mesh.along": 8}.items()]
+    session = Session(load_case("cases/dbv4-wide.toml", keys))
+    assert hoop_strain(session.described, 451e3) > HIGHEST_LEVEL
+    with pytest.raises(CaseError, match="strains the round wall"):
+        _ = session.replace({"downstream.pressure": 0.0}).described
 
 
 def test_a_drive_that_does_not_overcome_it_is_refused():

@@ -39,6 +39,7 @@ def load(*keys):
 @pytest.fixture(scope="module")
 def operating():
     (state,) = load(PUMP).steady().states
+    assert not load(PUMP).case.meets_pump("levels")  # whose pressures are listed
     return state
 
 

@@ -86,11 +86,11 @@ def variables_of(case: Case) -> tuple[Variable, ...]:
     found = []
     for name, text in case.design.variables.items():
         key = f"design.variables.{name}"
-        if name in ("pressure", "drive.pressure", "storage", "strain"):
+        if name in ("pressure", "drive.pressure", "storage", "strain", "materials.strain_level"):
             raise CaseError(f"{key} is given, and {name} is no number that a designer chooses.", key=key)
         quantity, own = _value(case, name, key)
         try:
-            low, high = parse_span(text, quantity)
+            low, high = parse_span(text, quantity, case.fluid.density)
         except ValueError as error:
             raise CaseError(f"{key} is given as {text!r}, {error}; it must be LOW:HIGH.", key=key) from None
         if name == "angle" and low <= 0:

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
-from ...case.parameters import Mu
+from ...case.parameters import PARAMETERS, Mu
 from ...case.statement import QUANTITIES, Statement
 from ...case.write import case_toml, write_case
 from ...drawing.style import headline, limits, log_axis, new_figure, parameter_label
@@ -25,7 +25,7 @@ from ...texts import digits
 from ..case import Case
 from ..result import StudyResult
 from ..session import Session, Study
-from ..stability.place import check_scan, require_head
+from ..stability.place import check_scan, number_of, require_head
 from ..stability.verdict import OUTCOMES, STABLE
 from .problem import (
     AtHead,
@@ -65,10 +65,12 @@ _NO_ROWS = {DESIGNS: 0, VERIFIED: 0}
 
 
 def check(case: Case) -> None:
-    """Refuse a case without flow or with a pump, and statements that cannot be read."""
+    """Refuse a case without flow or with a pump, statements that cannot be read, and names of no variable."""
     check_scan(case)
     require_head(case)
     statements_of(case)
+    for name in case.design.variables.keys() - PARAMETERS.keys():
+        number_of(case, name, f"design.variables.{name}")
 
 
 def run(session: Session, record: GrowingRecord, cases: Path | None = None) -> None:

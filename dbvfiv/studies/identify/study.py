@@ -63,9 +63,9 @@ def rows_to_keep(known: Record, _case: Case) -> dict[str, int]:
 
 
 def check(case: Case) -> None:
-    """Refuse a range of what the case does not have or without the last record, a pump, and a case without records."""
+    """Refuse what the case does not have, a range without the last record, a pump, and a case without records."""
     places = Places(case)
-    check_scan(case, places.parameter)
+    check_scan(case, places.parameter, *(name for one in places.of_records for name in one))
     require_head(case)
     if not case.identify.records:
         raise CaseError(

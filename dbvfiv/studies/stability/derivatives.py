@@ -321,7 +321,7 @@ def _has(model: ValveModel, name: str) -> bool:
     """True where a parameter of the table acts on the valve and has one value there."""
     if name in ("density", "storage"):
         return model.flow.has_fluid and model.flow.unsteady and not (name == "storage" and model.case.is_compressed)
-    if name in ("angle", "strain"):
+    if name in ("angle", "strain", "sealing"):
         return design_value(model.case, name) is not None
     try:
         require_parameter(model.case, name)

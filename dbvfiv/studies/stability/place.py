@@ -23,8 +23,12 @@ from ..case import Case
 
 #: Lengths of the parts of a valve, from the lip on.
 PARTS = ("duckbill_length", "saddle_length", "cuff_length", "flare_length", "flange_length")
+#: Keys that hold places along a valve, from the lip on.
+PLACES = ("valve.wall_map", "valve.patches", "valve.moulded_length", "layers", "mesh.breaks", "mesh.row_positions")
 #: Sizes of a valve that follow from the others by rules that jump where it is no longer the 12-inch one.
 KEPT = ("lip_radius", "duckbill_wall_deduction", "flange_wall_deduction")
+#: Keys that are turned into a parameter before anything is computed, and that parameter.
+READ_AS = {"drive.head": "pressure", "valve.cracking_head": "sealing"}
 
 
 def flow_law(mu: Mu) -> Mu:
@@ -141,7 +145,7 @@ def require_parameter(case: Case, name: str) -> None:
         "wave_speed": not case.has_waves
         and "There is no wave_speed to change: the valve has no elastic line in front; give upstream.length and "
         "upstream.wave_speed.",
-        "sealing": not (case.valve.sealing_pressure or case.valve.cracking_head)
+        "sealing": not case.valve.is_preset
         and "There is no sealing pressure to change: the bill is not moulded shut; give valve.sealing_pressure.",
     }
     unknown = case.damping.lacks(name)
@@ -162,7 +166,8 @@ def design_value(case: Case, name: str) -> float | None:
     if name == "thickness":
         return 1.0
     if name == "sealing":
-        return case.valve.sealing_pressure
+        force = case.valve.sealing_force
+        return force / case.valve.moulded_length if force else case.valve.sealing_pressure
     if name == "angle":  # of all plies at once
         values = {abs(layer.angle) for layer in case.layers if layer.angle}
     else:  # strain, of all rubbers at once
@@ -172,7 +177,7 @@ def design_value(case: Case, name: str) -> float | None:
 
 def redesigned(case: Case, design: Mapping[str, float]) -> Case:
     """A case with design parameters changed: wall thickness factor, size of the angle of all plies (degrees), strain
-    level (0.1 for 10 %); any other by its key, such as the length of the saddle, with which steps of the wall move.
+    level (0.1 for 10 %); any other by its key, such as the length of the saddle, with which places along the wall move.
 
     Raises
     ------
@@ -197,7 +202,7 @@ def redesigned(case: Case, design: Mapping[str, float]) -> Case:
             changes[PARAMETERS[name].key] = value
         else:
             keys[name] = value
-    changes |= _shape_beside(case, keys) | keys
+    changes |= _shape_beside(case, keys, changes) | keys
     return case.replace(changes) if changes else case
 
 
@@ -232,6 +237,8 @@ def number_of(case: Case, name: str, key: str) -> tuple[FieldInfo, Any]:
             f"{more if material in BUILT_IN else ''}.",
             key=key,
         )
+    if other := "strain" if target == AUTO else READ_AS.get(name):
+        raise CaseError(f"{key} names {name!r}, in whose place {other} is used; name that.", key=key)
     return field, target
 
 
@@ -274,9 +281,9 @@ def limits_of(field: FieldInfo, name: str) -> tuple[float, float]:
     return (0.0, LARGEST_LOSS) if is_loss else numeric_limits(field)
 
 
-def _shape_beside(case: Case, changed: Mapping[str, float]) -> dict[str, object]:
-    """Keys that keep the rest of a valve's shape where some of its numbers change: steps of a measured wall move with
-    its parts, and what follows from wall and shape by rules that jump stays.
+def _shape_beside(case: Case, changed: Mapping[str, float], beside: Mapping[str, Any]) -> dict[str, object]:
+    """Keys that keep the rest of a valve's shape where some of its numbers change: places along the axis move with its
+    parts, and what follows from wall and shape by rules that jump stays. Some keys are changed beside.
     """
     sizes = {name.removeprefix("valve."): value for name, value in changed.items() if name.startswith("valve.")}
     if not sizes:
@@ -286,13 +293,27 @@ def _shape_beside(case: Case, changed: Mapping[str, float]) -> dict[str, object]
     if valve.key_points is not None and "lip_radius" in kept:  # which the points give
         kept.remove("lip_radius")
     found: dict[str, object] = {f"valve.{key}": getattr(valve, key) for key in kept}
-    if valve.wall_map and not sizes.keys().isdisjoint(PARTS):
-        lengths = [getattr(valve, each) for each in PARTS]
-        longer = [sizes.get(each, length) for each, length in zip(PARTS, lengths)]
-        own, moved = (np.concatenate([[0.0], np.cumsum(each)]) for each in (lengths, longer))
-        steps = case.to_dict()["valve"]["wall_map"]
-        found["valve.wall_map"] = [step | {"to": float(np.interp(step["to"], own, moved))} for step in steps]
+    if sizes.keys().isdisjoint(PARTS):
+        return found
+    lengths = [getattr(valve, each) for each in PARTS]
+    longer = [sizes.get(each, length) for each, length in zip(PARTS, lengths)]
+    joints = [np.concatenate([[0.0], np.cumsum(each)]) for each in (lengths, longer)]
+    data = case.to_dict()
+    for key in PLACES:
+        section, _, name = key.partition(".")
+        held = beside.get(key, data[section][name] if name else data[section])
+        if held and (moved := _moved(held, *joints)) != held:
+            found[key] = moved
     return found
+
+
+def _moved(held: Any, *joints: np.ndarray) -> Any:
+    """Places along the axis, in lists and tables too, moved with the joints of a valve from where these were."""
+    if isinstance(held, list):
+        return [_moved(each, *joints) for each in held]
+    if isinstance(held, dict):
+        return held | {name: _moved(held[name], *joints) for name in ("to", "begin", "end") if held.get(name)}
+    return float(np.interp(held, *joints))
 
 
 def models_of(case: Case, own: ValveModel) -> Callable[[Mapping[str, float]], ValveModel]:

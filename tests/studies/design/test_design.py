@@ -17,7 +17,7 @@ from dbvfiv.model.sizes import ValveSizes
 from dbvfiv.studies.case import thesis_case
 from dbvfiv.studies.design import problem as problem_module
 from dbvfiv.studies.design.problem import SHARPNESS, DesignProblem, Variable, statements_of, together
-from dbvfiv.studies.design.study import CASE, DesignResult, _changed, draw_heads
+from dbvfiv.studies.design.study import CASE, DesignResult, _changed, check, draw_heads
 from dbvfiv.studies.inputs import Plan, quasi_random
 from dbvfiv.studies.stability.place import key_of, redesigned
 from dbvfiv.studies.stability.verdict import OUTCOMES
@@ -329,6 +329,13 @@ def test_several_heads_of_an_aim_count_together(valve):
         assert slopes == pytest.approx(shares @ [one.slopes["margin"] for one in pair], rel=1e-9)
 
 
+def test_a_key_that_is_turned_into_another_one_is_no_variable():
+    """Said before the sealing pressure is looked for."""
+    keys = {"valve.cracking_head": 0.2, "design.variables": {"valve.cracking_head": "0.1 m:0.3 m"}}
+    with pytest.raises(CaseError, match="in whose place sealing is used"):
+        check(load_small(KEYS, ASKED, keys).case)
+
+
 @pytest.mark.parametrize(
     ("changes", "words"),
     [
@@ -342,6 +349,8 @@ def test_several_heads_of_an_aim_count_together(valve):
         ({"design.aim": "mass down", "design.constraints": ["mass at most 3 kg"]}, "name no head"),
         ({"design.aim": "drag at 2 m down"}, "cannot be read"),
         ({"design.variables": {"drive.pressure": "1 kPa:20 kPa"}}, "no number that a designer chooses"),
+        ({"design.variables": {"drive.head": "1 m:2 m"}}, "in whose place pressure is used"),
+        ({"design.variables": {"materials.strain_level": "10 %:20 %"}}, "no number that a designer chooses"),
         ({"design.variables": {"thickness": 0.9}}, "must be names and bounds, such as"),
         ({"design.variables": {"thickness": "0.7:1.4", "valve.thickness_factor": "0.7:1.4"}}, "with which it changes"),
         ({"design.variables": {"angle": "30 deg:70 deg", "layers.2.angle": "30 deg:70 deg"}}, "with which it changes"),

@@ -261,6 +261,8 @@ def test_intervals_hold_hidden_inputs_and_onsets(valves, least, most, tmp_path):
         ([{"frequency": 20.0, "frequency_interval": 0.1, "at": "pressure=1e9"}], "pressure is not within 0 to 1e"),
         ([{"frequency": 20.0, "frequency_interval": 0.1, "at": "pressure=1 kg"}], "pressure=1 kg.* is not a pressure"),
         ([{"frequency": 20.0, "frequency_interval": 0.1, "at": "thickness=1"}], "must be such as"),
+        ([{"frequency": 20.0, "frequency_interval": 0.1, "at": "tail_length=5 m"}], "no tail_length to change"),
+        ([{"frequency": 20.0, "frequency_interval": 0.1, "at": "loss_factor=2"}], "no loss_factor to change"),
         ([{"file": "none.csv"}], "does not exist"),
         ([{"file": "README.md", "frequency": 20.0}], "names a file and has frequency, .* one of them"),
     ],

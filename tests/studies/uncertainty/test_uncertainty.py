@@ -21,7 +21,7 @@ from dbvfiv.studies import workers
 from dbvfiv.studies.case import load_case
 from dbvfiv.studies.inputs import Plan, inputs_of, quasi_random
 from dbvfiv.studies.session import load_result
-from dbvfiv.studies.stability.place import number_of, plain_number
+from dbvfiv.studies.stability.place import number_of, plain_number, redesigned
 from dbvfiv.studies.stability.verdict import OUTCOMES
 from dbvfiv.studies.uncertainty.figures import tornado
 from dbvfiv.studies.uncertainty.study import UncertaintyResult
@@ -328,6 +328,16 @@ MALFORMED = [
     ('inputs.density = "normal(5 %)"\ninputs."fluid.density" = "normal(2 %)"', "density twice"),
     ('inputs.pressure = "normal(5 %)"\nover = "pressure=0.1 m:1 m:3"', "uncertainty.over moves"),
     ('inputs."fluid.density" = "normal(5 %)"\nover = "density=10:100:3"', "uncertainty.over moves"),
+    ('inputs."valve.cracking_head" = "normal(0.2 m, 0.02 m)"', "in whose place sealing is used"),
+    ('inputs."drive.head" = "normal(1 m, 0.1 m)"', "in whose place pressure is used"),
+    (
+        'inputs.angle = "normal(2 deg)"\ninputs."layers.2.angle" = "normal(2 deg)"',
+        "layers.2.angle, which angle sets",
+    ),
+    (
+        'inputs."materials.strain_level" = "normal(20 %, 2 %)"\nover = "strain=0.1,0.2"',
+        "strain_level, which strain sets",
+    ),
     ('correlation = ["thickness", "angle", 0.5]', "correlation"),
     ('correlation = [["thickness", "angle"]]', "correlation"),
     ('correlation = [["thickness", "angle", 1.2]]', "between -1 and 1"),
@@ -412,6 +422,9 @@ def test_numbers_that_are_taken_as_inputs_can_be_set(level):
             with suppress(CaseError):
                 value = number_of(case, key, "of")[1]
                 taken.append((key, plain_number(case, key, value)))
+    if level == "auto":
+        with pytest.raises(CaseError, match="in whose place strain is used"):
+            number_of(settled, "materials.strain_level", "of")
     for key, number in taken:
         assert settled.replace({key: 0.3 if number is None else number})
     rubber = {"density", "strain_level"} if level == "auto" else set()
@@ -419,13 +432,20 @@ def test_numbers_that_are_taken_as_inputs_can_be_set(level):
 
 
 def test_lengths_and_sizes_of_a_sampled_valve_move_as_those_of_a_design():
-    """Steps of the wall with the parts; sizes that follow by rules of the 12-inch valve stay."""
+    """Places along the wall with the parts; sizes that follow by rules of the 12-inch valve stay."""
     inputs = {"valve.duckbill_length": "normal(2 %)", "valve.saddle_length": "normal(2 %)"}
     inputs |= {"valve.lip_half_width": "normal(1 %)", "materials.CR.stiffness_factor": "lognormal(1.1)"}
-    plan = Plan(load_case("cases/dbv12.toml").replace({"uncertainty.inputs": inputs}))
+    rows = [0.0, 0.1, 0.21, 0.3, 0.4, 0.49, 0.52, 0.56]
+    keys = {"valve.patches": [{"end": 0.49, "extra": 0.002}], "valve.moulded_length": 0.21, "layers.0.end": 0.3}
+    keys |= {"mesh.row_positions": rows, "mesh.breaks": [0.525]}
+    plan = Plan(load_case("cases/dbv12.toml").replace({"uncertainty.inputs": inputs} | keys))
     valve, sampled = plan.case.valve, plan.redescribed(np.array([0.22, 0.29, 0.126, 1.2]))
     ends = [step.to for step in sampled.valve.wall_map]
     assert ends == pytest.approx([0.22, 0.22 + 0.29 * 0.09 / 0.28, 0.51, 0.58])
+    assert (sampled.valve.patches[0].end, sampled.valve.moulded_length) == pytest.approx((0.51, 0.22))
+    assert sampled.mesh.breaks == pytest.approx([0.545]) and sampled.mesh.row_positions[5] == pytest.approx(0.51)
+    turned = redesigned(plan.case, {"valve.saddle_length": 0.14, "angle": 30.0})
+    assert (turned.layers[0].end, turned.layers[2].angle) == pytest.approx((0.255, 30.0))
     assert (sampled.valve.lip_half_width, sampled.materials.named["CR"].stiffness_factor) == (0.126, 1.2)
     for name in ("lip_radius", "duckbill_wall_deduction", "flange_wall_deduction"):
         assert getattr(sampled.valve, name) == getattr(valve, name)
