@@ -19,6 +19,8 @@ ORDER = 42
 class Keys(RangeSection):
     """Branches of limit cycles along one parameter."""
 
+    needs = {"start_cycle": "start_file"}
+
     over: StabilityRange = key(
         "density=20:60:9",
         "The parameter to move, as in onset.over. Cycles are given at these values, and at those that the branch needs "
