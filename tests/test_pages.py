@@ -16,6 +16,7 @@ from dbvfiv import cli
 from dbvfiv.case.parameters import PARAMETERS
 from dbvfiv.cli import main, studies
 from dbvfiv.studies import case as cases
+from dbvfiv.studies.session import Session
 from tests.pages import ROOT, blocks, command_lines, indented_commands, pages, tables
 
 #: The page on flow laws sets a key that its reader adds; tests/flow/test_adding_a_law.py carries it out.
@@ -33,8 +34,7 @@ def only_parsed(monkeypatch, capsys):
     kinds = [kind for kind, _ in studies.study_commands()]
 
     def perform(kind, case, request, *_):
-        changes = {key: value for key, value in request.changes.items() if value is not None}
-        case.replace(changes)
+        Session(case).prepared(kind, request.changes)
 
     def load_one(path, overrides):
         own = path is not None and not (ROOT / path).exists()
