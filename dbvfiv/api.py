@@ -184,7 +184,8 @@ class Valve:
             Result file.
         observer : Observer, optional
         changes
-            density, continuity, alpha, beta, in_vacuo, max_frequency in place of those of the case.
+            density, continuity, alpha, beta, ... in place of those of the case, and keys of the section of the study:
+            of this one in_vacuo, symmetry, max_frequency and the others of [modes].
 
         Raises
         ------
@@ -290,12 +291,10 @@ class Valve:
         workers : int or str, optional
             As for `uncertainty`.
         output, observer, changes
-            As for `modes`; also samples, rounds.
+            As for `modes`: samples, rounds.
         """
         given = None if records is None else [dict(record) for record in records]
         asked = {"identify.records": given, "identify.over": write_axis(over)}
-        own = {name: changes.pop(name) for name in [*changes] if name in ("samples", "round", "rounds", "seed")}
-        asked |= {f"identify.{name}": value for name, value in own.items()}
         shared = None if workers is None else read_workers(workers)
         return self._ask("identify", asked, changes, output, observer, workers=shared)
 
@@ -513,8 +512,7 @@ class Valve:
     def _ask(self, kind: str, keys: dict, given: dict, output: Output, observer: Observer | None, **choices) -> Any:
         """Result of a study with keys and named arguments put into its case; None stands for nothing given."""
         self.model  # shared by what is asked of this valve
-        changes = keys | named_changes(given)
-        session = self.session.replace({key: value for key, value in changes.items() if value is not None})
+        session = self.session.prepared(kind, keys | named_changes(given, kind))
         return session.perform(kind, output, observer or bar(), **choices)
 
 

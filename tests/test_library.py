@@ -98,7 +98,9 @@ def test_tables_come_with_units_and_ranges_as_arrays():
     grid = swept.table("states", form="xarray")
     assert grid["pressure"].attrs["units"] == "Pa" and grid["max_displacement_position"].shape == (1, 3)
     assert len(swept.table()) == sum(len(branch["growth_rate"]) for branch in swept.summary()["branches"])
-    assert valve.sweep("density=10,20,100").summary()["values"] == swept.summary()["values"]
+    of_state = valve.steady(valve.case.drive.pressure).sweep({"density": [10, 20, 100]})
+    for found in (valve.sweep("density=10,20,100"), of_state):
+        assert found.summary()["values"] == swept.summary()["values"]
     with pytest.raises(dbvfiv.CaseError, match="'rows'.*branches"):
         swept.table("rows")
     for given in ({"density": [1]}, {"density": "10"}, {"density": [1, 2], "pressure": [1, 2]}):
@@ -117,6 +119,9 @@ def test_tables_come_with_units_and_ranges_as_arrays():
         lambda valve: valve.modes("6 kPa", count="x"),
         lambda valve: valve.modes(density="x"),
         lambda valve: valve.modes(foam=1),
+        lambda valve: valve.sweep("density=10,20", in_vacuo=True),
+        lambda valve: valve.sweep({"density": [10, 20]}, density=10),
+        lambda valve: valve.map("alpha=0:40:3", "beta=1 ms:3 ms:3", beta="2 ms"),
         lambda valve: valve.onset(3),
         lambda valve: valve.sensitivity(5),
         lambda valve: valve.map("pressure=1000,2000", workers="two"),

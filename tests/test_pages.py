@@ -16,6 +16,7 @@ from dbvfiv import cli
 from dbvfiv.case.parameters import PARAMETERS
 from dbvfiv.cli import main, studies
 from dbvfiv.studies import case as cases
+from dbvfiv.studies.session import Session
 from tests.pages import ROOT, blocks, command_lines, indented_commands, pages, tables
 
 #: The page on flow laws sets a key that its reader adds; tests/flow/test_adding_a_law.py carries it out.
@@ -26,18 +27,20 @@ STAMPED = [table for page in PAGES for table in tables(page) if table.has_number
 @pytest.fixture
 def only_parsed(monkeypatch, capsys):
     """Give a command line to the program, up to the point at which it would begin to compute: options, case and keys
-    are read and checked. A case file that is not there stands for the reader's own and is left out.
+    are read and checked. A case file that is not there stands for the reader's own, of a valve in its fluid, and is
+    left out.
     """
     load = cases.load_case
     kinds = [kind for kind, _ in studies.study_commands()]
 
     def perform(kind, case, request, *_):
-        changes = {key: value for key, value in request.changes.items() if value is not None}
-        case.replace(changes)
+        Session(case).prepared(kind, request.changes)
 
-    monkeypatch.setattr(
-        cases, "load_case", lambda path, overrides: load(path if path and (ROOT / path).exists() else None, overrides)
-    )
+    def load_one(path, overrides):
+        own = path is not None and not (ROOT / path).exists()
+        return load(None if own else path, [*(["outside.fluid=same"] if own else []), *overrides])
+
+    monkeypatch.setattr(cases, "load_case", load_one)
     monkeypatch.setattr(studies, "perform", perform)
     for name, command in main.build().commands.items():
         if name not in kinds:

@@ -71,6 +71,9 @@ class Mesh(Section):
                 f"a row lies between the lip, 0 m, and the flange, {length:g} m",
             )
         if not self.row_positions:
+            if self.breaks and self.rows == "uniform":
+                given = f"a list with {self.breaks[0]:g} m with rows = 'uniform'"
+                raise BrokenRule("mesh.breaks", given, "rows that are even lie on no break, so leave one of them out")
             return
         if len(self.row_positions) < 7:
             given = f"a list of {len(self.row_positions)}"

@@ -347,6 +347,7 @@ class Case(Section):
     @classmethod
     def make_way(cls, data: dict[str, Any], changed: Collection[tuple[str, ...]]) -> None:
         """A key that is asked for stands in the place of one that was there before and says the same otherwise."""
+        super().make_way(data, changed)
         own = data.get("materials")
         tables = {(name,): (data.get(name), keys) for name, keys in _ALTERNATIVES.items()}
         if isinstance(own, dict):

@@ -53,6 +53,8 @@ class Shell(Section):
 class Fluid(Section):
     """The fluid and its conservation laws."""
 
+    needs = {"heat_capacity_ratio": "sound_speed"}
+
     density: Density = key(1000.0, "Mass density.", **PARAMETERS["density"].limits)
     continuity: Literal["quasi-steady", "storage"] = key(
         "storage",
@@ -276,6 +278,8 @@ OutsideFluid = Annotated[
 
 class Outside(Section):
     """Still fluid around the wall; its pressure in motion is that of potential flow on the deformed outer face."""
+
+    needs = {"pipe_diameter": "fluid", "lips": "fluid"}
 
     fluid: OutsideFluid = key(
         "none",

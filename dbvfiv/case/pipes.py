@@ -19,6 +19,8 @@ _LENGTH = PARAMETERS["pipe_length"]
 class Pipe(Section):
     """A straight pipe: a rigid column of fluid with friction and losses, or an elastic one."""
 
+    needs = {"elements": "wave_speed"}
+
     length: Annotated[float, _LENGTH.quantity] = key(..., "Length of the pipe.", gt=0, le=_LENGTH.high)
     diameter: Length | None = key(
         None,
@@ -82,14 +84,6 @@ class Pipe(Section):
                 "roughness",
                 f"{1e3 * self.roughness:g} mm beside friction = {self.friction:g}",
                 "both say how rough the pipe is, so leave one of them out",
-            )
-        return self
-
-    @model_validator(mode="after")
-    def _elements_of_waves(self) -> Pipe:
-        if self.elements is not None and self.wave_speed is None:
-            raise BrokenRule(
-                "elements", f"{self.elements} without a wave_speed", "a rigid column has none, so give both or neither"
             )
         return self
 
@@ -177,6 +171,8 @@ class Upstream(Pipe):
 class Downstream(Section):
     """Free or submerged discharge, or a pipe in which the valve stands and whose fluid its jet runs into."""
 
+    needs = {"length": "pipe_diameter", "loss": "pipe_diameter", "expansion_loss": "pipe_diameter"}
+
     pressure: Annotated[Pressure, Field(ge=0, le=PARAMETERS["pressure"].high)] = key(
         0.0,
         "Pressure downstream over that of the surroundings, as a depth too ('1.5 m'): around jet and wall where the "
@@ -231,17 +227,3 @@ class Downstream(Section):
                     f"{1e3 * self.pipe_diameter:g} mm around {around}",
                     f"it must be at least {1e3 * least:.4g} mm, {why}",
                 )
-
-    @model_validator(mode="after")
-    def _pipe_has_a_diameter(self) -> Downstream:
-        given = {
-            "length": f"{self.length:g} m" if self.length else "",
-            "loss": f"{self.loss:g}" if self.loss else "",
-            "expansion_loss": "" if self.expansion_loss is None else f"{self.expansion_loss:g}",
-        }
-        for name, text in given.items():
-            if text and self.pipe_diameter is None:
-                raise BrokenRule(
-                    name, f"{text} without pipe_diameter", "it belongs to a pipe downstream, so give pipe_diameter too"
-                )
-        return self

@@ -5,12 +5,13 @@ from __future__ import annotations
 import typing
 from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass
-from typing import Any, ClassVar, TypeVar
+from typing import Any, ClassVar, Self, TypeVar
 
-from pydantic import BaseModel, ConfigDict, Field, PrivateAttr, model_serializer
+from pydantic import BaseModel, ConfigDict, Field, PrivateAttr, model_serializer, model_validator
 from pydantic.fields import FieldInfo
 
 from ..texts import short_repr
+from .quantity import Quantity
 
 
 @dataclass(frozen=True)
@@ -72,10 +73,30 @@ class Section(BaseModel):
     __repr__ = short_repr
     #: Keys that say more where they are given than by their values.
     told_by_giving: ClassVar[tuple[str, ...]] = ()
+    #: Keys that say nothing without another one, and that.
+    needs: ClassVar[Mapping[str, str]] = {}
+
+    @model_validator(mode="after")
+    def _says_something(self) -> Self:
+        fields = type(self).model_fields
+        for name, other in self.needs.items():
+            value = getattr(self, name)
+            if value != fields[name].default and getattr(self, other) == fields[other].default:
+                quantity = mark_of(fields[name], Quantity)
+                shown = quantity.show(value) if quantity else value
+                given = f"{shown:g}" if isinstance(shown, float) else str(shown)
+                raise BrokenRule(name, f"{given} without {other}", "it says nothing alone, so give both or neither")
+        return self
 
     @classmethod
     def make_way(cls, data: dict[str, Any], changed: Collection[tuple[str, ...]]) -> None:
-        """Take out of plain data what a changed key stands in the place of."""
+        """Take out of plain data what a changed key stands in the place of, and what needs one that is taken away."""
+        for section, field in cls.model_fields.items():
+            table = data.get(section)
+            for name, other in getattr(field.annotation, "needs", {}).items() if isinstance(table, dict) else ():
+                taken = (section, other) in changed and (section, name) not in changed
+                if taken and table.get(other) in (None, field.annotation.model_fields[other].default):
+                    table.pop(name, None)
 
 
 class FollowingSection(Section):

@@ -441,8 +441,9 @@ class Valve(FollowingSection):
     )
     scale: Number = key(
         1.0,
-        "Multiplies every length of this section, wall and gap included, and the positions in mesh.breaks and "
-        "mesh.row_positions and in key_points; layers keep their shares of the wall. Lengths of other sections stay.",
+        "Multiplies every length of this section, wall and gap included, and the positions in mesh.breaks, "
+        "mesh.row_positions and key_points, and where layers begin and end, which keep their shares of the wall. "
+        "Lengths of other sections stay.",
         ge=1e-3,
         le=1000,
     )

@@ -27,7 +27,7 @@ OWN_MATERIAL = """
 # CR, SBR, EPDM or fibre that holds loss_factor alone leaves the material as it is)
 #
 # [materials.silicone]
-# kind = "mooney-rivlin"     # also neo-hookean, isotropic, orthotropic, halpin-tsai, fit, shipped
+# kind = "mooney-rivlin"  # also yeoh, softening, ogden, neo-hookean, isotropic, orthotropic, halpin-tsai, fit, shipped
 # c10 = "0.3 MPa"
 # c01 = "0.1 MPa"
 # density = "1150 kg/m^3"

@@ -96,7 +96,7 @@ def perform(kind: str, case, request, name: str, output: Path | None, plots: Pat
     changes = {key: value for key, value in request.changes.items() if value is not None}
     case = case.replace({"project.units": changes.pop("project.units", case.project.units)})
     choices = {key: value for key, value in request.choices.items() if value is not None}
-    session = Session(case, name).replace(changes)
+    session = Session(case, name).prepared(kind, changes)
     if request.sheet is not None:  # a result is checked by its session
         refuse_read(session.case, output, "The sheet")
     with in_units(case.units):

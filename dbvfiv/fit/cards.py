@@ -402,7 +402,7 @@ class DampingReport:
     def _match_lines(self, at: tuple[float, float]) -> list[str]:
         found = self.matches(at)
         rows = [(m["name"], *(f"{x:.4g}" for x in (*m["ratios"], m["alpha"], m["beta"]))) for m in found]
-        titles = ("material", f"at {at[0]:g} Hz", f"at {at[1]:g} Hz", "alpha, 1/s", "beta, s")
+        titles = ("material", f"ratio at {at[0]:g} Hz", f"ratio at {at[1]:g} Hz", "alpha, 1/s", "beta, s")
         lines = ["", "Rayleigh damping of the same ratio at both frequencies (Eq. 5.5):", *_table(titles, rows)]
         if any(min(m["alpha"], m["beta"]) < 0 for m in found):
             lines.append("A negative constant: no Rayleigh damping meets both ratios.")

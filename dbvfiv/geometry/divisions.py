@@ -44,14 +44,14 @@ def least_rows(surface: Surface) -> int:
 def row_division(valve: Valve, mesh: Mesh, surface: Surface, parts=()) -> Division:
     """Axial positions of the rows, m, from the lip to the flange; on the edges of parts of the wall too."""
     joints = surface.breaks
-    if mesh.rows == "uniform":
-        return divide(joints, (), mesh.along)
     given = valve.scale * np.asarray(mesh.row_positions, float)
     if len(given):
         given[[0, -1]] = joints[[0, -1]]
         if len(given) == mesh.along + 1:
             return Division(given, np.zeros(0))
         return divide(given[[0, -1]], (), mesh.along, (given, np.arange(len(given), dtype=float)))
+    if mesh.rows == "uniform":
+        return divide(joints, (), mesh.along)
     wall = [step.to for step in valve.wall_map] if valve.wall == "measured" else []
     asked = [valve.scale * z for z in mesh.breaks]
     patches = [z for part in parts for z in part.axial_edges]

@@ -24,6 +24,7 @@ from ..model.sizes import ValveSizes
 from ..model.symmetry import equilibria_of
 from ..observer import Observer, is_watched
 from ..studies.case import Case
+from ..studies.closure import EXAMINED
 from ..studies.onset.search import coarse_mesh
 from ..studies.session import Session, kept_run, load_result
 from ..studies.stability.place import why_it_moves
@@ -34,8 +35,8 @@ from ..studies.workers import Lost, Work, Workers
 PARTS = ("steady", "heads", "pipe", "onset", "law", "mesh", "levels", "closure", "chance", "cycle")
 #: Heads examined where none are asked for, over the largest pressure of the case: closer where the lips just open.
 _HEADS = (0.02, 0.05, 0.1, 0.2, 0.4, 0.7, 1.0)
-#: Back pressures examined, over the rated one.
-_BACK = (0.1, 0.5, 1.0, 1.5)
+#: Back pressures examined, over the rated one, besides that and `EXAMINED` times it.
+_BACK = (0.1, 0.5)
 #: Strain levels on both sides of those of the case, and lengths of the pipe over its own.
 _LEVELS, _LENGTHS = (0.10, 0.20), (0.2, 5.0, 6)
 
@@ -205,7 +206,7 @@ def closure_keys(case: Case) -> dict[str, Any]:
         return keys
     step = max(case.closure.max_step, 1.5 * rated / 20)
     given = set(case.closure.pressures) if "pressures" in case.closure.model_fields_set else set()
-    pressures = sorted({*given, *(float(f"{share * rated:.9g}") for share in _BACK[:2]), rated, _BACK[3] * rated})
+    pressures = sorted({*given, *(float(f"{share * rated:.9g}") for share in _BACK), rated, EXAMINED * rated})
     return keys | {"closure.pressures": pressures, "closure.max_step": step}
 
 

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 
-from ..case.parameters import PARAMETERS
 from ..case.quantity import number_or_text
 from ..case.section import BrokenRule
 from ..errors import CaseError
@@ -72,46 +71,10 @@ def law_changes(law: str | None, study: str) -> dict[str, str | None]:
     return {"fluid.continuity": law, f"{study}.continuity": "case" if law else None}
 
 
-def ranged_changes(
-    study: str, known: str | None, over: str | None, pressure: str | None, density: str | None
-) -> dict[str, Any]:
-    """Keys of the case that options --over, --pressure and --density of a study over a range change.
-
-    Parameters
-    ----------
-    known : str or None
-        Range of the case.
-
-    Raises
-    ------
-    CaseError
-        For a value of the parameter that the range moves.
-    """
-    refuse_moved({f"{study}.over": over or known or ""}, pressure=pressure, density=density)
+def ranged_changes(study: str, over: str | None, pressure: str | None, density: str | None) -> dict[str, Any]:
+    """Keys of the case that options --over, --pressure and --density of a study over a range change."""
     values = {"drive.pressure": number_or_text(pressure), "fluid.density": number_or_text(density)}
     return values | {f"{study}.over": over}
-
-
-def refuse_moved(ranges: Mapping[str, str], **given: str | None) -> None:
-    """Refuse a value for a parameter that a range moves.
-
-    Parameters
-    ----------
-    ranges : mapping
-        From the keys of the case that hold ranges to those.
-    given
-        Values of parameters as the command line has them; None where there is none.
-
-    Raises
-    ------
-    CaseError
-    """
-    for key, text in ranges.items():
-        name = text.partition("=")[0].strip()
-        if name in PARAMETERS and given.get(name) is not None:
-            raise CaseError(
-                f"--{name} is given as {given[name]!r}, but {key} = {text!r} moves the {name}; one of them has to go."
-            )
 
 
 def require_start_file(start: str, word: str, path: Path | None) -> None:

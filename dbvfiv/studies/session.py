@@ -109,27 +109,24 @@ def find_study(kind: str) -> Study:
     return import_module(f"{__package__}.{kind}.study").STUDY
 
 
-#: Keyword arguments of the Python interface and the keys of the case that they stand for.
-KEYWORDS = {row.name: row.key for row in PARAMETERS.values() if row.swept} | {
-    "continuity": "fluid.continuity",
-    "in_vacuo": "modes.in_vacuo",
-    "symmetry": "modes.symmetry",
-    "max_frequency": "modes.max_frequency",
-}
+#: Keyword arguments of the Python interface for every study, and the keys of the case that they stand for.
+KEYWORDS = {row.name: row.key for row in PARAMETERS.values() if row.swept} | {"continuity": "fluid.continuity"}
 
 
-def named_changes(given: Mapping[str, Any]) -> dict[str, Any]:
-    """Changes of a case from keyword arguments; those that are None are left out.
+def named_changes(given: Mapping[str, Any], kind: str = "") -> dict[str, Any]:
+    """Changes of a case from keyword arguments, those of every study and the keys of the section of the one asked;
+    those that are None are left out.
 
     Raises
     ------
     CaseError
         For a name that is nothing to choose.
     """
-    unknown = [name for name in given if name not in KEYWORDS]
-    if unknown:
-        raise CaseError(f"{unknown[0]!r} is given, which is nothing to choose here; known are {', '.join(KEYWORDS)}.")
-    return {KEYWORDS[name]: value for name, value in given.items() if value is not None}
+    own = Case.model_fields[kind].annotation.model_fields if kind else ()
+    known = {name: f"{kind}.{name}" for name in own} | KEYWORDS
+    if unknown := [name for name in given if name not in known]:
+        raise CaseError(f"{unknown[0]!r} is given, which is nothing to choose here; known are {', '.join(known)}.")
+    return {known[name]: value for name, value in given.items() if value is not None}
 
 
 def describe_surroundings(case: Case) -> dict[str, Any]:
@@ -244,6 +241,25 @@ class Session:
         if {key.partition(".")[0] for key in changes} <= set(KINDS):
             session.__dict__.update({name: self.__dict__[name] for name in _MODELS if name in self.__dict__})
         return session
+
+    def prepared(self, kind: str, changes: Mapping[str, Any]) -> Session:
+        """The session with what a study is asked for put into its case; None stands for nothing given.
+
+        Raises
+        ------
+        CaseError
+            For a key that cannot be used, and for a value of a parameter that the range of the study moves; where
+            records are identified, they were taken at that value.
+        """
+        given = {key: value for key, value in changes.items() if value is not None}
+        for key in (f"{kind}.{name}" for name in ("over", "x", "y") if kind != "identify"):
+            text = str(given.get(key) or getattr(getattr(self.case, kind), key.rpartition(".")[2], ""))
+            row = PARAMETERS.get(text.partition("=")[0].strip())
+            if row is not None and row.key in given:
+                raise CaseError(
+                    f"{row.name} is given as {given[row.key]!r}, but {key} = {text!r} moves it; one of them has to go."
+                )
+        return self.replace(given)
 
     def settle(self, observer: Observer | None = None) -> Session:
         """The session with strain levels for materials.strain_level = "auto"; itself where none are sought.

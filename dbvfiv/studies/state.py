@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
 from pathlib import Path
@@ -13,8 +13,9 @@ import numpy as np
 
 from eigen.operator import CoupledPencil
 
+from ..case.axis import write_axis
 from ..case.parameters import Mu
-from ..errors import CaseError, SolveError
+from ..errors import SolveError
 from ..model.dynamics import linearise
 from ..model.equilibria import LoadPath, SteadyOptions, require_equilibrium
 from ..model.state import SteadyState
@@ -26,7 +27,7 @@ from ..record.vtkhdf import Step, layer_field_names, motion
 from ..shell.recovery import LayerFields
 from .case import Case
 from .result import StudyResult
-from .session import Session, find_study, named_changes
+from .session import find_study, named_changes
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,9 +93,8 @@ class State(SteadyState):
         --------
         >>> state.pencil(density=1.2, alpha=0).K     # doctest: +SKIP
         """
-        if given := {"symmetry", "in_vacuo", "max_frequency"} & set(changes):
-            raise CaseError(f"{min(given)!r} is given, which the operator of a state does not take; see `modes`.")
-        session, model = self._session(changes, {}), self.model
+        given, model = {"drive.pressure": self.pressure} | named_changes(changes), self.model
+        session = self.results.session.replace(given)
         point, own = Mu.of(session.case), Mu.of(model.case)
         if any(point.get(name) != own.get(name) for name in ("density", "pipe_length")):  # which may move the state
             model = session.model
@@ -110,19 +110,19 @@ class State(SteadyState):
         --------
         >>> state.modes(density=1.2, alpha=0).plot("figures")     # doctest: +SKIP
         """
-        return self._session(changes, {"modes.count": count}).perform("modes", output, observer)
+        return self._ask("modes", {"modes.count": count}, changes, output, observer)
 
     def sweep(
         self,
-        over: str | None = None,
+        over: str | Mapping[str, Sequence[float | str]] | None = None,
         *,
         count: int | None = None,
         output: str | Path | None = None,
         observer: Any = None,
         **changes: Any,
     ) -> Any:
-        """Modes of this state tracked along density, alpha or beta, such as "density=1:1000:40:log"."""
-        return self._session(changes, {"sweep.over": over, "sweep.count": count}).perform("sweep", output, observer)
+        """Modes of this state tracked along a parameter of load, fluid or damping, as `Valve.sweep` takes it."""
+        return self._ask("sweep", {"sweep.over": write_axis(over), "sweep.count": count}, changes, output, observer)
 
     def sensitivity(
         self,
@@ -136,13 +136,13 @@ class State(SteadyState):
         """Derivatives of the leading mode of this state by parameters, such as ["pressure", "layer 3 angle"]; by all
         that the valve has without them.
         """
-        return self._session(changes, sensitivity_keys(of, mode)).perform("sensitivity", output, observer)
+        return self._ask("sensitivity", sensitivity_keys(of, mode), changes, output, observer)
 
-    def _session(self, given: dict[str, Any], keys: dict[str, Any]) -> Session:
-        changes = {"drive.pressure": self.pressure} | named_changes(given) | keys
-        session = self.results.session.replace({key: value for key, value in changes.items() if value is not None})
+    def _ask(self, kind: str, keys: dict[str, Any], given: dict[str, Any], output: Any, observer: Any) -> Any:
+        session = self.results.session.replace({"drive.pressure": self.pressure})
+        session = session.prepared(kind, keys | named_changes(given, kind))
         session.start = self.solution()
-        return session
+        return session.perform(kind, output, observer)
 
     def plot(self, folder: str | Path = ".", format: str = "png") -> list[Path]:
         """Write the figures of this state alone."""

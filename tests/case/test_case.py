@@ -478,6 +478,7 @@ drive.head = "1 m"
 damping = { model = "rayleigh", beta = "3 ms" }
 upstream = { length = 3, roughness = "1 mm" }
 valve.sealing_force = "500 N/m"
+outside = { fluid = "same", pipe_diameter = "330 mm" }
 """
 
 
@@ -489,6 +490,7 @@ valve.sealing_force = "500 N/m"
         ("valve.sealing_pressure=1 kPa", "valve.sealing_force"),
         ("valve.overlap=3 mm", "valve.sealing_force"),
         ("damping.model=loss factor", "damping.beta"),
+        ("outside.fluid=none", "outside.pipe_diameter"),
     ],
 )
 def test_override_stands_in_the_place_of_the_key_that_says_the_same(tmp_path, override, other):

@@ -8,8 +8,8 @@ from dbvfiv.case import CaseError
 from dbvfiv.case.axis import parse_stability_axis
 from dbvfiv.case.describe import allowed_words, walk
 from dbvfiv.case.parameters import DESIGN, PARAMETERS, SURROUNDINGS, SWEPT, SYSTEM_NAMES, Mu, listed
-from dbvfiv.studies.case import Case, thesis_case
-from dbvfiv.studies.session import KEYWORDS
+from dbvfiv.studies.case import Case, load_case, thesis_case
+from dbvfiv.studies.session import KEYWORDS, Session, named_changes
 
 
 @pytest.mark.parametrize("row", PARAMETERS.values(), ids=PARAMETERS)
@@ -87,6 +87,12 @@ def test_what_a_range_moves_is_given_no_value(misused, command, given):
 
 def test_arguments_of_the_python_interface():
     assert {name: KEYWORDS[name] for name in SWEPT} == {name: PARAMETERS[name].key for name in SWEPT}
+    session = Session(load_case(None))
+    for kind, name, value in (("onset", "symmetry", "all"), ("response", "max_frequency", 20.0), ("sweep", "count", 2)):
+        case = session.prepared(kind, named_changes({name: value}, kind)).case
+        assert getattr(getattr(case, kind), name) == value and case.modes == session.case.modes
+    known = named_changes({"density": 10.0, "in_vacuo": True, "beta": None}, "modes")
+    assert known == {"fluid.density": 10.0, "modes.in_vacuo": True}
 
 
 def test_a_parameter_point_holds_what_the_valve_has():

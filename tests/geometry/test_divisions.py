@@ -90,7 +90,8 @@ def test_twice_the_rows_hold_the_former_ones():
 def test_rows_of_ones_own():
     assert is_on(rows_of(24, breaks=[0.1234]).positions, 0.1234)
     own = [0.0, 0.1, 0.2, 0.22, 0.24, 0.3, 0.4, 0.56]
-    assert np.array_equal(rows_of(7, row_positions=own).positions, own)
+    for rows in ("lip", "uniform"):
+        assert np.array_equal(rows_of(7, rows=rows, row_positions=own).positions, own)
     spread = rows_of(14, row_positions=own).positions
     assert spread[::2] == pytest.approx(own, abs=1e-12)
 

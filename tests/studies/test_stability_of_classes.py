@@ -93,7 +93,7 @@ def test_maps_hold_every_class():
 @pytest.mark.parametrize("name", ["SA", "AA"])
 @pytest.mark.parametrize("over", ["density=10:1000:3:log", "pressure=6e3:10e3:2"])
 def test_sweeps_follow_one_class(name, over):
-    found = make(sweep__symmetry=name).sweep(over, count=2)
+    found = make().sweep(over, count=2, symmetry=name)
     assert found.certified and found.summary()["symmetry"] == name
     density = 10.0 if "density" in over else None
     modes = make().modes("6 kPa", symmetry=name, count=2, **({"density": density} if density else {}))

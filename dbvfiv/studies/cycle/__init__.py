@@ -7,7 +7,6 @@ from typing import Annotated, Literal
 from pydantic import StrictInt, model_validator
 
 from ...case.axis import RangeSection, StabilityRange
-from ...case.model import Case
 from ...case.parameters import listed
 from ...case.quantity import Length, Number
 from ...case.section import key
@@ -19,6 +18,8 @@ ORDER = 42
 
 class Keys(RangeSection):
     """Branches of limit cycles along one parameter."""
+
+    needs = {"start_cycle": "start_file"}
 
     over: StabilityRange = key(
         "density=20:60:9",
@@ -62,7 +63,6 @@ class Keys(RangeSection):
 
 
 def command(
-    case: Case,
     over: Annotated[
         str | None, over_option(f"PARAMETER=START:STOP:COUNT[:log] of {listed()}; cycle.over without it.")
     ] = None,
@@ -79,4 +79,4 @@ def command(
 
     dbvfiv cycle cases/light-fluid.toml --over density=25:60:8 -o cycle.h5 --plots figures
     """
-    return Request(ranged_changes("cycle", case.cycle.over, over, pressure, density))
+    return Request(ranged_changes("cycle", over, pressure, density))

@@ -8,11 +8,10 @@ import typer
 from pydantic import StrictBool, StrictInt, StrictStr, field_validator, model_validator
 
 from ...case.axis import Axis, Level, StabilityRange, parse_stability_axis
-from ...case.model import Case
 from ...case.parameters import listed
 from ...case.quantity import number_or_text
 from ...case.section import BrokenRule, Section, key
-from ..request import ClassesOption, Request, WorkersOption, pressure_option, refuse_moved
+from ..request import ClassesOption, Request, WorkersOption, pressure_option
 from ..workers import WORKERS_HELP, WorkersKey
 
 ORDER = 30
@@ -95,7 +94,6 @@ _RANGE = f"PARAMETER=START:STOP:COUNT[:log] of {listed()}"
 
 
 def command(
-    case: Case,
     x: Annotated[
         str | None, typer.Option("--x", metavar="RANGE", help=f"Horizontal axis, {_RANGE}; map.x without it.")
     ] = None,
@@ -149,8 +147,6 @@ def command(
     dbvfiv map cases/dbv12.toml --x "pressure=0.5 kPa:20 kPa:64" --y density=1:1000:64:log --workers 2 -o map.h5 --plots
     figures
     """
-    ranges = {"map.x": x or case.map.x, "map.y": y or case.map.y}
-    refuse_moved(ranges, pressure=pressure, density=density)
     changes = {
         "drive.pressure": number_or_text(pressure),
         "fluid.density": number_or_text(density),

@@ -21,6 +21,8 @@ ORDER = 25
 class Keys(Section):
     """Leading eigenvalues of the coupled state."""
 
+    needs = {"shift_frequency": "shift"}
+
     count: StrictInt = key(10, "How many modes; a conjugate pair is one.", ge=1, le=1000)
     max_frequency: Frequency | None = key(
         None, "Only modes up to this frequency; chosen where damping does not order the modes.", gt=0, le=1e6

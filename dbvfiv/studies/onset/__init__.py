@@ -7,7 +7,6 @@ from typing import Annotated, Literal
 from pydantic import StrictBool
 
 from ...case.axis import RangeSection, StabilityRange
-from ...case.model import Case
 from ...case.parameters import listed
 from ...case.quantity import Number
 from ...case.section import key
@@ -57,7 +56,6 @@ class Keys(RangeSection):
 
 
 def command(
-    case: Case,
     over: Annotated[
         str | None,
         over_option(
@@ -84,5 +82,5 @@ def command(
 
     dbvfiv onset cases/dbv12.toml --over density -p "6 kPa"
     """
-    changes = ranged_changes("onset", case.onset.over, over, pressure, density) | {"onset.symmetry": symmetry}
+    changes = ranged_changes("onset", over, pressure, density) | {"onset.symmetry": symmetry}
     return Request(changes | law_changes(law, "onset"))

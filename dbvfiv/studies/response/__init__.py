@@ -93,7 +93,7 @@ def command(
             f"--noise is given as {noise!r}, but the spectrum {str(known)!r} is in its place; one of them has to go."
         )
     changes = {
-        **ranged_changes("response", case.response.over, over, pressure, density),
+        **ranged_changes("response", over, pressure, density),
         "fluid.continuity": law,
         "response.noise": number_or_text(noise),
         "response.spectrum": None if spectrum is None else str(spectrum),

@@ -8,7 +8,6 @@ import typer
 from pydantic import StrictInt
 
 from ...case.axis import Axis, Range, parse_axis
-from ...case.model import Case
 from ...case.parameters import SWEPT, listed
 from ...case.quantity import Number
 from ...case.section import Section, key
@@ -46,7 +45,6 @@ class Keys(Section):
 
 
 def command(
-    case: Case,
     over: Annotated[
         str | None, over_option(f"PARAMETER=START:STOP:COUNT[:log] of {listed(SWEPT)}; sweep.over without it.")
     ] = None,
@@ -68,5 +66,5 @@ def command(
     dbvfiv sweep cases/dbv12.toml -p "6 kPa" --set damping.alpha=0 --over density=1:1000:40:log -o sweep.h5 --plots
     figures
     """
-    changes = ranged_changes("sweep", case.sweep.over, over, pressure, density)
+    changes = ranged_changes("sweep", over, pressure, density)
     return Request(changes | {"sweep.count": count, "sweep.symmetry": symmetry})

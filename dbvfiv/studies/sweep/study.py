@@ -260,7 +260,7 @@ def check(case: Case) -> None:
     if case.sweep.axis.parameter == "density" and case.drive.kind != "flow":
         raise CaseError(
             "sweep.over ranges over density, but drive.kind is 'uniform' and there is no fluid; choose "
-            "pressure, alpha or beta."
+            "pressure, alpha, beta or loss_factor."
         )
 
 
@@ -367,7 +367,7 @@ class SweepResult(StudyResult):
     Attributes
     ----------
     parameter : str
-        "pressure", "density", "alpha", "beta" or "loss_factor".
+        As the range names it, "density".
     values : (p,) SI
         Those done.
     branches : tuple of Branch

@@ -20,6 +20,8 @@ Verdict = Literal["steady", "decaying", "limit cycle", "growing", "closed", "cha
 class Keys(Section):
     """A time history."""
 
+    needs = {"start_state": "start_file"}
+
     step: Time = key(1e-3, "Time step; with adaptive steps the first and the largest one.", gt=0, le=1e3)
     duration: Time = key(0.5, "Simulated time.", gt=0, le=1e5)
     start: Literal["rest", "steady", "kick", "state"] = key(

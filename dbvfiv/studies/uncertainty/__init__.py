@@ -9,7 +9,6 @@ from pydantic import BeforeValidator, Field, StrictInt, StrictStr, ValidationInf
 
 from ...case.axis import RangeSection, StabilityRange
 from ...case.distribution import with_full_names
-from ...case.model import Case
 from ...case.parameters import listed
 from ...case.quantity import Number
 from ...case.section import Described, flattened, key
@@ -72,7 +71,6 @@ class Keys(RangeSection):
 
 
 def command(
-    case: Case,
     over: Annotated[
         str | None, over_option(f"PARAMETER=START:STOP:COUNT of {listed()}; uncertainty.over without it.")
     ] = None,
@@ -99,7 +97,7 @@ def command(
     figures
     """
     changes = {
-        **ranged_changes("uncertainty", case.uncertainty.over, over, pressure, density),
+        **ranged_changes("uncertainty", over, pressure, density),
         "uncertainty.samples": samples,
         "uncertainty.method": "rare" if rare else None,
         "uncertainty.workers": workers,
