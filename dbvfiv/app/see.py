@@ -50,6 +50,14 @@ def arguments_of(case: Any, title: str) -> list[str]:
     return [argument.format(**values) for argument in PICTURES[title][1]]
 
 
+def asked_at(values: dict[str, float]) -> list[str]:
+    """Arguments of `dbvfiv modes` at values of the sliders, SI; the wall stays that of the case, whose rubbers have
+    strain levels by the pressures that it names.
+    """
+    own = {"pressure": "--pressure={!r} N/m2", "density": "--density={!r}"}  # a unit in which the run tells nothing
+    return [own.get(name, f"--set={PARAMETERS[name].key}={{!r}}").format(value) for name, value in values.items()]
+
+
 def drop_box(label: str, largest: int, take: Callable[[events.UploadEventArguments], Any]) -> None:
     """Box that a file up to a size in bytes is dropped on.
 
@@ -305,9 +313,7 @@ class RunsPanel:
             elif page.checked.case is None:
                 page.site.runs.add(page.home, "verdict", f"verdict of {name}", {RECORD: content}, [])
             else:
-                moved = [
-                    f"--set={PARAMETERS[key].key}={value!r}" for key, value in page.asking.values_of(page.file).items()
-                ]
+                moved = asked_at(page.asking.values_of(page.file))
                 files = page.files() | {RECORD: content}
                 page.site.runs.add(page.home, "compare", f"{name} beside the modes of {page.name}", files, moved)
         except (CaseError, OSError) as error:
