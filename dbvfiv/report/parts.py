@@ -20,6 +20,7 @@ from ..effects import explained, without_numbers
 from ..errors import CaseError
 from ..fit.cards import describe_damping, law_from_case
 from ..materials.stability import StableRange, stable_range
+from ..model.supports import HELD_LIPS
 from ..model.symmetry import only_class_of, symmetry_named
 from ..studies.result import StudyResult
 from ..texts import digits, listed
@@ -371,7 +372,7 @@ def closure_part(found: Gathered) -> Part:
         f"back pressure, {units.name('pressure')}": lambda s: (
             f"{s.pressure / scale:.4g}{' (beyond the limit)' if s.beyond_limit else ''}"
         ),
-        "shut": lambda s: "yes" if s.closed else "no",
+        "shut": lambda s: "held" if result.case.closure.supports == HELD_LIPS else "yes" if s.closed else "no",
         f"sealed length, {unit}": lambda s: f"{s.sealed_length / size:.3g}",
         "leak, L/h": lambda s: digits(s.leak * 3.6e6),
         "contact force, N": lambda s: digits(s.contact_force),

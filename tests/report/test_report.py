@@ -398,8 +398,12 @@ def test_figures_of_steady_states_and_of_the_closure_have_names_of_their_own(mon
     state = SimpleNamespace(**dict.fromkeys(numbers, 1.0), closed=True, beyond_limit=False)
     drawers = dict.fromkeys(("measured-passage", "measured-sections"))
     result = SimpleNamespace(states=(state,), drawers=lambda: drawers, case=case, failures=(), remarks=lambda: ())
-    part = parts.closure_part(SimpleNamespace(get={"closure": result}.get, case=case))
+    found = SimpleNamespace(get={"closure": result}.get, case=case)
+    part = parts.closure_part(found)
     assert [one.name for one in part.pictures] == ["closure", "closure-measured-passage", "closure-measured-sections"]
+    assert part.tables[0].rows[0][1] == "yes"
+    result.case = case.replace({"closure.supports": "held-lips"})
+    assert parts.closure_part(found).tables[0].rows[0][1] == "held"
 
 
 def test_verdicts_over_the_pipe_without_a_mode_have_no_damping_ratio(monkeypatch):
@@ -523,6 +527,9 @@ def test_a_rated_pressure_that_was_not_reached_is_named(rated, answer):
     assert (closes(found).answer, closes(found).text) == ("yes", "Shut at 10 kPa and 60 kPa.")
     states[0].closed = False
     assert (closes(found).answer, closes(found).text) == ("no", "Shut at 10 kPa.")
+    states[0].closed, held = True, case.replace({"closure.rated_pressure": None, "closure.supports": "held-lips"})
+    found.case = found.results["closure"].case = held
+    assert (closes(found).answer, closes(found).text) == (UNKNOWN, "The lips are held shut by the supports.")
 
 
 @pytest.mark.parametrize(
