@@ -40,8 +40,8 @@ def arguments_of(case: Any, title: str) -> list[str]:
     """Arguments of the study of a picture for a case: heads over that downstream up to 1.5 times its own, damping from
     a quarter to three times its own.
     """
-    damping = ((name, getattr(case.damping, name)) for name in ("loss_factor", "beta", "alpha"))
-    name, own = next(((name, own) for name, own in damping if own > 0), ("density", case.fluid.density))
+    name = Mu.of(case).damping or "density"
+    own = Mu.of(case)[name]
     back = max(case.rest_pressure, 0.0)
     low, high = (back + share * (case.drive.pressure - back) for share in (0.15, 1.5))
     unit, scale = case.units.name("pressure"), case.units.factor("pressure")  # in any other the command would tell all

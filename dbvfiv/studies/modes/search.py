@@ -17,7 +17,7 @@ from eigen.search import leading_modes
 from eigen.spectrum import SearchOptions, Spectrum
 
 from ...case.parameters import PARAMETERS, Mu
-from ...errors import CaseError
+from ...errors import CaseError, SolveError
 from ...model.equilibria import require_equilibrium
 from ...model.leading import LeadingSearch
 from ...model.state import SteadyState
@@ -533,18 +533,20 @@ def critical_damping_factor(walk: StabilityWalk, place: Mu, verdict: Verdict) ->
         NaN where none is found.
     float
         The last factor looked at where none up to it, or down to it, makes the difference; NaN where one is found, the
-        wall has no such damping or none beside it that holds, the verdict is another, or no mode is neutral there by
-        the full matrices.
-
-    Raises
-    ------
-    SolveError
-        If there is no steady state.
+        wall has no such damping or none beside it that holds, the verdict is another, the search fails, or no mode is
+        neutral there by the full matrices.
     """
-    name = "loss_factor" if place.loss_factor > 0 else "beta"
-    own = place[name]
-    if own <= 0 or verdict.outcome not in (STABLE, FLUTTERS):
+    if place.damping not in ("loss_factor", "beta") or verdict.outcome not in (STABLE, FLUTTERS):
         return np.nan, np.nan
+    try:
+        return _change(walk, place, verdict)
+    except SolveError:  # the verdict stands by itself
+        return np.nan, np.nan
+
+
+def _change(walk: StabilityWalk, place: Mu, verdict: Verdict) -> tuple[float, float]:
+    """Factor at which the verdict changes, and the last one that was looked at."""
+    name, own = place.damping, place[place.damping]
     factors = LOWER if verdict.outcome == STABLE else HIGHER
     highest = PARAMETERS[name].high
     if name == "loss_factor":

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from ...case.parameters import Mu
-from ...errors import CaseError, NotValidError, SolveError
+from ...errors import CaseError, NotValidError
 from ...model.symmetry import asks_for_equilibria, symmetry_named
 from ...record.mesh import MeshData, WholeValve
 from ...record.record import GrowingRecord, Record
@@ -69,10 +69,7 @@ def run(session: Session, record: GrowingRecord) -> None:
             return
         if variant.continuity == own_variant(case).continuity and not case.modes.in_vacuo:
             record.progress("critical damping factor")
-            try:
-                factor, sought = critical_damping_factor(own, here, found.verdict)
-            except SolveError:
-                factor = sought = np.nan
+            factor, sought = critical_damping_factor(own, here, found.verdict)
             verdict = replace(found.verdict, critical_damping_factor=factor, damping_sought=sought)
             found = replace(found, verdict=verdict)
         _keep(record, variant, found)
