@@ -271,10 +271,12 @@ def _chance(found: Gathered) -> str | None:
     known = [point for point in result.points if point["probability"] is not None]
     if not known:
         return "probability of chatter: no sample was decided"
-    most = max(known, key=lambda point: point["probability"])
+    snaps = lambda point: point["outcomes"][DIVERGES]["probability"] or 0.0  # noqa: E731
+    most = max(known, key=lambda point: point["probability"] + snaps(point))
     chance, low, high = (digits(100 * x, 2) for x in (most["probability"], *most["interval"]))
     at = found.case.units.parameter(result.parameter).text(most["value"])
-    return f"probability of chatter at {at}: {chance} % ({low} to {high} %), {only_class_of(found.case.part)}"
+    also = f", of divergence {digits(100 * snaps(most), 2)} %" if snaps(most) else ""
+    return f"probability of chatter at {at}: {chance} % ({low} to {high} %){also}, {only_class_of(found.case.part)}"
 
 
 def loss_range(case) -> tuple[float, float] | None:

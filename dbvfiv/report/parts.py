@@ -317,7 +317,7 @@ def chance_part(found: Gathered) -> Part | None:
         f"{row.title}, {row.shown_unit}".rstrip(", "): lambda p: f"{p['value'] / row.scale:.4g}",
         "chatters, %": lambda p: percent(p["probability"]),
         "95 % interval, %": lambda p: " to ".join(map(percent, p["interval"])),
-        "not valid, %": lambda p: percent(p["outcomes"]["not valid"]["probability"]),
+        **{f"{name}, %": lambda p, name=name: percent(p["outcomes"][name]["probability"]) for name in result.others},
         "undecided": lambda p: f"{p['undecided']} of {p['samples']}",
     }
     captions = {

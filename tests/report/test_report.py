@@ -234,10 +234,12 @@ def test_the_least_damped_mode_is_that_of_a_head_that_has_modes():
 def test_a_probability_of_chatter_names_the_class_that_was_looked_at(keys, told):
     """A valve that sways at the head of samples of which none flutters in the class of the equilibria."""
     found = with_verdicts(damped("stable", 0.3), damped("flutters", 1.2), keys=keys)
-    point = {"value": 6e3, "probability": 0.0, "interval": [0.0, 0.014]}
+    point = {"value": 6e3, "probability": 0.0, "interval": [0.0, 0.014], "outcomes": {"diverges": {"probability": 0.0}}}
     found.results["chance"] = SimpleNamespace(points=[point], parameter="pressure")
     (said,) = (line for line in on_chatter(found).uncertainty if "probability" in line)
     assert said.startswith(f"probability of chatter at 6 kPa: 0 % (0 to 1.4 %), {told}")
+    point["outcomes"]["diverges"]["probability"] = 0.3
+    assert f": 0 % (0 to 1.4 %), of divergence 30 %, {told}" in " ".join(on_chatter(found).uncertainty)
 
 
 def test_onsets_are_told_with_their_kind_and_with_what_speaks_against_them():
