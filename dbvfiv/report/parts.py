@@ -356,7 +356,9 @@ def cycle_part(found: Gathered) -> Part | None:
         swing = units.text_of("size", point.amplitude, 3)
         said = f"{kind} limit cycle of {swing} of each lip, half its swing, at {point.frequency:.4g} Hz."
     pictures = pictures_of(result, {"branch": "Amplitude and frequency of the cycle; dashed where it is unstable."})
-    return Part("cycle", _CYCLES, (said,), (Table.of(result.points, columns),), pictures, result.failures)
+    return Part(
+        "cycle", _CYCLES, (said, result.remarks()[-1]), (Table.of(result.points, columns),), pictures, result.failures
+    )
 
 
 _CLOSURE = "Closing and sealing under back pressure"

@@ -32,6 +32,7 @@ from dbvfiv.report.page import sheet
 from dbvfiv.report.parts import _layers, heads_part, onset_part, steady_part
 from dbvfiv.shell.section import Section, WallParts, Zones
 from dbvfiv.studies.case import load_case
+from dbvfiv.studies.cycle.study import CycleResult
 from dbvfiv.studies.onset.search import NO_ONSET
 from dbvfiv.studies.session import Session
 from dbvfiv.studies.stability.verdict import Verdict
@@ -415,6 +416,16 @@ def test_verdicts_over_the_pipe_without_a_mode_have_no_damping_ratio(monkeypatch
     sweep = SimpleNamespace(values=(5.0, 20.0), verdicts=verdicts, case=case, failures=())
     (table,) = parts.pipe_part(SimpleNamespace(pipes={5e3: sweep}, case=case)).tables
     assert table.rows == (("5 kPa", "not valid", "stable, 3 %"),)
+
+
+def test_a_stable_cycle_is_said_to_be_so_in_the_class_of_the_model(monkeypatch):
+    monkeypatch.setattr(parts, "pictures_of", lambda *_: ())
+    case = load_case(None, ["drive.pressure=6 kPa"])
+    point = SimpleNamespace(value=6e3, amplitude=3e-3, frequency=8.0, lip_least=0.0, lip_largest=9e-3, stable=True)
+    result = SimpleNamespace(case=case, parameter="pressure", points=[point], nearest=lambda _: point, failures=())
+    vars(result).update(onset=None, special_points=(), reason="ends", remarks=lambda: CycleResult.remarks(result))
+    said, limit = parts.cycle_part(SimpleNamespace(case=case, get=lambda _: result)).sentences
+    assert said.startswith("A stable limit cycle of 3 mm") and limit.startswith("Stable means: against perturbations")
 
 
 @pytest.mark.parametrize(("name", "count"), [("SS", 1), ("SA", 0)])
