@@ -127,8 +127,7 @@ class Explorer:
         self._heads = self._spread()
 
     def _offered(self) -> Iterator[tuple[str, tuple[float, float]]]:
-        damped = [name for name in ("loss_factor", "beta", "alpha") if self.base.get(name, 0.0) > 0]
-        for name in ("pressure", "density", *damped[:1], "pipe_length"):
+        for name in ("pressure", "density", self.base.damping, "pipe_length"):
             own, (low, high) = self.base.get(name, 0.0), OFFERED.get(name, DAMPED)
             if own > 0 and self._can_ask(name):
                 above = self.case.least_drive if name == "pressure" else 0.0
@@ -180,16 +179,22 @@ class Explorer:
         return redescribe(seen, found)
 
     def predict(self, **values: float) -> Answer:
-        """Answer of the reduced operator, without its bound.
+        """Answer of the reduced operator, without its bound. Where the constants of a rubber are unstable the verdict
+        says so.
 
         Raises
         ------
         CaseError, SolveError
         """
+        return self._asked(values, lambda place: np.nan)
+
+    def _asked(self, values: Mapping[str, float], bound: Callable[[Mu], float]) -> Answer:
         place = self.place(values)
-        state = self.state(place)
+        state, refusal = self.state(place), self.walk.refusal(place)
+        if refusal:
+            return Answer(place, state, Verdict.not_valid(refusal))
         self._reduce(place)
-        return self._predicted(place, state, np.nan)
+        return self._predicted(place, state, bound(place))
 
     def _reduce(self, place: Mu) -> None:
         """Make the reduced operator of the state of a point, unless it is at hand."""
@@ -199,19 +204,13 @@ class Explorer:
             self._space = reduction, reduction.fine(reduction.first([place]), [place], TAKEN), self._corners(place)
 
     def bounded(self, **values: float) -> Answer:
-        """Prediction with its bound, on a reduced operator that is enriched where this is too large. Where the
-        constants of a rubber are unstable the verdict says so.
+        """Prediction with its bound, on a reduced operator that is enriched where this is too large.
 
         Raises
         ------
         CaseError, SolveError
         """
-        place = self.place(values)
-        state, refusal = self.state(place), self.walk.refusal(place)
-        if refusal:
-            return Answer(place, state, Verdict.not_valid(refusal))
-        self._reduce(place)
-        return self._predicted(place, state, self._enriched(place))
+        return self._asked(values, self._enriched)
 
     def prepare(self) -> bool:
         """Enrich the reduced operator at one more corner of the ranges, or find one more steady state; False where
@@ -268,12 +267,7 @@ class Explorer:
         return max(replace(found, eigenvalues=spectrum.eigenvalues), found, key=lambda sample: sample.pairs)
 
     def with_margin(self, answer: Answer) -> Answer:
-        """A confirmed answer with the factor on the damping at which flutter begins or ends.
-
-        Raises
-        ------
-        SolveError
-        """
+        """A confirmed answer with the factor on the damping at which flutter begins or ends."""
         verdicts = {}
         for name, verdict in answer.classes.items():
             walk = self.walk.in_class(symmetry_named(name))

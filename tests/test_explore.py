@@ -142,6 +142,13 @@ def test_a_band_below_the_flutter_is_left_open():
     assert answer.reason.endswith("modes.max_frequency moves the end.")
 
 
+def test_every_answer_says_where_the_rubber_is_not_valid():
+    keys = {"materials.constants": "published", "materials.strain_level": 0.1, "drive.pressure": 36e3}
+    explorer = dbvfiv.load(None, COARSE | keys).explore()
+    for answer in (explorer.predict(), explorer.bounded(), explorer.confirm()):
+        assert answer.verdict.outcome == "not valid" and "constants are unstable" in answer.verdict.reason
+
+
 def test_corners_are_prepared():
     explorer = dbvfiv.load(None, COARSE | {"damping.model": "rayleigh", "damping.beta": 0.003}).explore()
     explorer.predict()

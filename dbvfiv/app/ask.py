@@ -12,6 +12,7 @@ from nicegui import ui
 
 from ..case.parameters import PARAMETERS
 from ..errors import CaseError
+from ..studies.stability.verdict import STABLE
 
 #: Steps of a slider; time for which it rests before more than the prediction is computed, s.
 STEPS, REST = 400, 0.25
@@ -66,7 +67,7 @@ class AskPanel:
                 with ui.element("div").classes("numbers"):
                     self._numbers = {name: self._number(title) for title, name, *_ in NUMBERS}
                     self._margin = self._number("Least damping ratio")
-                    self._factor = self._number("Flutter begins at")
+                    self._factor = self._number("Flutter")
                 self._modes = ui.table(
                     columns=[
                         {"name": "growth", "label": "Growth rate, 1/s", "field": "growth"},
@@ -233,11 +234,12 @@ class AskPanel:
                 name
             ].content = f"<b data-name='{name}' data-si='{state[name]!r}'>{_short(state[name] * factor)} {unit}</b>"
         ratio, margin = verdict["damping_ratio"], verdict["critical_damping_factor"]
+        begins, none = ("begins", "none down") if verdict["outcome"] == STABLE else ("ends", "no end up")
         missing = "not known" if whole else "–"
         if (sought := verdict.get("damping_sought")) is not None:
-            missing = f"none to {sought:.3g} × damping"
+            missing = f"{none} to {sought:.3g} × damping"
         self._margin.content = f"<b>{'–' if ratio is None else f'{100 * ratio:.3g} %'}</b>"
-        self._factor.content = f"<b>{missing if margin is None else f'{margin:.3g} × damping'}</b>"
+        self._factor.content = f"<b>{missing if margin is None else f'{begins} at {margin:.3g} × damping'}</b>"
         self._verdict.text = verdict["outcome"].capitalize()
         bound = "" if found["bound"] is None else f", within {max(found['bound'], 1e-9):.0e} of an eigenvalue"
         self._mark.text = "confirmed by the full model" if found["confirmed"] else f"predicted{bound}"

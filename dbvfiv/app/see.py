@@ -40,14 +40,22 @@ def arguments_of(case: Any, title: str) -> list[str]:
     """Arguments of the study of a picture for a case: heads over that downstream up to 1.5 times its own, damping from
     a quarter to three times its own.
     """
-    damping = ((name, getattr(case.damping, name)) for name in ("loss_factor", "beta", "alpha"))
-    name, own = next(((name, own) for name, own in damping if own > 0), ("density", case.fluid.density))
+    name = Mu.of(case).damping or "density"
+    own = Mu.of(case)[name]
     back = case.least_drive
     low, high = (back + share * (case.drive.pressure - back) for share in (0.15, 1.5))
     unit, scale = case.units.name("pressure"), case.units.factor("pressure")  # in any other the command would tell all
     heads = {"low": low, "high": high, "shown_low": low / scale, "shown_high": high / scale, "unit": unit}
     values = heads | {"damping": f"{name}={0.25 * own:.6g}:{3 * own:.6g}"}
     return [argument.format(**values) for argument in PICTURES[title][1]]
+
+
+def asked_at(values: dict[str, float]) -> list[str]:
+    """Arguments of `dbvfiv modes` at values of the sliders, SI; the wall stays that of the case, whose rubbers have
+    strain levels by the pressures that it names.
+    """
+    own = {"pressure": "--pressure={!r} N/m2", "density": "--density={!r}"}  # a unit in which the run tells nothing
+    return [own.get(name, f"--set={PARAMETERS[name].key}={{!r}}").format(value) for name, value in values.items()]
 
 
 def drop_box(label: str, largest: int, take: Callable[[events.UploadEventArguments], Any]) -> None:
@@ -305,9 +313,7 @@ class RunsPanel:
             elif page.checked.case is None:
                 page.site.runs.add(page.home, "verdict", f"verdict of {name}", {RECORD: content}, [])
             else:
-                moved = [
-                    f"--set={PARAMETERS[key].key}={value!r}" for key, value in page.asking.values_of(page.file).items()
-                ]
+                moved = asked_at(page.asking.values_of(page.file))
                 files = page.files() | {RECORD: content}
                 page.site.runs.add(page.home, "compare", f"{name} beside the modes of {page.name}", files, moved)
         except (CaseError, OSError) as error:

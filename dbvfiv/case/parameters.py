@@ -235,6 +235,11 @@ class Mu(Mapping[str, float]):
         return {name: self._values[name] for name in PIPES if name in self._values}
 
     @property
+    def damping(self) -> str:
+        """Name of the first damping that the wall has, of loss factors, beta and alpha; empty without any."""
+        return next((name for name in ("loss_factor", "beta", "alpha") if self._values.get(name, 0.0) > 0), "")
+
+    @property
     def design(self) -> dict[str, float]:
         """Parameters of the design that are not the case's own."""
         return {name: value for name, value in self._values.items() if name in DESIGN}

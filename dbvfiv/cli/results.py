@@ -27,8 +27,10 @@ from .terminal import (
 
 if TYPE_CHECKING:
     from ..studies.recognition import Recognition
+    from ..studies.result import StudyResult
     from ..studies.state import State
-    from ..verdict.reading import Signal
+    from ..verdict import JudgeOptions
+    from ..verdict.reading import JudgedSignal, Reading, Signal
 
 #: Kinds of figure files, of other files, and the surfaces and bodies of a state.
 FigureFormat = StrEnum("FigureFormat", ["png", "svg"])
@@ -521,14 +523,14 @@ def verdict(
 
     from ..drawing.signal import save_signals
     from ..verdict import JudgeOptions
-    from ..verdict.reading import Reading, judge_file, judge_signals
+    from ..verdict.reading import Reading, judge_file
 
     reading = Reading(columns or (), time or "", rate, time_unit, skip_bad, since, until, detrend)
     if not 0 < steady < 1:
         raise CaseError(f"--steady is {steady:g}; it must be greater than 0 and less than 1.")
     options = JudgeOptions(steady=steady)
     if file.is_file() and h5py.is_hdf5(file):
-        judged = judge_signals(file, _signals_of_run(file, columns), reading, options, closed_below)
+        judged = _judged_run(file, reading, options, closed_below)
     else:
         judged = judge_file(file, reading, options, closed_below)
     figures = [] if plots is None else save_signals(plots, judged)
@@ -536,16 +538,29 @@ def verdict(
     print_either({"signals": [each.summary() for each in judged]}, lines, as_json)
 
 
-def _signals_of_run(file: Path, columns: list[str] | None) -> list[Signal]:
-    """Signals of a transient run."""
+def _judged_run(file: Path, reading: Reading, options: JudgeOptions, closed_below: float | None) -> list[JudgedSignal]:
+    """Signals of a transient run, where nothing else is asked for as the run itself is judged."""
     from ..studies.session import load_result
-    from ..verdict.reading import Signal
+    from ..verdict import JudgeOptions
+    from ..verdict.reading import judge_signals
 
     result = load_result(file)
     if result.kind != "transient":
         raise CaseError(f"{str(file)!r} holds a result of kind {result.kind!r} and no time series.")
+    signals, own = _signals_of_run(result, reading.columns), {}
+    if (reading.since, reading.until, closed_below, options) == (None, None, None, JudgeOptions()):
+        signals = [signal.between(result.judged_from, float("inf")) for signal in signals]
+        own = {name: told for name, told in result.verdict.items() if isinstance(told, dict) and "verdict" in told}
+    judged = judge_signals(file, signals, reading, options, closed_below)
+    return [each.named_by(own[each.signal.name]) if each.signal.name in own else each for each in judged]
+
+
+def _signals_of_run(result: StudyResult, columns: Sequence[str]) -> list[Signal]:
+    """Signals of a transient run."""
+    from ..verdict.reading import Signal
+
     known = [name for name, values in result.history.items() if values.ndim == 1]
-    names = columns or ["mass_flow", "lip_opening"]
+    names = list(columns) or ["mass_flow", "lip_opening"]
     names = [known[int(name) - 1] if name.isdigit() and 0 < int(name) <= len(known) else name for name in names]
     for name in names:
         if name not in known:

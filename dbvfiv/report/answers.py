@@ -14,14 +14,16 @@ from typing import Any
 import numpy as np
 
 from ..materials.shipped import shipped_loss, shipped_loss_names
+from ..model.supports import HELD_LIPS
 from ..model.symmetry import only_class_of
-from ..studies.closure.safety import BUCKLING, CROSSING, END, OWN, SEAL, FirstBuckling, buckles_first, rated_verdict
+from ..studies.closure.safety import BUCKLING, CROSSING, END, OWN, SEAL, buckles_first, rated_leak, rated_verdict
 from ..studies.onset.search import NO_ONSET
 from ..studies.stability.verdict import DIVERGES, FLUTTERS, Verdict
 from ..texts import digits, listed
 from .gather import Gathered, second_mesh
 
 YES, NO, UNKNOWN = "yes", "no", "not examined"
+_HELD = "The lips are held shut by the supports"
 #: Flow of the law over that in three dimensions, on the 12-inch valve; docs/three-dimensions.md.
 _FLOW = "flow 6 % high against three dimensions (12-inch valve)"
 
@@ -269,10 +271,12 @@ def _chance(found: Gathered) -> str | None:
     known = [point for point in result.points if point["probability"] is not None]
     if not known:
         return "probability of chatter: no sample was decided"
-    most = max(known, key=lambda point: point["probability"])
+    snaps = lambda point: point["outcomes"][DIVERGES]["probability"] or 0.0  # noqa: E731
+    most = max(known, key=lambda point: point["probability"] + snaps(point))
     chance, low, high = (digits(100 * x, 2) for x in (most["probability"], *most["interval"]))
     at = found.case.units.parameter(result.parameter).text(most["value"])
-    return f"probability of chatter at {at}: {chance} % ({low} to {high} %), {only_class_of(found.case.part)}"
+    also = f", of divergence {digits(100 * snaps(most), 2)} %" if snaps(most) else ""
+    return f"probability of chatter at {at}: {chance} % ({low} to {high} %){also}, {only_class_of(found.case.part)}"
 
 
 def loss_range(case) -> tuple[float, float] | None:
@@ -298,10 +302,11 @@ def closes(found: Gathered) -> Answer:
     if not states:
         return Answer(question, UNKNOWN, _first(result.failures))
     shut = [s.pressure for s in states if s.closed]
-    text = f"Shut at {listed(units.pressure(p, 3) for p in shut)}" if shut else "Open"
+    held = result.case.closure.supports == HELD_LIPS
+    text = _HELD if held else f"Shut at {listed(units.pressure(p, 3) for p in shut)}" if shut else "Open"
     collapse = _collapse(result, rated)
     text += f"{'' if shut else ' up to ' + units.pressure(states[-1].pressure, 3)}; {collapse}" if collapse else ""
-    answer = YES if shut and states[-1].closed else NO
+    answer = UNKNOWN if held else YES if shut and states[-1].closed else NO
     if not collapse and max(s.pressure for s in states) < rated * (1 - 1e-9):
         answer, text = UNKNOWN, f"{text}; no state was found at the rated {units.pressure(rated, 3)}"
     return Answer(question, answer, text + ".", _margin(result), _closure_mesh(found))
@@ -319,12 +324,9 @@ def seals(found: Gathered) -> Answer:
     if collapse:
         return Answer(question, NO, f"{collapse[0].upper()}{collapse[1:]}.", _margin(result), _closure_mesh(found))
     if told is None or told["sealed"] is None:
-        why = (
-            found.why("closure") if result is None else result.walk_failure or "The lips are held shut by the supports."
-        )
+        why = found.why("closure") if result is None else result.walk_failure or f"{_HELD}."
         return Answer(question, UNKNOWN, why)
-    still = " at most, as fluid.viscosity is none" if told["leak"] and not case.fluid.dynamic_viscosity else ""
-    text = f"{_seal(told).capitalize()}, leak {digits(told['leak'] * 3.6e6)} L/h{still}."
+    text = f"{_seal(told).capitalize()}, leak {rated_leak(result)}."
     return Answer(question, YES if told["sealed"] else NO, text, _margin(result), _closure_mesh(found))
 
 
@@ -334,12 +336,12 @@ def _collapse(result, rated: float) -> str:
     if first is None or first.pressure >= rated:
         return ""
     below = "rated back pressure" if result.case.closure.rated_pressure is not None else "largest one examined"
-    return f"{_gives_way(first)} at {units.pressure(first.pressure, 3)}, below the {below}"
+    return f"{_gives_way(first.kind)} at {units.pressure(first.pressure, 3)}, below the {below}"
 
 
-def _gives_way(first: FirstBuckling) -> str:
+def _gives_way(kind: str) -> str:
     """Clause on a wall at its critical back pressure: at a limit point it snaps to a state far away."""
-    return "the wall collapses" if first.kind == "limit point" else "the wall buckles"
+    return "the wall collapses" if kind == "limit point" else "the wall buckles"
 
 
 def _seal(told: dict[str, Any]) -> str:
@@ -359,7 +361,7 @@ def _margin(result) -> str:
     if safety.at_least:
         within = "" if result.classes else f" {OWN}"
         return f"no limit{within} up to {units.pressure(safety.followed_to, 3)}{times}"
-    limit = f"{_gives_way(buckles_first(result))} at" if safety.limit == BUCKLING else _LIMITS[safety.limit]
+    limit = f"{_gives_way(buckles_first(result).kind)} at" if safety.limit == BUCKLING else _LIMITS[safety.limit]
     return f"{limit} {units.pressure(safety.limit_pressure, 3)}{times}"
 
 
@@ -393,8 +395,7 @@ def trade(found: Gathered) -> list[tuple[str, str]]:
         ]
     if case.closure.rated_pressure is not None:
         rows += [("rated back pressure", units.pressure(case.closure.rated_pressure, 4))]
-        told = None if found.get("closure") is None else rated_verdict(found.get("closure"))
-        leak = "not examined" if told is None or told["leak"] is None else f"{digits(told['leak'] * 3.6e6)} L/h"
+        leak = "not examined" if found.get("closure") is None else rated_leak(found.get("closure"))
         rows += [("leak rate there", leak)]
     return rows
 

@@ -20,6 +20,7 @@ from ..effects import explained, without_numbers
 from ..errors import CaseError
 from ..fit.cards import describe_damping, law_from_case
 from ..materials.stability import StableRange, stable_range
+from ..model.supports import HELD_LIPS
 from ..model.symmetry import only_class_of, symmetry_named
 from ..studies.result import StudyResult
 from ..texts import digits, listed
@@ -316,7 +317,7 @@ def chance_part(found: Gathered) -> Part | None:
         f"{row.title}, {row.shown_unit}".rstrip(", "): lambda p: f"{p['value'] / row.scale:.4g}",
         "chatters, %": lambda p: percent(p["probability"]),
         "95 % interval, %": lambda p: " to ".join(map(percent, p["interval"])),
-        "not valid, %": lambda p: percent(p["outcomes"]["not valid"]["probability"]),
+        **{f"{name}, %": lambda p, name=name: percent(p["outcomes"][name]["probability"]) for name in result.others},
         "undecided": lambda p: f"{p['undecided']} of {p['samples']}",
     }
     captions = {
@@ -355,7 +356,9 @@ def cycle_part(found: Gathered) -> Part | None:
         swing = units.text_of("size", point.amplitude, 3)
         said = f"{kind} limit cycle of {swing} of each lip, half its swing, at {point.frequency:.4g} Hz."
     pictures = pictures_of(result, {"branch": "Amplitude and frequency of the cycle; dashed where it is unstable."})
-    return Part("cycle", _CYCLES, (said,), (Table.of(result.points, columns),), pictures, result.failures)
+    return Part(
+        "cycle", _CYCLES, (said, result.remarks()[-1]), (Table.of(result.points, columns),), pictures, result.failures
+    )
 
 
 _CLOSURE = "Closing and sealing under back pressure"
@@ -371,7 +374,7 @@ def closure_part(found: Gathered) -> Part:
         f"back pressure, {units.name('pressure')}": lambda s: (
             f"{s.pressure / scale:.4g}{' (beyond the limit)' if s.beyond_limit else ''}"
         ),
-        "shut": lambda s: "yes" if s.closed else "no",
+        "shut": lambda s: "held" if result.case.closure.supports == HELD_LIPS else "yes" if s.closed else "no",
         f"sealed length, {unit}": lambda s: f"{s.sealed_length / size:.3g}",
         "leak, L/h": lambda s: digits(s.leak * 3.6e6),
         "contact force, N": lambda s: digits(s.contact_force),

@@ -96,7 +96,8 @@ def candidates_of(result: StudyResult, error: float) -> list[Candidate]:
             if p.stable is not False
         ]
     elif result.kind == "transient":
-        verdict = judge_record(result.history["time"], result.history["lip_displacement"])
+        seen = result.history["time"] >= result.judged_from
+        verdict = judge_record(*(result.history[name][seen] for name in ("time", "lip_displacement")))
         found = [
             Candidate(
                 "run" if number == 0 else f"run, line {number + 1}",

@@ -81,6 +81,11 @@ class JudgedSignal:
     verdict: Verdict
     peaks: list[dict[str, float]]
 
+    def named_by(self, told: Mapping[str, Any]) -> JudgedSignal:
+        """The signal with what another verdict, as plain numbers, says that it does."""
+        own = {"name": told["verdict"], "period": told.get("period") or math.nan, "cycles": told["cycles_observed"]}
+        return replace(self, verdict=replace(self.verdict, decided=told["decided"], reason=told["reason"], **own))
+
     def summary(self) -> dict[str, Any]:
         """Plain numbers for JSON."""
         extra = {"skipped_rows": self.signal.skipped, "peaks": self.peaks}

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+from collections import defaultdict
 from contextlib import nullcontext, suppress
 from pathlib import Path
 from types import SimpleNamespace
@@ -12,7 +13,7 @@ from hypothesis import given as drawn
 from hypothesis import strategies as st
 
 from dbvfiv.app.ask import AskPanel
-from dbvfiv.app.see import arguments_of, map_figure
+from dbvfiv.app.see import RECORD, RunsPanel, arguments_of, map_figure
 from dbvfiv.app.sheet import (
     bring,
     change,
@@ -260,3 +261,49 @@ def test_a_valve_that_is_being_built_is_asked_where_a_map_was_clicked(monkeypatc
 
     asyncio.run(day())
     assert moved == asked and (not said if told is None else told in said[0])
+
+
+@pytest.mark.parametrize(
+    ("outcome", "factor", "sought", "told"),
+    [
+        ("stable", 0.4, None, "begins at 0.4 × damping"),
+        ("stable", None, 0.05, "none down to 0.05 × damping"),
+        ("flutters", 2.3, None, "ends at 2.3 × damping"),
+        ("flutters", None, 10.0, "no end up to 10 × damping"),
+    ],
+)
+def test_where_flutter_ends_is_not_where_it_begins(outcome, factor, sought, told):
+    panel, label = AskPanel(None), lambda: SimpleNamespace(classes=lambda **_: None)
+    for name in ("margin", "factor", "verdict", "mark", "reason", "card", "modes"):
+        setattr(panel, f"_{name}", label())
+    panel._numbers = defaultdict(label)
+    numbers = {"damping_ratio": 0.01, "critical_damping_factor": factor, "damping_sought": sought}
+    answer = {"verdict": {"outcome": outcome, "reason": ""} | numbers, "bound": 0.0, "confirmed": True}
+    panel._show(answer | {"state": defaultdict(float), "eigenvalues": []}, whole=True)
+    assert panel._factor.content == f"<b>{told}</b>"
+
+
+def test_a_record_is_compared_with_the_wall_that_the_sliders_move(monkeypatch, tmp_path, command_line):
+    """Whose rubbers have the strain levels of the pressures that the case names, in its own units."""
+    added, asked = [], []
+    file = tmp_path / "case.toml"
+    file.write_text('project.units = "m"\ndrive.head = "1 m"\nsteady.pressures = [50e3]\nfluid.density = 998\n')
+
+    async def read():
+        return b"time,p"
+
+    page = SimpleNamespace(file=file, name="case", home=tmp_path, files=dict, checked=SimpleNamespace(case=Case()))
+    page.asking = SimpleNamespace(values_of=lambda _: {"pressure": 9786.1, "density": 700.0, "loss_factor": 0.1})
+    page.site = SimpleNamespace(runs=SimpleNamespace(add=lambda *given: added.extend(given)))
+    monkeypatch.setattr(RunsPanel, "refresh", lambda self: None)
+    asyncio.run(RunsPanel(page)._take(SimpleNamespace(file=SimpleNamespace(name="p.csv", read=read))))
+    _, kind, _, files, arguments = added
+    assert kind == "compare" and RECORD in files
+
+    def settle(case, opening, *_):
+        asked.append((opening, case.damping.loss_factor, case.fluid.density, case.units.name("pressure")))
+        raise CaseError("Enough.")
+
+    monkeypatch.setattr("dbvfiv.studies.session.settle_levels", settle)
+    assert command_line("modes", file, *arguments).err.strip() == "Enough."
+    assert asked == [(50e3, 0.1, 998.0, "m")]

@@ -32,6 +32,7 @@ from dbvfiv.report.page import sheet
 from dbvfiv.report.parts import _layers, heads_part, onset_part, steady_part
 from dbvfiv.shell.section import Section, WallParts, Zones
 from dbvfiv.studies.case import load_case
+from dbvfiv.studies.cycle.study import CycleResult
 from dbvfiv.studies.onset.search import NO_ONSET
 from dbvfiv.studies.session import Session
 from dbvfiv.studies.stability.verdict import Verdict
@@ -234,10 +235,12 @@ def test_the_least_damped_mode_is_that_of_a_head_that_has_modes():
 def test_a_probability_of_chatter_names_the_class_that_was_looked_at(keys, told):
     """A valve that sways at the head of samples of which none flutters in the class of the equilibria."""
     found = with_verdicts(damped("stable", 0.3), damped("flutters", 1.2), keys=keys)
-    point = {"value": 6e3, "probability": 0.0, "interval": [0.0, 0.014]}
+    point = {"value": 6e3, "probability": 0.0, "interval": [0.0, 0.014], "outcomes": {"diverges": {"probability": 0.0}}}
     found.results["chance"] = SimpleNamespace(points=[point], parameter="pressure")
     (said,) = (line for line in on_chatter(found).uncertainty if "probability" in line)
     assert said.startswith(f"probability of chatter at 6 kPa: 0 % (0 to 1.4 %), {told}")
+    point["outcomes"]["diverges"]["probability"] = 0.3
+    assert f": 0 % (0 to 1.4 %), of divergence 30 %, {told}" in " ".join(on_chatter(found).uncertainty)
 
 
 def test_onsets_are_told_with_their_kind_and_with_what_speaks_against_them():
@@ -398,8 +401,12 @@ def test_figures_of_steady_states_and_of_the_closure_have_names_of_their_own(mon
     state = SimpleNamespace(**dict.fromkeys(numbers, 1.0), closed=True, beyond_limit=False)
     drawers = dict.fromkeys(("measured-passage", "measured-sections"))
     result = SimpleNamespace(states=(state,), drawers=lambda: drawers, case=case, failures=(), remarks=lambda: ())
-    part = parts.closure_part(SimpleNamespace(get={"closure": result}.get, case=case))
+    found = SimpleNamespace(get={"closure": result}.get, case=case)
+    part = parts.closure_part(found)
     assert [one.name for one in part.pictures] == ["closure", "closure-measured-passage", "closure-measured-sections"]
+    assert part.tables[0].rows[0][1] == "yes"
+    result.case = case.replace({"closure.supports": "held-lips"})
+    assert parts.closure_part(found).tables[0].rows[0][1] == "held"
 
 
 def test_verdicts_over_the_pipe_without_a_mode_have_no_damping_ratio(monkeypatch):
@@ -409,6 +416,16 @@ def test_verdicts_over_the_pipe_without_a_mode_have_no_damping_ratio(monkeypatch
     sweep = SimpleNamespace(values=(5.0, 20.0), verdicts=verdicts, case=case, failures=())
     (table,) = parts.pipe_part(SimpleNamespace(pipes={5e3: sweep}, case=case)).tables
     assert table.rows == (("5 kPa", "not valid", "stable, 3 %"),)
+
+
+def test_a_stable_cycle_is_said_to_be_so_in_the_class_of_the_model(monkeypatch):
+    monkeypatch.setattr(parts, "pictures_of", lambda *_: ())
+    case = load_case(None, ["drive.pressure=6 kPa"])
+    point = SimpleNamespace(value=6e3, amplitude=3e-3, frequency=8.0, lip_least=0.0, lip_largest=9e-3, stable=True)
+    result = SimpleNamespace(case=case, parameter="pressure", points=[point], nearest=lambda _: point, failures=())
+    vars(result).update(onset=None, special_points=(), reason="ends", remarks=lambda: CycleResult.remarks(result))
+    said, limit = parts.cycle_part(SimpleNamespace(case=case, get=lambda _: result)).sentences
+    assert said.startswith("A stable limit cycle of 3 mm") and limit.startswith("Stable means: against perturbations")
 
 
 @pytest.mark.parametrize(("name", "count"), [("SS", 1), ("SA", 0)])
@@ -528,6 +545,9 @@ def test_a_rated_pressure_that_was_not_reached_is_named(rated, answer):
     assert (closes(found).answer, closes(found).text) == ("yes", "Shut at 10 kPa and 60 kPa.")
     states[0].closed = False
     assert (closes(found).answer, closes(found).text) == ("no", "Shut at 10 kPa.")
+    states[0].closed, held = True, case.replace({"closure.rated_pressure": None, "closure.supports": "held-lips"})
+    found.case = found.results["closure"].case = held
+    assert (closes(found).answer, closes(found).text) == (UNKNOWN, "The lips are held shut by the supports.")
 
 
 @pytest.mark.parametrize(

@@ -12,7 +12,7 @@ import scipy.linalg as la
 
 import dbvfiv
 from dbvfiv.case.parameters import Mu
-from dbvfiv.errors import CaseError, SolveError
+from dbvfiv.errors import CaseError, JumpError, SolveError
 from dbvfiv.model import ValveModel
 from dbvfiv.model.dynamics import linearise
 from dbvfiv.model.equilibria import LoadPath, rest_state
@@ -191,6 +191,7 @@ def test_the_critical_damping_is_sought_among_factors_that_the_materials_reach()
         (lambda beta: -1.0, "stable", 0.0, (np.nan, np.nan)),  # nothing to take away
         (lambda beta: -1.0, "flutters", 1e-3, (np.nan, np.nan)),  # another verdict than that of the full matrices
         (lambda beta: np.nan if beta < 0.2e-3 else -1.0, "stable", 1e-3, (np.nan, 0.22361)),
+        (lambda beta: jump() if beta == 0.3e-3 else 0.3e-3 - beta, "stable", 1e-3, (np.nan, np.nan)),
     ],
 )
 def test_damping_that_was_looked_at_is_told_from_damping_that_was_not(monkeypatch, rates, outcome, beta, found):
@@ -213,6 +214,10 @@ def test_a_wall_that_no_fluid_couples_is_looked_at_with_the_least_damping(monkey
     assert found == pytest.approx((np.nan, sought), nan_ok=True)
 
 
+def jump():
+    raise JumpError("The leading mode enters the list.")
+
+
 def sought_of(monkeypatch, rates, outcome, own, reduced, forces=3, holds=None):
     """Multiples of the damping of a wall whose mode grows by a function of beta; of its loss factor where its rubber
     holds up to one.
@@ -222,7 +227,7 @@ def sought_of(monkeypatch, rates, outcome, own, reduced, forces=3, holds=None):
         is_reduced, column = reduced, SimpleNamespace(model=SimpleNamespace())
 
         def locate(self, crossing, accuracy, scan):
-            return SimpleNamespace(value=0.3e-3, residual=0.0)
+            return SimpleNamespace(value=0.3e-3, residual=0.0 * rates(0.3e-3))
 
         def spectrum(self, value):
             return np.array(eigenvalues(self.place(value)))

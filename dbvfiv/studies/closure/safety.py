@@ -163,6 +163,15 @@ def rated_verdict(result: StudyResult) -> dict[str, Any] | None:
     }
 
 
+def rated_leak(result: StudyResult) -> str:
+    """Leak at the rated back pressure in words, a bound of a fluid without viscosity."""
+    told = rated_verdict(result)
+    if told is None or told["leak"] is None:
+        return "not examined"
+    ideal = told["leak"] > 0 and not result.case.fluid.dynamic_viscosity
+    return f"{digits(told['leak'] * 3.6e6)} L/h{' at most, as fluid.viscosity is none' if ideal else ''}"
+
+
 def rated_sentence(result: StudyResult) -> str | None:
     """Answer at the rated back pressure in one sentence; None where no rated one is given."""
     told = rated_verdict(result)
@@ -178,10 +187,8 @@ def rated_sentence(result: StudyResult) -> str | None:
         return f"{begin} not examined; {result.walk_failure or 'it is not among closure.pressures.'}"
     seal = "sealing not examined, as the supports hold the lips shut"
     if told["sealed"] is not None:
-        ideal = told["leak"] > 0 and not result.case.fluid.dynamic_viscosity
-        still = " at most, as fluid.viscosity is none" if ideal else ""
-        seal = f"{'shut' if told['shut'] else 'open'}, leak {digits(told['leak'] * 3.6e6)} L/h{still}"
-        seal = "sealed, leak 0 L/h" if told["sealed"] else seal
+        seal = "sealed" if told["sealed"] else "shut" if told["shut"] else "open"
+        seal += f", leak {rated_leak(result)}"
     buckles = f"no buckling {watched_by(result)} up to {told['examined_to'] / 1e3:.6g} kPa"
     buckles = buckles if at is None else f"buckles at {at / 1e3:.6g} kPa"
     least = "at least " if told["at_least"] else ""

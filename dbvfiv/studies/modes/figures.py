@@ -169,8 +169,9 @@ def _rays(axes, left: float, top: float) -> None:
 
 
 _PANELS = 6
-#: Share of the clear height that a drawn mode may take, and share of the amplitude it is drawn with in any case.
-_OPEN, _SEEN = 0.85, 0.2
+#: Largest displacement at which a mode is drawn, over the length of the valve; share of the clear height that it may
+#: take, and share of the largest that it has in any case.
+_LARGEST, _OPEN, _SEEN = 0.035, 0.85, 0.1
 
 
 def mode_shapes(result: StudyResult, modes) -> Figure:
@@ -240,18 +241,17 @@ class ModeSurface:
 
 def drawn_amplitude(state: State, mode: ModeShape) -> float:
     """Largest displacement, m, at which a mode shows well and the inner faces of the lips do not cross."""
-    mesh = state.results.mesh
-    symmetry = symmetry_named(mode.symmetry)
+    mesh, symmetry = state.results.mesh, symmetry_named(mode.symmetry)
+    largest = _LARGEST * float(np.ptp(mesh.z))
     if not symmetry.moves_lips_apart:
-        return mode.drawn_amplitude(state)
+        return largest
     line = mesh.centre_line  # which a sideways sway leaves in place
     line = line if symmetry.signs[0] > 0 and mesh.part.is_quarter else mesh.rows.ravel()
     height = faces(mesh, state.nodal)[0][line, 1]
     swing = np.abs(mode.shape[line, 1])
     chosen = (swing > 1e-3) & (height > 0)
-    wanted = mode.drawn_amplitude(state)
-    room = float(np.min(_OPEN * height[chosen] / swing[chosen])) if chosen.any() else wanted
-    return min(wanted, max(room, _SEEN * wanted))
+    room = float(np.min(_OPEN * height[chosen] / swing[chosen])) if chosen.any() else largest
+    return min(largest, max(room, _SEEN * largest))
 
 
 _PHASES, _DRAWN = 10, 3

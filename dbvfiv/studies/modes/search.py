@@ -17,11 +17,11 @@ from eigen.search import leading_modes
 from eigen.spectrum import SearchOptions, Spectrum
 
 from ...case.parameters import PARAMETERS, Mu
-from ...errors import CaseError
+from ...errors import CaseError, SolveError
 from ...model.equilibria import require_equilibrium
 from ...model.leading import LeadingSearch
 from ...model.state import SteadyState
-from ...model.symmetry import EQUILIBRIA, SYMMETRIES, Symmetry, symmetry_named
+from ...model.symmetry import EQUILIBRIA, SYMMETRIES, Symmetry
 from ...model.valve import GRAZING, ValveModel
 from ...observer import Observer
 from ...record.table import Column
@@ -31,7 +31,6 @@ from ..stability.line import ParameterLine
 from ..stability.scan import Crossing, Scan
 from ..stability.verdict import FLUTTERS, STABLE, Verdict, lowered, oscillates
 from ..stability.walk import StabilityWalk, ValveFamily, name_state_in_failures
-from ..state import State
 
 if TYPE_CHECKING:
     from . import Keys
@@ -64,9 +63,6 @@ MODE = (
     Column("pressure", "Pa/m", "Change of the pressure at each row for 1 m of largest displacement", "c16"),
     Column("inlet_velocity", "1/s", "Change of the inlet velocity for 1 m of largest displacement", "c16"),
 )
-#: Largest displacement at which shapes are drawn, as a fraction of the valve's length, and as one of the opening that
-#: must not close.
-_DRAWN, _OPEN = 0.035, 0.85
 
 
 @dataclass(frozen=True, eq=False)
@@ -134,19 +130,6 @@ class ModeShape:
     def at_phase(self, phase: float) -> np.ndarray:
         """(nn, c) displacements and rotations at a phase of the cycle, rad; growth or decay left out."""
         return (self.shape * np.exp(1j * phase)).real
-
-    def drawn_amplitude(self, state: State) -> float:
-        """Largest displacement, m, at which the mode shows well and the centre line of the duckbill stays open."""
-        mesh = state.results.mesh
-        largest = _DRAWN * float(np.ptp(mesh.z))
-        if not symmetry_named(self.symmetry).moves_lips_apart:
-            return largest
-        line = mesh.centre_line
-        height = mesh.nodes[line, 1] + state.nodal[line, 1]
-        swing = np.abs(self.shape[line, 1])
-        moving = swing > 1e-3
-        room = float(np.min(_OPEN * height[moving] / swing[moving])) if moving.any() else np.inf
-        return min(largest, room) if room > 0.05 * largest else 0.2 * largest
 
     def summary(self) -> dict[str, Any]:
         """Plain SI numbers for JSON."""
@@ -533,18 +516,20 @@ def critical_damping_factor(walk: StabilityWalk, place: Mu, verdict: Verdict) ->
         NaN where none is found.
     float
         The last factor looked at where none up to it, or down to it, makes the difference; NaN where one is found, the
-        wall has no such damping or none beside it that holds, the verdict is another, or no mode is neutral there by
-        the full matrices.
-
-    Raises
-    ------
-    SolveError
-        If there is no steady state.
+        wall has no such damping or none beside it that holds, the verdict is another, the search fails, or no mode is
+        neutral there by the full matrices.
     """
-    name = "loss_factor" if place.loss_factor > 0 else "beta"
-    own = place[name]
-    if own <= 0 or verdict.outcome not in (STABLE, FLUTTERS):
+    if place.damping not in ("loss_factor", "beta") or verdict.outcome not in (STABLE, FLUTTERS):
         return np.nan, np.nan
+    try:
+        return _change(walk, place, verdict)
+    except SolveError:  # the verdict stands by itself
+        return np.nan, np.nan
+
+
+def _change(walk: StabilityWalk, place: Mu, verdict: Verdict) -> tuple[float, float]:
+    """Factor at which the verdict changes, and the last one that was looked at."""
+    name, own = place.damping, place[place.damping]
     factors = LOWER if verdict.outcome == STABLE else HIGHER
     highest = PARAMETERS[name].high
     if name == "loss_factor":

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from ...case.parameters import Mu
-from ...errors import CaseError, NotValidError, SolveError
+from ...errors import CaseError, NotValidError
 from ...model.symmetry import asks_for_equilibria, symmetry_named
 from ...record.mesh import MeshData, WholeValve
 from ...record.record import GrowingRecord, Record
@@ -25,6 +25,7 @@ from ..stability.dimensions import Variant, compare_states, own_variant, variant
 from ..stability.verdict import Verdict
 from ..stability.walk import StabilityWalk
 from ..state import State, StateSteps, states_of
+from .figures import drawn_amplitude
 from .search import CURVE, MODE, Certificate, FoundModes, ModeShape, critical_damping_factor, run_modes
 
 STATE, MODES, COUNT = "state", "modes", "count"
@@ -69,10 +70,7 @@ def run(session: Session, record: GrowingRecord) -> None:
             return
         if variant.continuity == own_variant(case).continuity and not case.modes.in_vacuo:
             record.progress("critical damping factor")
-            try:
-                factor, sought = critical_damping_factor(own, here, found.verdict)
-            except SolveError:
-                factor = sought = np.nan
+            factor, sought = critical_damping_factor(own, here, found.verdict)
             verdict = replace(found.verdict, critical_damping_factor=factor, damping_sought=sought)
             found = replace(found, verdict=verdict)
         _keep(record, variant, found)
@@ -130,7 +128,7 @@ def _mode_step(result: ModesResult, valve: WholeValve, mode: ModeShape) -> Step:
 def _phase_step(result: ModesResult, valve: WholeValve, mode: ModeShape, share: float) -> Step:
     """A phase of a cycle, given as a share of it; "time" is time in s, or the share where nothing oscillates."""
     state, mesh = result.state, result.mesh
-    moved = mode.at_phase(2 * np.pi * share) * mode.drawn_amplitude(state)
+    moved = mode.at_phase(2 * np.pi * share) * drawn_amplitude(state, mode)
     parity = symmetry_named(mode.symmetry).parity(valve.sign)[:, None]
     points = motion(mesh, valve, state.nodal + moved)
     if np.any(parity < 0):

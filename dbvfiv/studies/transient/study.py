@@ -163,6 +163,11 @@ class TransientResult(StudyResult):
         since = judged_from(self.history["time"], Drive.of(self.case))
         return assess(self.history, self.model, since=since).summary()
 
+    @property
+    def judged_from(self) -> float:
+        """Time, s, from which on the run is judged."""
+        return ((self.verdict.get("mass_flow") or {}).get("judged") or [0.0])[0] or 0.0
+
     @cached_property
     def stability(self) -> Verdict | None:
         """Verdict on the steady state that the run was kicked from; None of a run that was not kicked."""

@@ -11,11 +11,11 @@ from ...case.parameters import PARAMETERS
 from ...drawing.style import ACCENT, COMPUTED, REST, headline, limits, log_axis, new_figure, parameter_label
 from ..result import StudyResult
 from ..stability.place import describe_fixed
-from ..stability.verdict import FLUTTERS, NOT_VALID, OUTCOMES, STABLE
+from ..stability.verdict import DIVERGES, FLUTTERS, NOT_VALID, OUTCOMES, STABLE
 
 #: Samples from which a fifth of them has a median, three each.
 LEAST = 15
-_LOOKS = {STABLE: COMPUTED, FLUTTERS: ACCENT}
+_LOOKS = {STABLE: COMPUTED, FLUTTERS: ACCENT, DIVERGES: "black"}
 
 
 def draw(result: StudyResult) -> Iterator[tuple[str, Callable[[], Figure]]]:
@@ -53,18 +53,19 @@ def _under(figure: Figure, result: StudyResult) -> None:
 
 
 def probability(result: StudyResult) -> Figure:
-    """Probability of flutter, and of states that are not valid, over the range, with their intervals."""
+    """Probability of flutter, and of other outcomes than stable, over the range, with their intervals."""
     figure = new_figure()
     axes = figure.add_subplot()
     x = _axis(axes, result)
-    for name, colour in ((FLUTTERS, ACCENT), (NOT_VALID, REST)):
+    looks = _LOOKS | {NOT_VALID: REST}
+    for name in (FLUTTERS, *result.others):
         found = [point["outcomes"][name] for point in result.points]
         value = np.array([np.nan if one["probability"] is None else one["probability"] for one in found])
         if name != FLUTTERS and not value.any():
             continue
         low, high = np.array([one["interval"] for one in found]).T
-        axes.fill_between(x, 100 * low, 100 * high, color=colour, alpha=0.25, lw=0, label=f"{name}, 95 % interval")
-        axes.plot(x, 100 * value, "o-", color=colour, label=name)
+        axes.fill_between(x, 100 * low, 100 * high, color=looks[name], alpha=0.25, lw=0, label=f"{name}, 95 % interval")
+        axes.plot(x, 100 * value, "o-", color=looks[name], label=name)
     axes.set(ylabel="Probability, %", ylim=(-2, 102))
     axes.legend()
     headline(figure, f"Probability of flutter of {result.header.name}")
@@ -90,10 +91,10 @@ def margin(result: StudyResult) -> Figure:
         plain = _with_ratio(found)
         ratio, outcome = 100 * found["damping_ratio"][plain], found["outcome"][plain]
         edges = np.histogram_bin_edges(ratio, max(1, round(len(ratio) ** 0.5)))
-        for name in (STABLE, FLUTTERS):
+        for name, colour in _LOOKS.items():
             here = ratio[outcome == OUTCOMES.index(name)]
             if here.size:
-                axes.hist(here, edges, color=_LOOKS[name], label=f"{name}, {here.size} samples")
+                axes.hist(here, edges, color=colour, label=f"{name}, {here.size} samples")
         axes.set(xlabel="Least damping ratio, %", ylabel="Samples")
         axes.axvline(0.0, color="black", lw=0.8)
     if axes.get_legend_handles_labels()[0]:

@@ -447,6 +447,12 @@ class UncertaintyResult(StudyResult):
         return _percentiles(ratio), _percentiles(ratio, weights)
 
     @cached_property
+    def others(self) -> tuple[str, ...]:
+        """Outcomes besides flutter that are told at each value: "diverges" where any sample does, and "not valid"."""
+        diverges = (self.record.column(SAMPLES, "outcome") == OUTCOMES.index(DIVERGES)).any()
+        return (DIVERGES,) * bool(diverges) + (NOT_VALID,)
+
+    @cached_property
     def points(self) -> list[dict[str, Any]]:
         there = set(self._rows["value"].tolist())
         return [self.point(value) for value in self.plan.values if value in there]
@@ -490,7 +496,8 @@ class UncertaintyResult(StudyResult):
         row = PARAMETERS[self.parameter]
         fixed = describe_fixed(self.case, self.parameter, *(one.name for one in self.plan.inputs))
         place = f"{self.parameter}, {row.shown_unit}".rstrip(", ")
-        head = f"{place:>16}{'flutters':>10}  {'95 % interval':<17}{'not valid':>10}{'undecided':>10}{'samples':>9}"
+        head = f"{place:>16}{'flutters':>10}  {'95 % interval':<17}"
+        head += "".join(f"{name:>10}" for name in (*self.others, "undecided")) + f"{'samples':>9}"
         lines = [f"At {fixed}; {only_class_of(self.case.part)}:", *(f"  {one.words()}" for one in self.plan.inputs)]
         lines.append(f"{head}  least damping ratio, %")
         lines += [*map(self._line, self.points), *self._verdict_lines(), *self.deciding_lines()]
@@ -513,12 +520,12 @@ class UncertaintyResult(StudyResult):
 
     def _line(self, point: dict[str, Any]) -> str:
         low, middle, high = point["percentiles"]["damping_ratio"]
-        flutters, invalid = (point["outcomes"][name]["probability"] for name in (FLUTTERS, NOT_VALID))
-        said, never = ("-" if one is None else f"{one:.3g}" for one in (flutters, invalid))
+        chances = (point["outcomes"][name]["probability"] for name in (FLUTTERS, *self.others))
+        said, *others = ("-" if one is None else f"{one:.3g}" for one in chances)
         interval = "{:.2g} to {:.2g}".format(*point["interval"])
         spread = "-" if middle is None else "{} ({} to {})".format(*(digits(100 * x) for x in (middle, low, high)))
         value = point["value"] / PARAMETERS[self.parameter].scale
-        counts = f"{never:>10}{point['undecided']:10d}{point['samples']:9d}"
+        counts = "".join(f"{one:>10}" for one in others) + f"{point['undecided']:10d}{point['samples']:9d}"
         return f"{value:16.6g}{said:>10}  {interval:<17}{counts}  {spread}"
 
     def deciding_lines(self) -> list[str]:

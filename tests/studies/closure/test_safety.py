@@ -10,7 +10,8 @@ import pytest
 import dbvfiv
 from dbvfiv.model.closed import ClosedValve
 from dbvfiv.record.mesh import MeshData
-from dbvfiv.report.answers import _collapse, _margin
+from dbvfiv.report.answers import _collapse, _margin, trade
+from dbvfiv.report.gather import Gathered
 from dbvfiv.studies.case import thesis_case
 from dbvfiv.studies.closure.safety import ClassBuckling, _buckling, find_safety, rated_sentence, rated_verdict
 from dbvfiv.studies.closure.study import ClosureResult, PressedState
@@ -71,6 +72,12 @@ def test_buckling_in_another_class_is_a_limit():
     assert _margin(every).startswith("no limit up to")
     assert _margin(own).startswith("no limit within the symmetry of the model up to")
     assert "no buckling within the symmetry of the model up to 2 kPa" in rated_sentence(own) and own.safety.at_least
+    assert "sealed, leak 0 L/h; no" in rated_sentence(own)
+    own.states[-1].leak = 1e-6
+    assert "shut, leak 3.6 L/h at most, as fluid.viscosity is none; no" in rated_sentence(own)
+    sizes = SimpleNamespace(bill_width=0.2, bill_height=0.1)
+    rows = trade(Gathered(own.case, "valve", (2e3,), sizes, {"closure": own}))
+    assert ("leak rate there", "3.6 L/h at most, as fluid.viscosity is none") in rows
 
 
 def test_a_class_that_is_unstable_without_buckling_is_not_said_to_hold():

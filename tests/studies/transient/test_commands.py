@@ -1,15 +1,19 @@
 """The commands transient, resume, verdict and compare."""
 
 import json
-from pathlib import Path
+from dataclasses import replace
 from types import SimpleNamespace
 
+import h5py
 import numpy as np
 import pytest
 
 from dbvfiv.cli.results import _signals_of_run
 from dbvfiv.errors import CaseError
 from dbvfiv.studies import session
+from dbvfiv.studies.recognition import candidates_of
+from dbvfiv.studies.transient.study import TransientResult
+from dbvfiv.verdict import judge
 from tests.small_valves import SMALL, settings
 
 SHORT = settings(SMALL | {"transient.duration": 0.02, "transient.save_every": 0.005})
@@ -74,16 +78,44 @@ def test_signals_with_names_that_look_alike_in_files_have_their_own(command_line
     assert {p.name for p in (tmp_path / "figures").iterdir()} == {"p-in.png", "p-in-2.png", "Druck-\u03c1.png"}
 
 
-def test_columns_of_a_run_have_numbers_too(monkeypatch):
+def test_columns_of_a_run_have_numbers_too():
     history = {name: np.zeros(3) for name in ("time", "mass_flow", "lip_opening")}
-    run = SimpleNamespace(kind="transient", history=history)
-    monkeypatch.setattr(session, "load_result", lambda _: run)
-    assert [signal.name for signal in _signals_of_run(Path("r.h5"), ["2", "lip_opening"])] == [
-        "mass_flow",
-        "lip_opening",
-    ]
+    run = SimpleNamespace(history=history)
+    assert [signal.name for signal in _signals_of_run(run, ["2", "lip_opening"])] == ["mass_flow", "lip_opening"]
     with pytest.raises(CaseError, match="no column '4'"):
-        _signals_of_run(Path("r.h5"), ["4"])
+        _signals_of_run(run, ["4"])
+
+
+def test_a_run_is_judged_as_it_judged_itself(monkeypatch, command_line, tmp_path):
+    """From where its drive holds still, and by what it knows beside each signal."""
+    t = np.linspace(0.0, 4.0, 2001)
+    rings = np.minimum(t / 0.5, 1.0) * (1.0 + 0.1 * np.sin(50.0 * t))
+    held, moving = t >= 0.5, judge(t[t >= 0.5], rings[t >= 0.5])
+    told = replace(moving, name="chatters", reason="Faces meet again and again.")
+    known = {
+        "verdict": "chatters",
+        "mass_flow": told.summary(),
+        "lip_opening": told.summary(),
+        "chatter": {"rate": 2.0},
+    }
+    run = SimpleNamespace(kind="transient", verdict=known)
+    run.history = {"time": t, "mass_flow": rings, "lip_opening": rings, "lip_displacement": rings}
+    run.judged_from = TransientResult.judged_from.fget(run)
+    monkeypatch.setattr(session, "load_result", lambda _: run)
+    h5py.File(tmp_path / "r.h5", "w").close()
+
+    def found(*options):
+        document = json.loads(command_line("verdict", tmp_path / "r.h5", *options, "--json").out)
+        return {one.pop("name"): one for one in document["signals"]}
+
+    for name, one in found().items():
+        assert {key: one[key] for key in known[name]} == known[name], name
+    (other,) = found("-c", "lip_displacement").values()
+    assert other["verdict"] == "limit cycle" and other["smallest"] == rings[held].min()
+    (whole,) = found("-c", "mass_flow", "--since", 0).values()
+    assert whole["verdict"] != "chatters" and whole["smallest"] == 0.0
+    (candidate,) = candidates_of(run, 0.02)
+    assert candidate.frequency == pytest.approx(50.0 / (2 * np.pi), rel=1e-3)
 
 
 def test_verdict_without_times(command_line, tmp_path):

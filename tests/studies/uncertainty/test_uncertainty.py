@@ -138,6 +138,30 @@ def test_the_document_has_probability_interval_and_what_decides(found):
     assert {row["parameter"] for row in document["inputs"]} == set(OWN)
 
 
+def test_samples_that_diverge_are_told(found):
+    class Record:
+        """The record, in which four samples diverge."""
+
+        def __getattr__(self, name):
+            return getattr(found.record, name)
+
+        def column(self, table, name):
+            values = found.record.column(table, name)
+            four = table == "samples" and name == "outcome"
+            return np.where(np.arange(len(values)) < 4, OUTCOMES.index("diverges"), values) if four else values
+
+    some = object.__new__(UncertaintyResult)
+    vars(some).update({name: one for name, one in vars(found).items() if name not in ("_rows", "points", "others")})
+    some.record = Record()
+    head, row = (" ".join(line.split()) for line in some.lines()[4:6])
+    assert "diverges not valid undecided samples" in head and " 0.25 0 0 16 " in row
+    assert "diverges" not in " ".join(found.lines())
+    (axes,) = some.figures(only=["margin"])["margin"].axes
+    assert "diverges, 4 samples" in [text.get_text() for text in axes.get_legend().get_texts()]
+    table = chance_part(SimpleNamespace(get=lambda _: some, case=some.case)).tables[0]
+    assert table.rows[0][list(table.head).index("diverges, %")] == "25"
+
+
 def test_workers_and_interruptions_change_no_digit(valve, found, tmp_path):
     path = tmp_path / "samples.h5"
     partly = valve.uncertainty(inputs=OWN, output=path, observer=Stop(8))
