@@ -329,9 +329,9 @@ def export(
     and stretch of each layer. Or one steady state as STL or STEP: inner face, mid-surface and outer face of the wall,
     the wall and the fluid inside as closed bodies.
 
-    The states are the time steps of the file; the "time" that ParaView shows is the inlet pressure in Pa. Of modes it
-    is the number of the mode: mode_real, mode_imag and mode_amplitude come with the displacement of the steady state;
-    --mode N writes one cycle of that mode instead.
+    The states are the time steps of the file; the "time" that ParaView shows is the inlet pressure in Pa, of runs and
+    cycles the time in s. Of modes it is the number of the mode: mode_real, mode_imag and mode_amplitude come with the
+    displacement of the steady state; --mode N writes one cycle of that mode instead.
     """
     from ..studies.session import load_result
 
