@@ -514,7 +514,7 @@ class Valve(FollowingSection):
         """Twice the distance in m from the axis that the outer face of the lip reaches at rest."""
         profiles, factor = readable_key_points(self.key_points), 1.0 if self._given is None else self.scale
         aside = factor * profiles[0].reach if profiles else self.lip.widest + abs(self.bill_shift)
-        return 2 * aside + self.thickness_at(0.0)
+        return 2 * aside + self.thickness_at(0.0, 1.0)
 
     @property
     def outer_diameter(self) -> float:

@@ -288,7 +288,7 @@ def _varied(valve: Valve, z: np.ndarray, surface: Surface, share: np.ndarray) ->
     section. Where the inner faces of both lips would cross they meet, as those of an even wall do.
     """
     edges = [s for patch in valve.patches for s in patch.section_edges]
-    places = np.unique([*np.linspace(0.0, 1.0, _FINE + 1), *edges])
+    places = np.unique(np.round([*np.linspace(0.0, 1.0, _FINE + 1), *edges], 12))
     if not surface.part.is_quarter:
         places = np.concatenate([-places[:0:-1], places])
     middle = 0.5 * (places[1:] + places[:-1])

@@ -8,7 +8,9 @@ import pytest
 from dbvfiv.case import CaseError
 from dbvfiv.geometry import valve_mesh
 from dbvfiv.geometry.divisions import grading
+from dbvfiv.model import ValveModel
 from dbvfiv.model.build import build_shell
+from dbvfiv.model.sizes import ValveSizes
 from dbvfiv.studies.case import Case
 
 EVEN = {"valve.wall": "uniform", "valve.wall_thickness": 0.012}
@@ -88,6 +90,20 @@ def test_a_patch_of_the_same_wall_changes_no_passage():
     even, patched = meshes({"begin": 0.1, "end": 0.3, "around_from": 0.2, "thickness": 0.012})
     assert np.interp(even.z, patched.z, patched.wall_deduction) == pytest.approx(even.wall_deduction, rel=1e-3)
     assert patched.wall_deduction[0] == even.wall_deduction[0]
+
+
+@pytest.mark.parametrize("part", ["auto", "half"])
+def test_size_of_a_bill_with_a_thicker_edge_or_middle(part):
+    sizes = []
+    for patch in ({"extra": 0.0}, {"around_from": 0.95, "extra": 0.003}, {"around_to": 0.4, "extra": 0.003}):
+        case = case_of(patch | {"end": 0.05}, **{"mesh.around": 8, "mesh.along": 16, "mesh.part": part})
+        found = ValveSizes.of(ValveModel(case))
+        assert found.bill_width == pytest.approx(case.valve.bill_width, rel=1e-9)
+        assert found.lip_area == pytest.approx(4 * 0.125 * 1e-4, rel=1e-3)  # edges beside a place of the sum, too
+        sizes.append((found.bill_width, found.bill_height))
+    even, edge, middle = sizes
+    assert edge == pytest.approx((even[0] + 0.003, even[1]), abs=1e-9)
+    assert middle == pytest.approx((even[0], even[1] + 0.003), abs=1e-9)
 
 
 def test_a_patch_that_fills_a_narrow_place(one_sentence):
