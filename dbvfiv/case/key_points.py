@@ -17,6 +17,8 @@ _COLUMN = re.compile(r"\s*([A-Za-z]+)\s*(?:[\[(]\s*([^\])]*?)\s*[\])])?\s*")
 _HEADER = "the first line must name x, y and z with their units, such as 'profile, x [mm], y [mm], z [mm], joint'"
 #: Distance from a symmetry plane, over the size of the profile, up to which a point lies on it.
 _ON_PLANE = 1e-6
+#: Range of the z of a profile's points, over the length of the valve, up to which it lies at their mean.
+_ONE_PLACE = 1e-3
 _LARGEST = 200_000
 
 
@@ -174,6 +176,9 @@ def _check(profiles: list[KeyProfile]) -> None:
     for i, profile in enumerate(profiles, 1):
         points = profile.points
         where = f"whose profile {i} at z = {profile.z:g} m"
+        low, high = (end(z for _, _, z in points) for end in (min, max))
+        if high - low > _ONE_PLACE * abs(profiles[-1].z):
+            raise ValueError(f"{where} has points from {low:g} to {high:g} m, and a profile lies at one z")
         if len(points) < 3:
             raise ValueError(f"{where} has {len(points)} points, and a profile has three or more")
         size = max(max(abs(x), abs(y)) for x, y, _ in points)

@@ -404,6 +404,11 @@ class _Ply(Section):
     thickness: Length = key(..., "Thickness before all layers are scaled to the local wall thickness.", gt=0, le=10)
     angle: Angle = key(0.0, "Angle of material axis 1 from the valve's axis, in the tangent plane.", ge=-180, le=180)
 
+    @property
+    def folded(self) -> float:
+        """Its angle from -90 to 90 degrees: half a turn on it is the same layer."""
+        return math.remainder(self.angle, 180.0)
+
 
 class Layer(Extent, _Ply):
     """One layer of the wall: everywhere, or a filler on a part of it, which leaves the thickness of the wall as it is

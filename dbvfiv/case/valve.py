@@ -376,7 +376,11 @@ class Valve(FollowingSection):
         "mid-surface stays; the flow section follows the inner face, as far as the faces do not meet.",
     )
     thickness_factor: Number = key(
-        1.0, "Multiplies the wall thickness everywhere; mid-surface and flow section stay.", gt=0, le=10
+        1.0,
+        "Multiplies the wall thickness everywhere; mid-surface and flow section stay, so below 1 the lips are further "
+        "apart than the section says.",
+        gt=0,
+        le=10,
     )
     initial_gap: Length | None = key(
         None,
@@ -414,8 +418,8 @@ class Valve(FollowingSection):
     )
     duckbill_wall_deduction: Length | None = key(
         None,
-        "Half wall taken off the flow section of the duckbill (TH1, Th. 4.12); where not given half the wall at the "
-        "lip, at most lip_radius (6.19 mm in the 12-inch valve, App. A).",
+        "Half wall taken off the flow section of the duckbill (TH1, Th. 4.12), at the lip where wall_map has steps in "
+        "it; where not given half the wall there, at most lip_radius (6.19 mm in the 12-inch valve, App. A).",
         ge=0,
         le=10,
     )
@@ -515,7 +519,7 @@ class Valve(FollowingSection):
         """Twice the distance in m from the axis that the outer face of the lip reaches at rest."""
         profiles, factor = readable_key_points(self.key_points), 1.0 if self._given is None else self.scale
         aside = factor * profiles[0].reach if profiles else self.lip.widest + abs(self.bill_shift)
-        return 2 * aside + self.thickness_at(0.0)
+        return 2 * aside + self.thickness_at(0.0, 1.0)
 
     @property
     def outer_diameter(self) -> float:

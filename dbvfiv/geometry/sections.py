@@ -17,6 +17,8 @@ from ..case.valve import LipSizes
 #: Places at which the arc length of a key-point curve is kept, and Gauss points between them.
 _FINE = 401
 _GAUSS = np.polynomial.legendre.leggauss(6)
+#: Part of a lip's length up to which its side edge is none: that of a bow of half a circle.
+_SHORT = 1e-6
 
 
 @dataclass(frozen=True)
@@ -88,7 +90,8 @@ def flange_section(radius: float) -> Callable[[np.ndarray], np.ndarray]:
 def lip_profile(z: float, lip: LipSizes) -> Profile:
     """Profile of a lip at an axial position, m; the curvature jumps where its side edge begins."""
     length = lip.bow_length + lip.edge_length
-    return Profile(z, lip_section(lip), length, (lip.bow_length / length,))
+    has_edge = lip.edge_length > _SHORT * length
+    return Profile(z, lip_section(lip), length, (lip.bow_length / length,) if has_edge else ())
 
 
 def round_profile(z: float, radius: float) -> Profile:

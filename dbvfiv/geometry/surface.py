@@ -94,6 +94,8 @@ class Surface:
 class SmoothSurface(Surface):
     """Profiles joined by curves along the axis that do not overshoot (monotone cubics, Fritsch and Carlson 1980)."""
 
+    smooth: bool = True
+
     @property
     def breaks(self) -> np.ndarray:
         """Axial positions of the ends, m; between them the surface has no joints."""

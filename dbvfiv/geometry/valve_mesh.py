@@ -120,7 +120,7 @@ def valve_mesh(valve: Valve, mesh: Mesh, column_breaks=(), parts: Sequence[Exten
     ValueError
         If the mesh has fewer elements along than the surface has pieces.
     CaseError
-        If patches of the wall leave no flow area.
+        If the wall leaves no flow area in a section.
     """
     part = part_of(valve, mesh)
     surface = surface_of(valve, part)
@@ -139,11 +139,10 @@ def valve_mesh(valve: Valve, mesh: Mesh, column_breaks=(), parts: Sequence[Exten
     rows = np.arange(len(z) * count, dtype=np.int32).reshape(len(z), count)
     quads = np.stack([rows[:-1, :-1], rows[1:, :-1], rows[1:, 1:], rows[:-1, 1:]], axis=-1).reshape(-1, 4)
     rest_area, taken = np.array([surface.area(level) for level in z]), wall_deduction(valve, z, surface)
-    if valve.patches and np.any(taken >= rest_area):
-        place = z[np.argmax(taken >= rest_area)]
-        raise CaseError(
-            f"valve.patches leave no flow area at z = {place:.4g} m; the wall must be thinner there.", "valve.patches"
-        )
+    if np.any(taken >= rest_area):
+        place, key = z[np.argmax(taken >= rest_area)], "valve.patches" if valve.patches else None
+        what = "The wall leaves" if key is None else f"{key} leave"
+        raise CaseError(f"{what} no flow area at z = {place:.4g} m; the wall must be thinner there.", key)
     middle = 0.5 * (z[1:] + z[:-1])
     element_z = np.repeat(middle, count - 1)
     return ValveMesh(
@@ -203,8 +202,8 @@ _FINE = 1000
 
 
 def wall_deduction(valve: Valve, z: np.ndarray, surface: Surface) -> np.ndarray:
-    """Part of the section taken by the wall (Th. 4.12-4.14, App. A): constant on duckbill, cuff and flange, linear
-    over saddle and flare.
+    """Part of the section taken by the wall (Th. 4.12-4.14, App. A): constant on cuff, flange and an even duckbill,
+    linear over a ruled saddle and flare; over smooth ones it grows as their sections do, which gain nothing at first.
 
     Raises
     ------
@@ -212,13 +211,8 @@ def wall_deduction(valve: Valve, z: np.ndarray, surface: Surface) -> np.ndarray:
         If the wall fills the section of the lip or of the flange that key points give, if these leave a wider passage
         at the lip than at the flange, or if patches fill a section.
     """
-    return _even_deduction(valve, z, surface) + (_patched(valve, z, surface) if valve.patches else 0.0)
-
-
-def _even_deduction(valve: Valve, z: np.ndarray, surface: Surface) -> np.ndarray:
-    """Area (k,), m2, that a wall without patches takes from the sections at z (k,), m."""
-    place = np.asarray(z, float)
-    share = np.clip((place - valve.duckbill_length) / valve.saddle_length, 0.0, 1.0)
+    place, joint = np.asarray(z, float), valve.duckbill_length
+    share = _grown(surface, place, joint, valve.saddle_length)
     quarters = surface.part.quarters
     if valve.key_points is not None:
         duckbill, cuff, flange = _key_point_deductions(valve, surface)
@@ -228,9 +222,26 @@ def _even_deduction(valve: Valve, z: np.ndarray, surface: Surface) -> np.ndarray
         cuff, flange = (quarters * _round_deduction(radius, valve) for radius in radii)
     taken = duckbill + share * (cuff - duckbill)
     if valve.flare_length > 0:
-        begin = valve.duckbill_length + valve.saddle_length + valve.cuff_length
-        taken = taken + np.clip((place - begin) / valve.flare_length, 0.0, 1.0) * (flange - cuff)
-    return taken
+        begin = joint + valve.saddle_length + valve.cuff_length
+        taken = taken + _grown(surface, place, begin, valve.flare_length) * (flange - cuff)
+    lip, steps = valve.wall_at(0.0), valve.wall_map if valve.wall == "measured" else ()
+    before = (0.0, *(step.to for step in steps))
+    uneven = any(step.thickness != lip and begin < joint * (1 - 1e-6) for begin, step in zip(before, steps))
+    return taken + (_varied(valve, place, surface, share) if uneven or valve.patches else 0.0)
+
+
+def _grown(surface: Surface, z: np.ndarray, begin: float, length: float) -> np.ndarray:
+    """Share (k,) of a transition that lies before the axial positions z (k,), m: of its length between straight
+    rulings, else of what its section grows by.
+    """
+    line = np.clip((z - begin) / length, 0.0, 1.0)
+    inside = (line > 0.0) & (line < 1.0)
+    if not (surface.smooth and np.any(inside)):
+        return line
+    first, last = surface.area(begin), surface.area(begin + length)
+    if last > first:
+        line[inside] = np.clip([(surface.area(level) - first) / (last - first) for level in z[inside]], 0.0, 1.0)
+    return line
 
 
 def _round_deduction(radius: float, valve: Valve) -> float:
@@ -269,20 +280,21 @@ def _key_point_deductions(valve: Valve, surface: Surface) -> tuple[float, float,
     return found[0], found[1], found[2]
 
 
-def _patched(valve: Valve, z: np.ndarray, surface: Surface) -> np.ndarray:
-    """Areas (k,), m2, that patches take off the sections at z beyond what an even wall does.
+def _varied(valve: Valve, z: np.ndarray, surface: Surface, share: np.ndarray) -> np.ndarray:
+    """Areas (k,), m2, that patches, and steps of the wall within the duckbill, take off the sections at z beyond what
+    an even wall does; share (k,) of the saddle lies before them.
 
     A half wall h(s) inside a section takes the integral of h ds - h^2/2 dtheta, theta being the direction of the
     section. Where the inner faces of both lips would cross they meet, as those of an even wall do.
     """
     edges = [s for patch in valve.patches for s in patch.section_edges]
-    places = np.unique([*np.linspace(0.0, 1.0, _FINE + 1), *edges])
+    places = np.unique(np.round([*np.linspace(0.0, 1.0, _FINE + 1), *edges], 12))
     if not surface.part.is_quarter:
         places = np.concatenate([-places[:0:-1], places])
     middle = 0.5 * (places[1:] + places[:-1])
-    joint, end = valve.duckbill_length, valve.duckbill_length + valve.saddle_length
+    halves = valve.duckbill_wall_deduction + share * (valve.flange_wall_deduction - valve.duckbill_wall_deduction)
     taken = []
-    for level in z:
+    for level, even, left in zip(z, halves, 1.0 - share):
         points = surface.section(level, places)[:, :2]
         steps = np.diff(points, axis=0)
         lengths = np.linalg.norm(steps, axis=1)
@@ -290,20 +302,19 @@ def _patched(valve: Valve, z: np.ndarray, surface: Surface) -> np.ndarray:
         between = np.concatenate([angle[:1], 0.5 * (angle[1:] + angle[:-1]), angle[-1:]])
         turn = between[:-1] - between[1:]
         room = 0.5 * (points[1:, 1] + points[:-1, 1]) * lengths / np.maximum(steps[:, 0], 1e-9 * lengths)
-        even = np.interp(level, (joint, end), (valve.duckbill_wall_deduction, valve.flange_wall_deduction))
-        added = 0.5 * (_sides(valve, level, np.abs(middle)) - _sides(valve, level))
-        half = np.minimum(even + added, np.maximum(room, even))
+        half = np.minimum(even + 0.5 * _added(valve, level, np.abs(middle), left), np.maximum(room, even))
         more = np.sum((half - even) * lengths - 0.5 * (half**2 - even**2) * turn)
         taken.append(float(more))
     return np.array(taken)
 
 
-def _sides(valve: Valve, z: float, shares: np.ndarray | None = None) -> np.ndarray | float:
-    """Mean wall thickness before and behind an axial position, m, `thickness_factor` left out; with patches at
-    shares (k,) of the section.
+def _added(valve: Valve, z: float, shares: np.ndarray, left: float) -> np.ndarray:
+    """Wall at shares (k,) of the section beyond an even one, m, `thickness_factor` left out: over that at the lip in
+    the duckbill, over that without patches behind it, where a share `left` of its steps is left; the mean before and
+    behind an axial position.
     """
-    near = 1e-6 * valve.length
+    near, joint, lip = 1e-6 * valve.length, valve.duckbill_length, valve.wall_at(0.0)
+    steps = left * (valve.wall_at(joint - near) - lip)
     places = [place for place in (z - near, z + near) if 0.0 < place < valve.length]
-    if shares is None:
-        return float(np.mean([valve.thickness_at(place) for place in places])) / valve.thickness_factor
-    return np.mean([[valve.wall_at(place, s) for s in shares] for place in places], axis=0)
+    even = [lip if place < joint else valve.wall_at(place) - steps for place in places]
+    return np.mean([[valve.wall_at(place, s) - own for s in shares] for place, own in zip(places, even)], axis=0)

@@ -161,7 +161,9 @@ def layer_levels(model: ValveModel, q: np.ndarray, levels: Mapping[str, float]) 
 
 
 def beyond_levels(model: ValveModel, states: Iterable[SteadyState]) -> Iterator[str]:
-    """Sentences on rubbers that strain beyond levels that were settled (materials.strain_level = "auto")."""
+    """Sentences on rubbers that strain beyond their levels where these are settled (materials.strain_level = "auto"),
+    or told for some of them in tables.
+    """
     materials = model.case.materials
     levels = materials.levels({layer.material for layer in model.case.layers})
     worst: dict[str, tuple[float, float]] = {}
@@ -172,8 +174,9 @@ def beyond_levels(model: ValveModel, states: Iterable[SteadyState]) -> Iterator[
     for name, (peak, pressure) in worst.items():
         yield (
             f"{name} strains by up to {100 * peak:.3g} % at {pressure:.6g} Pa and has the constants of "
-            f"{100 * levels[name]:.3g} %, settled at the largest pressures that the case names; give drive.pressure or "
-            "steady.pressures in the case as high as the valve is to go."
+            f"{100 * levels[name]:.3g} %, which the case gives or which settled at the largest pressures that it "
+            f"names; give a higher strain_level of {name}, or drive.pressure or steady.pressures in the case as high "
+            "as the valve is to go."
         )
 
 

@@ -49,16 +49,16 @@ class ValveSizes:
         density = np.atleast_2d(shell.at_rest.inertia)[:, 0]  # of the wall, by element or everywhere
         mass = float(np.sum(shell.geometry.area.sum(axis=1) * shell.mesh.thickness * density))
         passage = mesh.part.copies * (mesh.rest_area - mesh.wall_deduction)
-        lip = mesh.nodes[mesh.rows[0]]
-        wall = float(mesh.thickness[0])
-        width = 2 * np.abs(lip[:, 0]).max() if mesh.part.is_quarter else np.ptp(lip[:, 0])
+        x, y = mesh.nodes[mesh.rows[0], :2].T
+        wall = mesh.thickness[: len(x) - 1]  # of the elements at the lip, from one side edge or the middle on
+        width = 2 * np.abs(x).max() + wall[-1] if mesh.part.is_quarter else np.ptp(x) + 0.5 * (wall[0] + wall[-1])
         pipes = case.upstream.pipes if case.has_line else ()
         bores = [0.25 * np.pi * pipe.diameter**2 if pipe.diameter else passage[-1] for pipe in pipes]
         line = sum(bore * pipe.length for bore, pipe in zip(bores, pipes))
         return cls(
             case.valve.length,
-            float(width + wall),
-            float(2 * lip[:, 1].max() + wall),
+            float(width),
+            float(np.max(2 * np.maximum(y[1:], y[:-1]) + wall)),
             mesh.part.copies * mass,
             float(passage[0]),
             float(passage[-1]),

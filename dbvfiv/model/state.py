@@ -12,6 +12,7 @@ import numpy as np
 from ..case.quantity import GRAVITY, WATER, head_of
 from ..errors import SolveError
 from ..geometry.valve_mesh import ValveMesh
+from ..shell.mesh import nodal_thickness
 from ..shell.shell import Shell
 from ..texts import shortly
 from .valve import ValveModel
@@ -254,13 +255,13 @@ class LipCentre:
     def __init__(self, mesh: ValveMesh, shell: Shell):
         node = mesh.centre_line[0]
         surface = shell.mesh
-        around = np.any(surface.quads == node, axis=1)
-        self.half_wall = 0.5 * float(surface.thickness[around].mean())
+        self.half_wall = 0.5 * float(nodal_thickness(surface)[node])
         self._height = float(surface.nodes[node, 1])
         self._director, self._frame = surface.directors[node], surface.frames[node]
         self._unknowns = shell.dofs.index[node]
         drawn = 2.0 * (self._height - self.half_wall * float(self._director[1]))
-        self._shut = 0.0 if shell.stress_free is None else drawn  # the faces touch in the shape that is drawn
+        # faces that are moulded shut, or that cross as drawn, touch in that shape
+        self._shut = drawn if shell.stress_free is not None else min(drawn, 0.0)
 
     def displacement(self, q: np.ndarray) -> float:
         """Displacement in y, m, of the mid-surface of one lip, from the free unknowns (n,); below zero where the lip
@@ -275,7 +276,8 @@ class LipCentre:
         mid-surface at rest and its displacement v the opening is 2 (Y + v - h/2 d_y). At rest it is what the shape
         leaves between the faces, 2 (Y - h/2): 0.38 mm in the 12-inch valve, whose mid-surface is 6.19 mm high and whose
         wall is 12 mm thick; none where the lip radius is half the wall. `valve.initial_gap`, which keeps the flow
-        section open at rest, is no part of it. Of a bill that is moulded shut by how much it is more than that.
+        section open at rest, is no part of it. Of a bill that is moulded shut, and of walls too thick for the shape, by
+        how much it is more than that.
         """
         local = self._local(q)
         turn = float(np.hypot(*local[3:]))

@@ -21,7 +21,6 @@ from ..errors import CaseError, SolveError
 from ..flow.law import FlowLaw
 from ..flow.terms.pump import with_static_lift
 from ..model.forms import ValveForms
-from ..model.state import LipCentre
 from ..model.valve import ValveModel
 from ..motion.periodic import PeriodicValve
 from .case import Case
@@ -161,12 +160,6 @@ class Orbit:
         """Least and largest mass flow at the lip, kg/s, between instants too."""
         flow, _ = self.flow
         return -float(peak(-flow)), float(peak(flow))
-
-    def opening(self) -> float:
-        """Least clear opening between the inner faces of both lips at x = z = 0, m; below zero where they cross."""
-        lip = LipCentre(self.model.mesh, self.model.shell)
-        samples = self.motion.at(self.phases[::4])[:, : self.model.size]
-        return float(min(lip.opening(q) for q in samples))
 
 
 #: Displacement of the lip, m, that a step of one along the branch stands for.

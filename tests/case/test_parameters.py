@@ -2,14 +2,17 @@
 
 import pickle
 
+import numpy as np
 import pytest
 
 from dbvfiv.case import CaseError
 from dbvfiv.case.axis import parse_stability_axis
 from dbvfiv.case.describe import allowed_words, walk
 from dbvfiv.case.parameters import DESIGN, PARAMETERS, SURROUNDINGS, SWEPT, SYSTEM_NAMES, Mu, listed
+from dbvfiv.model.build import build_section
 from dbvfiv.studies.case import Case, load_case, thesis_case
 from dbvfiv.studies.session import KEYWORDS, Session, named_changes
+from dbvfiv.studies.stability.place import design_value, redesigned
 
 
 @pytest.mark.parametrize("row", PARAMETERS.values(), ids=PARAMETERS)
@@ -60,6 +63,15 @@ def test_a_case_has_every_parameter_of_load_and_surroundings():
     mu = Mu.of(thesis_case())
     assert mu == Mu(pressure=18e3, density=1000.0, storage=0.0, alpha=5.0, beta=0.003, loss_factor=0.0)
     assert set(mu.at(angle=30).for_system()) == {*SYSTEM_NAMES, "angle"}
+
+
+def test_plies_beyond_a_right_angle_are_those_of_half_a_turn():
+    """Plies at 54 and 126 degrees are turned as those at 54 and -54, and one at 180 stays along the axis."""
+    layers = [{"material": "fibre", "thickness": 1e-3, "angle": angle} for angle in (54.0, 126.0, -126.0, 180.0)]
+    case = thesis_case({"layers": layers})
+    assert [layer.angle for layer in redesigned(case, {"angle": 40.0}).layers] == [40.0, -40.0, 40.0, 180.0]
+    own, again = (build_section(each).plane_stiffness for each in (case, redesigned(case, {"angle": 54.0})))
+    assert design_value(case, "angle") == 54.0 and again == pytest.approx(own, rel=1e-12, abs=1e-6 * np.abs(own).max())
 
 
 def test_words():

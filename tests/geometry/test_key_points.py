@@ -60,6 +60,12 @@ def test_the_parametric_shape_comes_back(more, tmp_path):
     assert two.rest_area - two.wall_deduction == pytest.approx(passage, rel=1e-8)
 
 
+def test_lips_bowed_to_half_a_circle_have_no_side_edge(tmp_path):
+    case = Case().replace(WIDE | {"valve.lip_half_width": 0.07, "valve.lip_rise": 0.07})
+    one, two = (valve_mesh(c.valve, c.mesh) for c in (case, by_points(case, tmp_path, 65)))
+    assert two.rest_area == pytest.approx(one.rest_area, rel=1e-8)
+
+
 def test_the_command_says_which_keys_give_the_valve_back(tmp_path, command_line):
     """Deductions of the 12-inch valve, which follow otherwise beside key points: three times its passage at rest."""
     target, case = tmp_path / "own.csv", Case()
@@ -232,6 +238,13 @@ BAD = {
     "profiles mixed": (
         "profile, x [mm], y [mm], z [mm]\n" + "\n".join(f"{'ab'[i % 2]}, {row}" for i, row in enumerate(GOOD[1:])),
         "points of a profile do not follow each other",
+    ),
+    "not at one z": (
+        "profile, "
+        + "\n".join([GOOD[0], *("ab"[i > 2] + ", " + row for i, row in enumerate(GOOD[1:]))]).replace(
+            "30, 30, 560", "30, 30, 555"
+        ),
+        "profile 2 at z = 0.558333 m has points from 0.555 to 0.56 m, and a profile lies at one z",
     ),
     "too short a valve": ("\n".join(GOOD).replace("560", "400"), "profiles end at z = 0.4 m; the lengths .*0.56 m"),
     "bare word among numbers": ("0 20 0\n50 x 0\n", "line 2 is not three numbers"),

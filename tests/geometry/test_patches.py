@@ -8,7 +8,9 @@ import pytest
 from dbvfiv.case import CaseError
 from dbvfiv.geometry import valve_mesh
 from dbvfiv.geometry.divisions import grading
+from dbvfiv.model import ValveModel
 from dbvfiv.model.build import build_shell
+from dbvfiv.model.sizes import ValveSizes
 from dbvfiv.studies.case import Case
 
 EVEN = {"valve.wall": "uniform", "valve.wall_thickness": 0.012}
@@ -65,10 +67,44 @@ def test_lips_that_touch_stay_touching():
     assert thinner.wall_deduction[-1] == even.wall_deduction[-1]
 
 
+def test_a_step_within_the_duckbill_is_the_patch_that_says_the_same():
+    """Behind a lip of 14 mm a wall of 12 leaves a slot of 1 mm below either face, and one of 16 grows outwards."""
+    passages = {}
+    for behind in (0.012, 0.014, 0.016):
+        stepped = [(0.05, 0.014), (0.21, behind), (0.56, 0.014)]
+        told = (
+            {"valve.wall": "measured", "valve.wall_map": [{"to": to, "thickness": h} for to, h in stepped]},
+            {"valve.wall_thickness": 0.014, "valve.patches": [{"begin": 0.05, "end": 0.21, "thickness": behind}]},
+        )
+        found = [valve_mesh(case.valve, case.mesh) for case in (case_of(**keys) for keys in told)]
+        on_lips = found[0].z < 0.209
+        passages[behind], other = (1e6 * (mesh.rest_area - mesh.wall_deduction)[on_lips] for mesh in found)
+        assert passages[behind] == pytest.approx(other, abs=1e-3)
+    depth = np.interp(found[0].z[on_lips], [0.0499, 0.05, 0.0501], [0.0, 0.5, 1.0])  # mm
+    slot = 125.0 * depth + np.pi / 4 * depth**2
+    assert passages[0.012] - passages[0.014] == pytest.approx(slot, rel=1e-3, abs=1e-3)
+    assert passages[0.016] == pytest.approx(passages[0.014], abs=1e-3)
+
+
 def test_a_patch_of_the_same_wall_changes_no_passage():
     even, patched = meshes({"begin": 0.1, "end": 0.3, "around_from": 0.2, "thickness": 0.012})
     assert np.interp(even.z, patched.z, patched.wall_deduction) == pytest.approx(even.wall_deduction, rel=1e-3)
     assert patched.wall_deduction[0] == even.wall_deduction[0]
+
+
+@pytest.mark.parametrize("part", ["auto", "half"])
+def test_size_of_a_bill_with_a_thicker_edge_or_middle(part):
+    sizes = []
+    for patch in ({"extra": 0.0}, {"around_from": 0.82, "extra": 0.003}, {"around_to": 0.4, "extra": 0.003}):
+        case = case_of(patch | {"end": 0.05}, **{"mesh.around": 8, "mesh.along": 16, "mesh.part": part})
+        found = ValveSizes.of(ValveModel(case))
+        assert found.bill_width == pytest.approx(case.valve.bill_width, rel=1e-9)
+        assert found.lip_area == pytest.approx(4 * 0.125 * 1e-4, rel=1e-3)  # edges beside a place of the sum, too
+        sizes.append((found.bill_width, found.bill_height))
+    even, edge, middle = sizes
+    wider, higher = np.subtract(edge, even), np.subtract(middle, even)
+    assert wider == pytest.approx([0.003, 0.003], abs=1e-9)  # the edge begins where the lips are flat
+    assert higher == pytest.approx([0.0, 0.003], abs=1e-9)
 
 
 def test_a_patch_that_fills_a_narrow_place(one_sentence):

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from dbvfiv.case.model import Case
+from dbvfiv.errors import CaseError
 from dbvfiv.geometry import surface_of, valve_mesh
 from dbvfiv.geometry.divisions import grading
 from dbvfiv.geometry.valve_mesh import wall_deduction
@@ -117,6 +118,25 @@ def test_wall_deduction():
     duckbill = np.pi * 0.00619**2 / 4 + 0.125 * (0.00619 - 1e-4)
     flange = np.pi * (0.13919**2 - (0.13919 - 0.00819) ** 2) / 4
     assert deducted == pytest.approx([duckbill, duckbill, (duckbill + flange) / 2, flange, flange], rel=1e-12)
+
+
+@pytest.mark.parametrize("along", [48, 96])
+@pytest.mark.parametrize(("half_width", "flange"), [(0.125, None), (0.07, None), (0.125, 0.015)])
+def test_no_smooth_saddle_is_narrower_than_the_lips(along, half_width, flange):
+    """Behind the duckbill its section gains nothing at first, and the wall takes no more of it."""
+    sizes = {"lip_half_width": half_width, "flange_wall_deduction": flange, "initial_gap": 1e-4}
+    smooth, ruled = (mesh_of(6, along, saddle=saddle, **sizes) for saddle in ("smooth", "ruled"))
+    passage, straight = (mesh.rest_area - mesh.wall_deduction for mesh in (smooth, ruled))
+    assert passage.min() == pytest.approx(half_width * 1e-4, rel=1e-4)
+    assert passage[[0, -1]] == pytest.approx(straight[[0, -1]], rel=1e-12)
+    middle = [np.interp(0.35, z, found) for z, found in ((smooth.z, passage), (ruled.z, straight))]
+    assert middle[0] == pytest.approx(middle[1], rel=0.05)  # there both surfaces have one section
+
+
+def test_a_wall_that_fills_a_section_is_refused(one_sentence):
+    with pytest.raises(CaseError, match="leaves no flow area at z = ") as caught:
+        mesh_of(6, 48, flange_wall_deduction=0.139, lip_half_width=0.0001, lip_radius=0.00601)
+    assert one_sentence(str(caught.value).replace("0.", ""))
 
 
 def key_point_file(path, surface, s):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from copy import copy
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
@@ -106,6 +107,15 @@ def test_faces_press_evenly_at_rest_in_the_shape_that_is_drawn(model):
     assert np.abs(model.nodal(model.rest())[:, :3]).max() < valve.initial_gap
     beyond = model.mesh.nodes[:, 1] - model.shell.stress_free.nodes[:, 1]
     assert beyond[model.mesh.centre_line[0]] > 5e-3  # the lips cross without contact
+
+
+def test_faces_that_cross_at_rest_leave_nothing_open(model):
+    crossed = copy(model)
+    crossed.__dict__.pop("_film", None)
+    crossed.rows = SimpleNamespace(areas=lambda nodal: model.rows.areas(nodal) - 1e-4)
+    at_rest = crossed.rows.areas(model.nodal(model.rest()))
+    assert at_rest.min() < 0 and crossed.open_share(at_rest) == 0.0 and crossed.mass_flow(at_rest, PRESSURE) == 0.0
+    assert crossed.open_share(at_rest + 1e-3) == 1.0
 
 
 def test_overlap_and_force_give_the_pressure_that_they_belong_to(model):
@@ -229,6 +239,7 @@ def test_presets_that_cannot_be_are_refused_in_a_sentence(keys, words):
     [
         {"valve.lip_radius": "9 mm", "valve.duckbill_wall_deduction": "6 mm"},
         {"valve.patches": [{"end": "60 mm", "thickness": "6 mm"}]},
+        {"valve.wall_map": [{"to": "50 mm", "thickness": "14 mm"}, {"to": "560 mm", "thickness": "12 mm"}]},
     ],
 )
 def test_a_bill_whose_faces_do_not_touch_as_drawn_is_not_moulded_shut(keys):

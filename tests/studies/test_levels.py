@@ -111,6 +111,10 @@ def test_a_state_beyond_the_settled_levels_is_told():
     valve = dbvfiv.load(thesis_case(), AUTO | {"drive.pressure": 6e3})
     assert any(sentence.startswith("CR strains by up to 1") for sentence in valve.steady([36e3]).warnings)
     assert not any("strains by up to" in sentence for sentence in valve.steady([7e3]).warnings)
+    given = {f"materials.{name}": {"kind": "shipped", "rubber": name} for name in ("CR", "SBR", "EPDM")}
+    warnings = dbvfiv.load(thesis_case(), AUTO | given).steady([36e3]).warnings
+    (told,) = (said for said in warnings if "strains by up to" in said)
+    assert "constants of 10 %, which the case gives or" in told and "give a higher strain_level of CR" in told
 
 
 def test_pressures_at_which_levels_settle():

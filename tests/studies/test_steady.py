@@ -101,6 +101,12 @@ def test_lip_opening_is_the_distance_between_the_faces(model):
 def test_lip_opening_knows_the_wall(model):
     thin = ValveModel(model.case.replace({"valve.thickness_factor": 0.5}))
     assert LipCentre(thin.mesh, thin.shell).opening(thin.rest()) == pytest.approx(2 * (0.00619 - 0.003), rel=1e-9)
+    thick = ValveModel(model.case.replace({"valve.thickness_factor": 1.3}))  # the faces cross as drawn
+    lifted = np.zeros((len(thick.mesh.nodes), 5))
+    lifted[thick.mesh.centre_line[0], 1] = 0.002
+    centre = LipCentre(thick.mesh, thick.shell)
+    assert centre.opening(thick.rest()) == 0.0
+    assert centre.opening(thick.shell.dofs.restrict(lifted)) == pytest.approx(0.004, rel=1e-9)
 
 
 def test_heads_of_the_fluid():

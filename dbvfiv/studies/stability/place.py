@@ -157,7 +157,7 @@ def require_parameter(case: Case, name: str) -> None:
             "There is no strain level to change, because no layer is one of the built-in rubbers "
             f"{', '.join(RUBBERS)}; the layers are of {', '.join(sorted(used))}."
         )
-    if name == "angle" and not any(layer.angle for layer in case.layers):
+    if name == "angle" and not any(layer.folded for layer in case.layers):
         raise CaseError("There is no fibre angle to change, because every layer lies at 0 degrees.")
 
 
@@ -169,7 +169,7 @@ def design_value(case: Case, name: str) -> float | None:
         force = case.valve.sealing_force
         return force / case.valve.moulded_length if force else case.valve.sealing_pressure
     if name == "angle":  # of all plies at once
-        values = {abs(layer.angle) for layer in case.layers if layer.angle}
+        values = {abs(layer.folded) for layer in case.layers if layer.folded}
     else:  # strain, of all rubbers at once
         values = set(case.materials.levels({layer.material for layer in case.layers}).values())
     return values.pop() if len(values) == 1 else None
@@ -194,9 +194,9 @@ def redesigned(case: Case, design: Mapping[str, float]) -> Case:
             changes |= case.materials.at_levels(dict.fromkeys(rubbers, value))
         elif name == "angle":
             layers = case.to_dict()["layers"]
-            for layer in layers:
-                if layer["angle"]:
-                    layer["angle"] = value if layer["angle"] > 0 else -value
+            for layer, own in zip(layers, case.layers):
+                if own.folded:
+                    layer["angle"] = value if own.folded > 0 else -value
             changes[PARAMETERS[name].key] = layers
         elif name in PARAMETERS:
             changes[PARAMETERS[name].key] = value
