@@ -183,7 +183,7 @@ class MovingFluid:
     moves = True
 
     def __init__(self, law: FlowLaw, density: float, seal: Callable[[np.ndarray], int | None] = lambda area: None):
-        self.law, self.density, self._seal = law, float(density), seal
+        self.law, self.density, self.seal = law, float(density), seal
         self.traced = jax.device_put(law.reversed())
         self._behind: dict[int | None, MovingFluid] = {None: self}
 
@@ -192,7 +192,7 @@ class MovingFluid:
         seal; of a liquid that is compressed a film passes, since stopping it would be a blow.
         """
         open_ = self._behind[None]
-        seal = None if open_.compressed and not open_.quiet_inward else self._seal(area)
+        seal = None if open_.compressed and not open_.quiet_inward else self.seal(area)
         if seal not in self._behind:
             law = open_.law.shut(seal)
             self._behind[seal] = open_ if law is open_.law else open_._with(law)
@@ -381,7 +381,8 @@ class SteadyFlow:
     def at(self, mid: tuple, new: tuple) -> Flow:
         """The flow; see `FluidStep.at`."""
         law, area = self.fluid.law, new[0]
-        velocity = law.inlet_velocity(area, self.inlet, self.fluid.density) if self.inlet > law.back else 0.0
+        flows = self.inlet > law.back and self.fluid.seal(area) is None
+        velocity = law.inlet_velocity(area, self.inlet, self.fluid.density) if flows else 0.0
         pressure = law.steady_pressure(mid[0], self.inlet)
         none, speed = np.zeros(law.count + law.inner), law.velocities(area, velocity)
         return Flow(self.inlet, pressure, *new, speed, np.array([velocity]), none, self, mid)

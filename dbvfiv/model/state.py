@@ -150,8 +150,8 @@ def describe_state(model: ValveModel, q: np.ndarray, pressure: float, **solution
     velocity = float(inner[0])
     if not np.isfinite(velocity):
         raise SolveError(_boundless(model, area, pressure))
-    share = model.open_share(area)
-    speeds = model.flow.steady_velocities(area, pressure, density) * float(share > 0.0)
+    open_ = model.is_open(area)
+    speeds = model.flow.steady_velocities(area, pressure, density) * open_
     displacement = np.linalg.norm(nodal[:, :3], axis=1)
     where = int(np.argmax(displacement))
     lip = LipCentre(model.mesh, model.shell)
@@ -174,11 +174,11 @@ def describe_state(model: ValveModel, q: np.ndarray, pressure: float, **solution
         nodal=nodal,
         mass_flow=mass_flow,
         volume_flow=mass_flow / density,
-        outlet_area=float(model.mesh.part.copies * area[0] * share),
+        outlet_area=float(model.mesh.part.copies * area[0] * open_),
         outlet_velocity=float(speeds[0]),
         max_displacement=float(displacement[where]),
         max_displacement_position=tuple(float(value) for value in model.mesh.nodes[where]),
-        lip_opening=lip.opening(q) if share else 0.0,
+        lip_opening=lip.opening(q) if open_ else 0.0,
         lip_displacement=lip.displacement(q),
         station_area=area,
         station_velocity=speeds,
