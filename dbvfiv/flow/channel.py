@@ -205,7 +205,8 @@ class Channel(FlowLaw):
         source, back = self.supply(parameters)
         head = (source - back if drive is None else drive) - self.heads(area, area_rate, inner, parameters)
         if self.sealed:
-            still = self.steady(area, parameters)[0] / parameters["density"]
+            rest = self.at_seal(area, parameters)
+            still, (source, back) = self.steady(area, rest)[0] / rest["density"], self.supply(rest)
             return jnp.append(still + self.front * (head - source + back), 0.0)
         return self._outlet_behind(head + self.static / parameters["density"])
 
@@ -298,6 +299,15 @@ class Channel(FlowLaw):
         return storage * jnp.sum(self.spans[1] * opening) / open_[-1]
 
     def work_lengths(self, area: np.ndarray) -> np.ndarray:
+    def at_seal(self, area, parameters):
+        """Parameters with the inlet pressure, Pa, that fluid at rest in front of a seal has: that of a pump that
+        delivers nothing; traceable.
+        """
+        none = jnp.zeros_like(area)
+        stream = self.stream(area, none, none, none[:1])
+        gained = -sum(term.head(stream, parameters) for term in self.terms if term.drives)
+        return {**parameters, "inlet": parameters["inlet"] + parameters["density"] * gained}
+
         """Lengths (m,), m, over which pressures of moving fluid in front of the seal do work on areas (m,).
 
         With the discharges Q_k that the wall displaces, by trapezoids, the kinetic energy is rho/2 sum_k l_k Q_k^2/A_k,
@@ -372,4 +382,7 @@ class AroundChannel(FlowLaw):
         return self.changed(channel=self.channel.shut(seal))
 
     def work_lengths(self, area):
+    def at_seal(self, area, parameters):
+        return self.channel.at_seal(area, parameters)
+
         return self.channel.work_lengths(area)

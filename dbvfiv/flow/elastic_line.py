@@ -345,7 +345,8 @@ class LineChannel(AroundChannel):
         source, back = self.channel.supply(parameters)
         momentum, stretch = self.line.sources(velocity, pressure, source, area[-1], parameters)
         drive = -momentum[-1] - self.channel.flange(own, parameters)[1] - back
-        passage = self.channel.sources(area, area_rate, own, parameters, drive)
+        rest = self.at_seal(area, parameters) if self.sealed else parameters
+        passage = self.channel.sources(area, area_rate, own, rest, drive)
         return jnp.concatenate([passage, momentum[:-1], stretch])
 
     def scales(self, area, parameters):
@@ -364,6 +365,9 @@ class LineChannel(AroundChannel):
 
     def still(self, area, given):
         """At the pressure behind the valve, up to which nothing flows."""
+    def at_seal(self, area, parameters):
+        return self.rigid.at_seal(area, parameters)
+
         values, found = self.values(given), super().still(area, given)
         back = self.channel.supply(values)[1]
         found[-(self.line.size // 2) :] = self.line.steady_pressure(0.0, back, area[-1], values)

@@ -227,8 +227,9 @@ class GasChannel(AroundChannel):
         _, sigma = self.split(inner, parameters)
         pressure = self.pressure(sigma, parameters) + self.channel.static
         if self.sealed:
-            rest = self.channel.static + parameters["inlet"] - self.channel.back
-            pressure = self.steady(area, parameters)[0] + self.channel.front * (pressure - rest)
+            still = self.at_seal(area, parameters)
+            rest = self.channel.static + still["inlet"] - self.channel.back
+            pressure = self.steady(area, still)[0] + self.channel.front * (pressure - rest)
         return jnp.concatenate([pressure, self.balances(area, area_rate, inner, parameters, drive)])
 
     # -- the flange, where a line may stand in front

@@ -196,7 +196,7 @@ class MovingFluid:
         if seal not in self._behind:
             law = open_.law.shut(seal)
             self._behind[seal] = open_ if law is open_.law else open_._with(law)
-        if self._behind[seal] is open_ or speed[seal] == 0.0:
+        if self._behind[seal] is open_ or speed[0] == 0.0:  # also where a seal grows inwards
             return self._behind[seal]
         passing = abs(speed) * open_.law.open_area(area)
         film = open_.steady_inner(area, inlet)[0] * open_.law.open_area(area)[-1]
@@ -215,7 +215,10 @@ class MovingFluid:
     def still(self, area: np.ndarray, inlet: float) -> tuple | None:
         """See `Flow.still`."""
         law = self.law
-        return (law.steady_pressure(area, inlet), law.work_lengths(area)) if law.sealed else None
+        if not law.sealed:
+            return None
+        at_rest = law.at_seal(area, self.parameters(inlet))["inlet"]
+        return law.steady_pressure(area, float(at_rest)), law.work_lengths(area)
 
     @property
     def compressed(self) -> bool:
@@ -246,9 +249,9 @@ class MovingFluid:
         return FluidInstant(self.facing(state.area, state.speed, inlet), state, inlet)
 
     def steady_inner(self, area: np.ndarray, inlet: float) -> np.ndarray:
-        """Unknowns (l,) of a steady flow; those of a fluid at rest without pressure where there is none."""
+        """Unknowns (l,) of a steady flow; those of a fluid at rest at the pressure behind where there is none."""
         found = self.law.steady_inner(area, self.parameters(inlet))
-        return found if np.isfinite(found).all() else np.zeros(self.law.inner)
+        return found if np.isfinite(found).all() else self.law.still(area, self.parameters(inlet))
 
     def speeds(self, area, area_rate, inner) -> np.ndarray:
         """Speeds (m,) at the stations, m/s."""

@@ -27,6 +27,7 @@ from dbvfiv.model.newton import EquilibriumSolver, NewtonOptions
 from dbvfiv.model.preset import stress_free_shape
 from dbvfiv.model.state import parted_width
 from dbvfiv.model.symmetry import SYMMETRIES
+from dbvfiv.motion import start
 from dbvfiv.motion.control import RunOptions
 from dbvfiv.motion.start import steady_positions
 from dbvfiv.motion.stepper import StepOptions
@@ -485,6 +486,12 @@ def test_faces_of_few_elements_press_on_each_other_before_the_back_pressure(size
     keys = {"mesh.around": 5, "mesh.along": 10, "closure.pressures": [28e3], "closure.arclength": False}
     (state,) = load(load_case(CASES / f"dbv{size}-moulded.toml").replace(keys)).closure().states
     assert state.closed and state.energy_balance < 1e-3
+
+
+def test_a_run_from_rest_begins_without_a_velocity(model, monkeypatch):
+    monkeypatch.setattr(start, "consistent_state", lambda motion, time, q, v, *_: (q, v))
+    (q, v), _ = start.first_state(SimpleNamespace(model=model), model.case, 0.0, None)
+    assert model.case.transient.start == "rest" and q.any() and not v.any()
 
 
 def test_sealing_pressure_is_a_parameter_of_a_bill_that_is_moulded_shut_alone(model):
