@@ -187,9 +187,10 @@ class Channel(FlowLaw):
             psi = psi + self.term_momenta(self.stream(area, area_rate, speed, inner), parameters)
         return psi
 
-    def stream(self, area, area_rate, speed, inner) -> Stream:
+    def stream(self, area, area_rate, speed, inner, passing=None) -> Stream:
         """The streamline as terms see it; traceable."""
-        return Stream(area, area_rate, speed, inner, above_floor(area, self.floor), self.perimeter, self.step)
+        open_ = above_floor(area, self.floor)
+        return Stream(area, area_rate, speed, inner, open_, self.perimeter, self.step, passing)
 
     def term_heads(self, stream: Stream, parameters, terms: Sequence[FlowTerm] | None = None):
         """Heads (m,) that the terms, or some of them, add; traceable."""
@@ -298,7 +299,6 @@ class Channel(FlowLaw):
         open_, opening = jax.jvp(lambda a: above_floor(a, self.floor), (area,), (area_rate,))
         return storage * jnp.sum(self.spans[1] * opening) / open_[-1]
 
-    def work_lengths(self, area: np.ndarray) -> np.ndarray:
     def at_seal(self, area, parameters):
         """Parameters with the inlet pressure, Pa, that fluid at rest in front of a seal has: that of a pump that
         delivers nothing; traceable.
@@ -308,6 +308,7 @@ class Channel(FlowLaw):
         gained = -sum(term.head(stream, parameters) for term in self.terms if term.drives)
         return {**parameters, "inlet": parameters["inlet"] + parameters["density"] * gained}
 
+    def work_lengths(self, area: np.ndarray) -> np.ndarray:
         """Lengths (m,), m, over which pressures of moving fluid in front of the seal do work on areas (m,).
 
         With the discharges Q_k that the wall displaces, by trapezoids, the kinetic energy is rho/2 sum_k l_k Q_k^2/A_k,
@@ -381,8 +382,8 @@ class AroundChannel(FlowLaw):
     def shut(self, seal: int | None) -> AroundChannel:
         return self.changed(channel=self.channel.shut(seal))
 
-    def work_lengths(self, area):
     def at_seal(self, area, parameters):
         return self.channel.at_seal(area, parameters)
 
+    def work_lengths(self, area):
         return self.channel.work_lengths(area)

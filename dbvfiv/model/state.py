@@ -158,7 +158,7 @@ def describe_state(model: ValveModel, q: np.ndarray, pressure: float, **solution
     mass_flow = model.mass_flow(area, pressure)
     station_pressure = model.flow.steady_pressure(area, pressure)
     line = model.line
-    outlet, recovered, tail_speed, tail_loss = _behind(model, area, velocity, float(speeds[0]))
+    outlet, recovered, tail_speed, tail_loss = _behind(model, area, model.flow.far_velocity(inner), float(speeds[0]))
     flange = station_pressure[-1] - np.broadcast_to(model.flow.static, area.shape)[-1] + outlet + model.flow.level
     return SteadyState(
         pressure=float(pressure),
