@@ -302,7 +302,7 @@ def oddities(case: Case) -> Iterator[str]:
         words = "unbounded" if around is None else f"in a pipe of {1e3 * around:.4g} mm"
         yield (
             f"downstream.pipe_diameter is {1e3 * behind:.4g} mm, and the fluid outside the wall is {words}; "
-            "outside.pipe_diameter says in which pipe the valve stands, so give it too."
+            "outside.pipe_diameter says in which pipe the valve stands, so give both alike."
         )
 
 
