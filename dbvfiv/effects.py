@@ -30,6 +30,7 @@ EFFECTS = {
     "more than any that is sold": ("unknown", "valve.scale"),
     "it is half the width of the bill": ("unknown", "valve.lip_half_width"),
     "before a valve of": ("unknown", "upstream.diameter"),
+    "says in which pipe the valve stands": ("frequencies less than half as high", "outside.pipe_diameter"),
     "scaled until they fill the wall": ("none where their shares are meant", "-"),
     "the thicknesses of valve.wall_map": ("unknown", "valve.wall"),
     "radians are given as": ("unknown", "-"),

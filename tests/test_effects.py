@@ -82,6 +82,11 @@ MENDED = {
     ),
     "half the diameter is its radius": (oddities, ["valve.flange_radius=12 in"], "139 mm"),
     "more than any that is sold": (oddities, ["valve.scale=12"], "1"),
+    "says in which pipe the valve stands": (
+        oddities,
+        ["downstream.pipe_diameter=330 mm", "outside.fluid=same"],
+        "330 mm",
+    ),
     "it is half the width of the bill": (oddities, ["valve.lip_half_width=250 mm"], "125 mm"),
     "the thicknesses of valve.wall_map": (oddities, ["valve.wall_thickness=5 mm"], "uniform"),
     "before a valve of": (oddities, ["upstream.length=3 m", "upstream.diameter=45 mm"], "300 mm"),

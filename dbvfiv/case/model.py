@@ -161,6 +161,12 @@ class Case(Section):
                 f"{self.upstream.first_wave_speed:g} m/s with fluid.unsteady = false, which leaves waves out",
                 "give it with the unsteady law alone",
             )
+        if self.has_pump and not self.fluid.unsteady:
+            raise BrokenRule(
+                "upstream.pump",
+                "given with fluid.unsteady = false, which holds the pressure",
+                "give it with the unsteady law alone",
+            )
         self._check_compression()
         inlet = 2 * (self.valve.inlet_radius - self.valve.flange_wall_deduction)
         self.upstream.check_pipes(inlet)

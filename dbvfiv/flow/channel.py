@@ -187,9 +187,10 @@ class Channel(FlowLaw):
             psi = psi + self.term_momenta(self.stream(area, area_rate, speed, inner), parameters)
         return psi
 
-    def stream(self, area, area_rate, speed, inner) -> Stream:
+    def stream(self, area, area_rate, speed, inner, passing=None) -> Stream:
         """The streamline as terms see it; traceable."""
-        return Stream(area, area_rate, speed, inner, above_floor(area, self.floor), self.perimeter, self.step)
+        open_ = above_floor(area, self.floor)
+        return Stream(area, area_rate, speed, inner, open_, self.perimeter, self.step, passing)
 
     def term_heads(self, stream: Stream, parameters, terms: Sequence[FlowTerm] | None = None):
         """Heads (m,) that the terms, or some of them, add; traceable."""
@@ -205,7 +206,8 @@ class Channel(FlowLaw):
         source, back = self.supply(parameters)
         head = (source - back if drive is None else drive) - self.heads(area, area_rate, inner, parameters)
         if self.sealed:
-            still = self.steady(area, parameters)[0] / parameters["density"]
+            rest = self.at_seal(area, parameters)
+            still, (source, back) = self.steady(area, rest)[0] / rest["density"], self.supply(rest)
             return jnp.append(still + self.front * (head - source + back), 0.0)
         return self._outlet_behind(head + self.static / parameters["density"])
 
@@ -297,6 +299,15 @@ class Channel(FlowLaw):
         open_, opening = jax.jvp(lambda a: above_floor(a, self.floor), (area,), (area_rate,))
         return storage * jnp.sum(self.spans[1] * opening) / open_[-1]
 
+    def at_seal(self, area, parameters):
+        """Parameters with the inlet pressure, Pa, that fluid at rest in front of a seal has: that of a pump that
+        delivers nothing; traceable.
+        """
+        none = jnp.zeros_like(area)
+        stream = self.stream(area, none, none, none[:1])
+        gained = -sum(term.head(stream, parameters) for term in self.terms if term.drives)
+        return {**parameters, "inlet": parameters["inlet"] + parameters["density"] * gained}
+
     def work_lengths(self, area: np.ndarray) -> np.ndarray:
         """Lengths (m,), m, over which pressures of moving fluid in front of the seal do work on areas (m,).
 
@@ -370,6 +381,9 @@ class AroundChannel(FlowLaw):
 
     def shut(self, seal: int | None) -> AroundChannel:
         return self.changed(channel=self.channel.shut(seal))
+
+    def at_seal(self, area, parameters):
+        return self.channel.at_seal(area, parameters)
 
     def work_lengths(self, area):
         return self.channel.work_lengths(area)

@@ -251,14 +251,6 @@ class ElasticLine(Traceable):
         spread = segments.lost[:, None] * ((one.finer * flows * jnp.abs(flows)) @ one.value)
         return (segments.loss * velocity * jnp.abs(velocity)).at[nodes].add(spread)
 
-    def steady_head(self, velocity, source, inlet_area, parameters):
-        """Total pressure at the flange over the density, m2/s2, in steady flow of a velocity; traceable."""
-        segments = self.segments(inlet_area, parameters)
-        lost = jnp.sum(segments.lost) + jnp.sum(segments.loss)
-        return self.far_head(velocity, source, inlet_area, parameters, steady=True) - lost * velocity * jnp.abs(
-            velocity
-        )
-
     def steady_pressure(self, velocity, source, inlet_area, parameters):
         """pi (k,) of the steady flow with an inlet velocity."""
         segments = self.segments(inlet_area, parameters)
@@ -280,7 +272,7 @@ class LineChannel(AroundChannel):
     channel : Channel or GasChannel
         Without the line.
     rigid : Channel or GasChannel
-        With its rigid column, which has the same steady flow but for what compression changes in the line.
+        With its rigid column, which has the same steady flow.
     line : ElasticLine
     """
 
@@ -328,7 +320,7 @@ class LineChannel(AroundChannel):
         own, velocity, pressure = jnp.split(inner, [self.channel.inner, self.channel.inner + self.line.size // 2])
         return own, jnp.append(velocity, self.channel.flange(own, parameters)[0]), pressure
 
-    def far_velocity(self, inner: np.ndarray) -> float:
+    def far_velocity(self, inner, given=None) -> float:
         return float(inner[self.channel.inner])
 
     # -- the definition
@@ -345,7 +337,8 @@ class LineChannel(AroundChannel):
         source, back = self.channel.supply(parameters)
         momentum, stretch = self.line.sources(velocity, pressure, source, area[-1], parameters)
         drive = -momentum[-1] - self.channel.flange(own, parameters)[1] - back
-        passage = self.channel.sources(area, area_rate, own, parameters, drive)
+        rest = self.at_seal(area, parameters) if self.sealed else parameters
+        passage = self.channel.sources(area, area_rate, own, rest, drive)
         return jnp.concatenate([passage, momentum[:-1], stretch])
 
     def scales(self, area, parameters):
@@ -372,6 +365,9 @@ class LineChannel(AroundChannel):
     def is_soft(self, density):
         return self.channel.is_soft(density)
 
+    def at_seal(self, area, parameters):
+        return self.rigid.at_seal(area, parameters)
+
     def with_displaced(self, area, area_rate, inner):
         return self.channel.with_displaced(area, area_rate, inner)
 
@@ -385,18 +381,9 @@ class LineChannel(AroundChannel):
         return self.changed(channel=self.channel.reversed())
 
     def steady(self, area, parameters):
-        """Steady flow of the rigid column of fluid, with a uniform velocity in the line; with the line's own head at
-        the flange where the fluid is compressed.
-        """
+        """Steady flow of the rigid column of fluid, with a uniform velocity in the line."""
         source, _ = self.channel.supply(parameters)
-        if self.compressed:
-
-            def drive(velocity, kinetic, driven):
-                return self.line.steady_head(velocity, self.channel.supply(driven)[0], area[-1], driven) - kinetic
-
-            p, own = self.channel.steady_from(area, parameters, self.rigid.settled(area, parameters), drive, 4)
-        else:
-            p, own = self.rigid.steady(area, parameters)
+        p, own = self.rigid.steady(area, parameters)
         velocity = self.channel.flange(own, parameters)[0]
         pressure = self.line.steady_pressure(velocity, source, area[-1], parameters)
         return p, jnp.concatenate([own, jnp.full(self.line.size // 2, velocity), pressure])

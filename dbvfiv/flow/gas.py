@@ -167,7 +167,7 @@ class GasChannel(AroundChannel):
         volume = parameters["storage"] * open_ * jnp.exp(self.inside(sigma) / parameters["sound_speed"])
         added = jnp.zeros_like(area)
         if channel.terms:
-            added = added + channel.term_momenta(channel.stream(area, area_rate, speed, inner), parameters)
+            added = added + channel.term_momenta(self.stream(area, area_rate, speed, inner, parameters), parameters)
         psi, flange = _cells(channel.step, speed), added[-1:]
         if self.sealed:  # the differences of what a fluid without compression has, which feeds no motion
             before, spans = channel.spans
@@ -175,6 +175,10 @@ class GasChannel(AroundChannel):
             flange = flange + before[-1:] * speed[-1:]
         psi = psi + added[:-1] - added[1:]
         return self._in_front(psi, flange, _cells(channel.step, volume), speed, sigma)
+
+    def stream(self, area, area_rate, speed, inner, parameters):
+        """The streamline as terms see it; traceable."""
+        return self.channel.stream(area, area_rate, speed, inner, self.flange(inner, parameters)[0])
 
     @staticmethod
     def inside(sigma):
@@ -188,7 +192,7 @@ class GasChannel(AroundChannel):
         channel = self.channel
         speed, sigma = self.split(inner, parameters)
         open_ = above_floor(area, self.floor)
-        head = channel.heads_of(channel.stream(area, area_rate, speed, inner), parameters)
+        head = channel.heads_of(self.stream(area, area_rate, speed, inner, parameters), parameters)
         drive = self.supply(parameters)[0] if drive is None else drive
         total = head + self.enthalpy(sigma, parameters)
         thick = sigma + jnp.zeros_like(sigma).at[0].set(self.drawn(speed[0], parameters))
@@ -227,8 +231,9 @@ class GasChannel(AroundChannel):
         _, sigma = self.split(inner, parameters)
         pressure = self.pressure(sigma, parameters) + self.channel.static
         if self.sealed:
-            rest = self.channel.static + parameters["inlet"] - self.channel.back
-            pressure = self.steady(area, parameters)[0] + self.channel.front * (pressure - rest)
+            still = self.at_seal(area, parameters)
+            rest = self.channel.static + still["inlet"] - self.channel.back
+            pressure = self.steady(area, still)[0] + self.channel.front * (pressure - rest)
         return jnp.concatenate([pressure, self.balances(area, area_rate, inner, parameters, drive)])
 
     # -- the flange, where a line may stand in front
@@ -246,6 +251,9 @@ class GasChannel(AroundChannel):
         of the fluid; traceable.
         """
         return inner[0] * jnp.exp(inner[-1] / parameters["sound_speed"]), 0.5 * inner[0] ** 2
+
+    def far_velocity(self, inner, given=None) -> float:
+        return float(self.flange(inner, {"sound_speed": self.sound_speed, **(given or {})})[0])
 
     @property
     def drive_share(self):
@@ -265,8 +273,19 @@ class GasChannel(AroundChannel):
         return jnp.concatenate([speed[-1:], speed[:-1], sigma[1:]])
 
     def steady(self, area, parameters):
-        """Searched for; nothing flows where no pressure drives it."""
-        return self.steady_from(area, parameters, self.settled(area, parameters))
+        """Searched for; none where no pressure drives it. Newton's steps end the search, two through which derivatives
+        are traced; see `dbvfiv.flow.law.solve_steady`.
+        """
+        own, still = self.without_drives(), parameters["inlet"] == self.channel.back
+        driven = self._driven_at_all(parameters)
+        inner = self.settled(area, parameters)
+        for _ in range(2):
+            inner = inner + _newton_step(own, area, driven, inner)
+        _, sigma = own.split(inner, parameters)
+        pressure, over = self.pressure(sigma, parameters), parameters["inlet"] - self.channel.back
+        # where nothing flows their derivative by the inlet pressure is that of the flow that 1 Pa drives
+        pressure = jnp.where(still, over * jax.lax.stop_gradient(pressure), pressure)
+        return pressure + self.channel.static, jnp.where(still, 0.0, inner)
 
     def settled(self, area, parameters):
         """Unknowns (l,) that the flow settles in; traceable, without derivatives."""
@@ -276,32 +295,6 @@ class GasChannel(AroundChannel):
         """Parameters with a pressure of one, Pa, that drives the flow where there is none."""
         still = parameters["inlet"] == self.channel.back
         return {**parameters, "inlet": jnp.where(still, self.channel.back + 1.0, parameters["inlet"])}
-
-    def steady_from(self, area, parameters, inner, drive=None, more: int = 0):
-        """Pressures (m,) and unknowns (l,) of the steady flow next to given ones, none where no pressure drives it;
-        traceable.
-
-        Newton's steps: as many as `more`, and two more through which derivatives are traced; see
-        `dbvfiv.flow.law.solve_steady`.
-
-        Parameters
-        ----------
-        drive : callable, optional
-            Enthalpy at the flange, m2/s2, of a line in front, from velocity and kinetic energy as `flange` gives them
-            and the parameters.
-        """
-        own, still = self.without_drives(), parameters["inlet"] == self.channel.back
-        driven = self._driven_at_all(parameters)
-        if more:  # one place of the code, which takes long to compile
-            further = lambda _, x: x + _newton_step(own, area, driven, x, drive)  # noqa: E731
-            inner = jax.lax.stop_gradient(jax.lax.fori_loop(0, more, further, inner))
-        for _ in range(2):
-            inner = inner + _newton_step(own, area, driven, inner, drive)
-        _, sigma = own.split(inner, parameters)
-        pressure, over = self.pressure(sigma, parameters), parameters["inlet"] - self.channel.back
-        # where nothing flows their derivative by the inlet pressure is that of the flow that 1 Pa drives
-        pressure = jnp.where(still, over * jax.lax.stop_gradient(pressure), pressure)
-        return pressure + self.channel.static, jnp.where(still, 0.0, inner)
 
     def without_drives(self) -> GasChannel:
         """Copy of the law with only those terms that act on steady flow, which is that of an open passage."""
@@ -380,15 +373,14 @@ class GasChannel(AroundChannel):
         return flow[0], flow[-1], jnp.max(jnp.abs(speed) / self.local_sound_speed(sigma, parameters))
 
 
-def _left(law: GasChannel, area, parameters, inner, drive=None):
+def _left(law: GasChannel, area, parameters, inner):
     """Residual of the equations (l,), Pa, in a passage whose walls are at rest."""
-    drive = None if drive is None else drive(*law.flange(inner, parameters), parameters)
-    balance = law.balances(area, jnp.zeros_like(area), inner, parameters, drive)
+    balance = law.balances(area, jnp.zeros_like(area), inner, parameters)
     return law.scales(area, parameters)[law.count :] * balance
 
 
-def _newton_step(law: GasChannel, area, parameters, inner, drive=None):
-    return newton_step(lambda x: _left(law, area, parameters, x, drive), inner)
+def _newton_step(law: GasChannel, area, parameters, inner):
+    return newton_step(lambda x: _left(law, area, parameters, x), inner)
 
 
 def _settling_step(law: GasChannel, area, parameters, inner):

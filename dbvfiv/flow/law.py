@@ -276,8 +276,10 @@ class FlowLaw(Traceable, ABC):
         """True for a gas, which hits no wall as a liquid does."""
         return False
 
-    def far_velocity(self, inner: np.ndarray) -> float:
-        """Velocity at the far end of a line, m/s of the inlet's section, by the law's unknowns (l,)."""
+    def far_velocity(self, inner: np.ndarray, given: Mapping[str, float] | None = None) -> float:
+        """Velocity at the far end of a line, m/s of the inlet's section, that mass flows with at the density around the
+        jet, by the law's unknowns (l,) under given parameters.
+        """
         return float(inner[0])
 
     def speeds_of(self, area, area_rate, inner, parameters):

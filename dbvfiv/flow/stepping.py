@@ -183,7 +183,7 @@ class MovingFluid:
     moves = True
 
     def __init__(self, law: FlowLaw, density: float, seal: Callable[[np.ndarray], int | None] = lambda area: None):
-        self.law, self.density, self._seal = law, float(density), seal
+        self.law, self.density, self.seal = law, float(density), seal
         self.traced = jax.device_put(law.reversed())
         self._behind: dict[int | None, MovingFluid] = {None: self}
 
@@ -192,11 +192,11 @@ class MovingFluid:
         seal; of a liquid that is compressed a film passes, since stopping it would be a blow.
         """
         open_ = self._behind[None]
-        seal = None if open_.compressed and not open_.quiet_inward else self._seal(area)
+        seal = None if open_.compressed and not open_.quiet_inward else self.seal(area)
         if seal not in self._behind:
             law = open_.law.shut(seal)
             self._behind[seal] = open_ if law is open_.law else open_._with(law)
-        if self._behind[seal] is open_ or speed[seal] == 0.0:
+        if self._behind[seal] is open_ or speed[0] == 0.0:  # also where a seal grows inwards
             return self._behind[seal]
         passing = abs(speed) * open_.law.open_area(area)
         film = open_.steady_inner(area, inlet)[0] * open_.law.open_area(area)[-1]
@@ -215,7 +215,10 @@ class MovingFluid:
     def still(self, area: np.ndarray, inlet: float) -> tuple | None:
         """See `Flow.still`."""
         law = self.law
-        return (law.steady_pressure(area, inlet), law.work_lengths(area)) if law.sealed else None
+        if not law.sealed:
+            return None
+        at_rest = law.at_seal(area, self.parameters(inlet))["inlet"]
+        return law.steady_pressure(area, float(at_rest)), law.work_lengths(area)
 
     @property
     def compressed(self) -> bool:
@@ -246,9 +249,9 @@ class MovingFluid:
         return FluidInstant(self.facing(state.area, state.speed, inlet), state, inlet)
 
     def steady_inner(self, area: np.ndarray, inlet: float) -> np.ndarray:
-        """Unknowns (l,) of a steady flow; those of a fluid at rest without pressure where there is none."""
+        """Unknowns (l,) of a steady flow; those of a fluid at rest at the pressure behind where there is none."""
         found = self.law.steady_inner(area, self.parameters(inlet))
-        return found if np.isfinite(found).all() else np.zeros(self.law.inner)
+        return found if np.isfinite(found).all() else self.law.still(area, self.parameters(inlet))
 
     def speeds(self, area, area_rate, inner) -> np.ndarray:
         """Speeds (m,) at the stations, m/s."""
@@ -381,7 +384,8 @@ class SteadyFlow:
     def at(self, mid: tuple, new: tuple) -> Flow:
         """The flow; see `FluidStep.at`."""
         law, area = self.fluid.law, new[0]
-        velocity = law.inlet_velocity(area, self.inlet, self.fluid.density) if self.inlet > law.back else 0.0
+        flows = self.inlet > law.back and self.fluid.seal(area) is None
+        velocity = law.inlet_velocity(area, self.inlet, self.fluid.density) if flows else 0.0
         pressure = law.steady_pressure(mid[0], self.inlet)
         none, speed = np.zeros(law.count + law.inner), law.velocities(area, velocity)
         return Flow(self.inlet, pressure, *new, speed, np.array([velocity]), none, self, mid)

@@ -30,6 +30,8 @@ class Stream(NamedTuple):
         Arcs of the wall that the fluid wets, m, of the same part of the section as the areas.
     step : (m-1,) array, optional
         Distances of the stations, m.
+    passing : float, optional
+        `velocity` where it is not that of the inlet.
     """
 
     area: Any
@@ -39,6 +41,12 @@ class Stream(NamedTuple):
     open_area: Any = None
     perimeter: Any = None
     step: Any = None
+    passing: Any = None
+
+    @property
+    def velocity(self):
+        """Velocity at the inlet, m/s, that mass flows with at the density around the jet."""
+        return self.inner[0] if self.passing is None else self.passing
 
 
 class FlowTerm(Traceable):

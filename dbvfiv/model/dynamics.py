@@ -21,6 +21,7 @@ from ..case.parameters import Mu
 from ..errors import SolveError
 from ..flow.channel import Channel
 from ..flow.law import FlowLaw, FlowMotion
+from ..flow.terms.pump import with_static_lift
 from .outside import AddedMass
 from .valve import ValveModel
 
@@ -92,6 +93,7 @@ class LinearisedState:
         """A0 to S1 of the still fluid in front of a seal, `given` the parameters of the flow law."""
         law = self._still_law(given.get("storage"))
         rest = law.with_velocity(law.steady_inner(self.area, given), 0.0)
+        law = with_static_lift(law, self.area, rest, given)
         found = law.shut(self.seal).linearise(FlowMotion.still(self.area, rest), given).parts()
         parts = self.no_flow(self.model.flow.inner)
         parts["S0"] = np.eye(self.model.flow.inner)

@@ -376,6 +376,8 @@ def operating_pressure(model: ValveModel, observer: Observer | None = None) -> f
     while beyond(high) <= 0:
         low, high = high, min(back + _UP * (high - back), top)
         if low == top:
+            if beyond(top) == 0:  # a bill that stays sealed
+                return top
             raise _outside(known[low], pump, "at all of its heads")
     pressure = float(brentq(beyond, low, high, xtol=_TOLERANCE * top, rtol=4 * _TOLERANCE))
     if abs(beyond(pressure)) > _JUMP * top:

@@ -151,15 +151,15 @@ def describe_state(model: ValveModel, q: np.ndarray, pressure: float, **solution
     velocity = float(inner[0])
     if not np.isfinite(velocity):
         raise SolveError(_boundless(model, area, pressure))
-    share = model.open_share(area)
-    speeds = model.flow.steady_velocities(area, pressure, density) * float(share > 0.0)
+    open_ = model.is_open(area)
+    speeds = model.flow.steady_velocities(area, pressure, density) * open_
     displacement = np.linalg.norm(nodal[:, :3], axis=1)
     where = int(np.argmax(displacement))
     lip = LipCentre(model.mesh, model.shell)
     mass_flow = model.mass_flow(area, pressure)
     station_pressure = model.flow.steady_pressure(area, pressure)
     line = model.line
-    outlet, recovered, tail_speed, tail_loss = _behind(model, area, velocity, float(speeds[0]))
+    outlet, recovered, tail_speed, tail_loss = _behind(model, area, model.flow.far_velocity(inner), float(speeds[0]))
     flange = station_pressure[-1] - np.broadcast_to(model.flow.static, area.shape)[-1] + outlet + model.flow.level
     return SteadyState(
         pressure=float(pressure),
@@ -175,11 +175,11 @@ def describe_state(model: ValveModel, q: np.ndarray, pressure: float, **solution
         nodal=nodal,
         mass_flow=mass_flow,
         volume_flow=mass_flow / density,
-        outlet_area=float(model.mesh.part.copies * area[0] * share),
+        outlet_area=float(model.mesh.part.copies * area[0] * open_),
         outlet_velocity=float(speeds[0]),
         max_displacement=float(displacement[where]),
         max_displacement_position=tuple(float(value) for value in model.mesh.nodes[where]),
-        lip_opening=lip.opening(q) if share else 0.0,
+        lip_opening=lip.opening(q) if open_ else 0.0,
         lip_displacement=lip.displacement(q),
         station_area=area,
         station_velocity=speeds,

@@ -424,23 +424,25 @@ class ValveModel(PressedShell):
         law = self.contact.law
         return 1.0 + (law.rounding - law.gap_at(self.shell.closing_pressure)) / self.case.valve.initial_gap
 
-    def open_share(self, area: np.ndarray) -> float:
-        """Share of the narrowest of sections (m,), m2, that is open: what faces in contact leave carries no flow."""
+    def is_open(self, area: np.ndarray) -> bool:
+        """True where the narrowest of sections (m,), m2, is wider than what faces in contact leave, which carries no
+        flow.
+        """
         narrowest = int(np.argmin(area))
-        film = self.parting * float(np.broadcast_to(self._film, area.shape)[narrowest])
-        # lips pressed across each other leave a negative section
-        return float(np.clip(1.0 - film / max(area[narrowest], np.finfo(float).tiny), 0.0, 1.0))
+        return self.shell.stress_free is None or bool(area[narrowest] > self.parting * self._film[narrowest])
 
     def seal(self, area: np.ndarray) -> int | None:
         """Last station, from the outlet on, of sections (m,), m2, that faces in contact shut; None where none is."""
-        if self.shell.stress_free is None or self.open_share(area) > 0.0:
+        if self.is_open(area):
             return None
         moulded = self._film <= self.parting * self._film.min()
         return int(max(np.argmin(area), np.flatnonzero(moulded & (area <= self.parting * self._film)).max(initial=0)))
 
     def mass_flow(self, area: np.ndarray, pressure: float) -> float:
         """Steady mass flow of the whole valve, kg/s; none where its faces shut a section."""
+        if not self.is_open(area):
+            return 0.0
         velocity = self.flow.inlet_velocity(area, pressure, self.case.fluid.density)
         density = self.flow.inlet_density(area, pressure, self.case.fluid.density)
         inlet = float(self.mesh.rest_area[-1] - self.mesh.wall_deduction[-1])
-        return self.open_share(area) * self.mesh.part.copies * density * velocity * inlet
+        return self.mesh.part.copies * density * velocity * inlet

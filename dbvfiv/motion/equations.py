@@ -170,7 +170,7 @@ class ValveMotion:
         self.wall = WallMemory(model.shell, branches.strengths, branches.times) if branches else None
         density = self.mu.density
         if not model.flow.unsteady:
-            self.fluid = SteadyFluid(model.flow, density)
+            self.fluid = SteadyFluid(model.flow, density, model.seal)
         else:
             self.fluid = (FrozenFluid if staggered else MovingFluid)(model.flow, density, model.seal)
         self.size = model.size

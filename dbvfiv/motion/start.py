@@ -45,7 +45,7 @@ def first_state(
     """
     model, transient = motion.model, case.transient
     if transient.start == "rest":
-        return consistent_state(motion, 0.0, model.rest(), model.rest(), inlet), None
+        return consistent_state(motion, 0.0, model.rest(), np.zeros(model.size), inlet), None
     observer.progress(f"steady state at {inlet:.6g} Pa")
     q = steady_positions(model, inlet, SteadyOptions.of(case))
     inner = steady_fluid(motion, q, inlet)

@@ -57,18 +57,13 @@ class _CaseOfStudies(PhysicsCase):
 
     @model_validator(mode="after")
     def _steps_take_what_is_upstream(self) -> Self:
-        if self.has_waves and self.transient.coupling == "staggered":
-            raise BrokenRule(
-                "transient.coupling",
-                "'staggered' with an elastic line (upstream.wave_speed)",
-                "it must be 'monolithic' there, or the column rigid",
-            )
-        if self.is_compressed and self.transient.coupling == "staggered":
-            raise BrokenRule(
-                "transient.coupling",
-                "'staggered' with a fluid that is compressed (fluid.sound_speed)",
-                "it must be 'monolithic' there",
-            )
+        for there, words in (
+            (self.has_waves, "an elastic line (upstream.wave_speed)"),
+            (self.is_compressed, "a fluid that is compressed (fluid.sound_speed)"),
+            (not self.fluid.unsteady, "fluid.unsteady = false, which leaves no order to choose"),
+        ):
+            if there and self.transient.coupling == "staggered":
+                raise BrokenRule("transient.coupling", f"'staggered' with {words}", "it must be 'monolithic' there")
         given = "pressures" if self.has_pump and self.transient.drive_table is not None else ""
         if given or (self.has_pump and self.transient.ramp > 0):
             raise BrokenRule(
@@ -300,6 +295,13 @@ def oddities(case: Case) -> Iterator[str]:
     """Sentences on keys that are allowed and seldom meant: half widths that are whole, degrees that are radians."""
     yield from _sizes_seldom_meant(case)
     yield from _gas(case)
+    behind, around = case.downstream.pipe_diameter, case.outside.pipe_diameter
+    if case.has_tail and case.outside.is_there and around != behind:
+        words = "unbounded" if around is None else f"in a pipe of {1e3 * around:.4g} mm"
+        yield (
+            f"downstream.pipe_diameter is {1e3 * behind:.4g} mm, and the fluid outside the wall is {words}; "
+            "outside.pipe_diameter says in which pipe the valve stands, so give both alike."
+        )
 
 
 def _gas(case: Case) -> Iterator[str]:

@@ -97,6 +97,7 @@ SELDOM_MEANT = [
     (["fluid.density=1", "drive.head=2"], "2 m carry 19.61 Pa"),
     (["valve.flange_radius=12 in"], "a pipe of 609.6 mm before a bill that is 274 mm wide"),
     (["valve.scale=12"], "a bore of 3.34 m"),
+    (["downstream.pipe_diameter=330 mm", "outside.fluid=same"], "the fluid outside the wall is unbounded"),
 ]
 
 

@@ -93,6 +93,15 @@ def test_steady_flow_meets_the_equations():
         assert np.ptp(inner[: 1 + law.line.size // 2]) == 0.0
 
 
+def test_a_line_without_a_flow_has_the_pressure_behind_the_valve():
+    z, area = passage()
+    line = line_of(7.0, 800.0)
+    law = LineChannel(Channel(z, FLOOR, back=1e4), Channel(z, FLOOR, back=1e4, terms=[line.line]), line)
+    inner = MovingFluid(law, DENSITY).steady_inner(area, 0.0)
+    velocity, pressure = np.split(inner, [-(line.size // 2)])
+    assert not velocity.any() and DENSITY * 800.0 * pressure == pytest.approx(np.full(line.size // 2, 1e4))
+
+
 @pytest.mark.slow
 def test_water_hammer():
     """A flow that is stopped raises the pressure by rho c dU at the flange, for 2 L/c, and lowers it as much for the

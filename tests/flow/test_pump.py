@@ -11,6 +11,7 @@ from dbvfiv.case.quantity import GRAVITY
 from dbvfiv.flow import Channel
 from dbvfiv.flow.elastic_line import ElasticLine, LineChannel
 from dbvfiv.flow.law import FlowMotion
+from dbvfiv.flow.stepping import MovingFluid
 from dbvfiv.flow.terms.line import Line
 from dbvfiv.flow.terms.pump import Pump, with_static_lift
 from eigen import CoupledPencil, certified_spectrum, leading_modes
@@ -76,6 +77,24 @@ def test_other_densities_see_the_pressures_of_the_pump():
     root = np.sqrt(DENSITY)
     for name, power in {"A0": 0, "A1": 1, "A2": 2, "B0": 1, "B1": 2, "S0": 1, "S1": 2}.items():
         assert getattr(own, name) == pytest.approx(getattr(unit, name) * root**power, rel=1e-9, abs=1e-6)
+
+
+@pytest.mark.parametrize("speed", [None, 500.0])
+def test_fluid_at_rest_in_front_of_a_seal_has_the_head_of_no_flow(speed):
+    """All of it is the pressure of still fluid, none of it that of moving fluid, which does work on areas alone."""
+    z, area = passage()
+    area[:3] = 1e-6
+    line, pump = Line(7.0, 0.2, 0.02), Pump(FLOWS, HEADS, DENSITY, SUPPLY)
+    law, head = Channel(z, FLOOR, 1.0, terms=[line, pump]), DENSITY * GRAVITY * HEADS[0]
+    inner = np.zeros(1)
+    if speed is not None:
+        law = LineChannel(Channel(z, FLOOR, 1.0), law, ElasticLine(line, speed, 3, pump))
+        inner = np.append(np.zeros(13), np.full(12, head / DENSITY / (line.section(area[-1])[1] * speed)))
+    fluid = MovingFluid(law, DENSITY, lambda area: 2).facing(area, np.zeros(len(z)), SUPPLY)
+    pressure, rest = fluid.law.evaluate(FlowMotion.still(area, inner), {"inlet": SUPPLY, "density": DENSITY})
+    assert abs(head / SUPPLY - 1) > 0.5 and np.abs(rest).max() < 1e-9 * head
+    wanted = pytest.approx(Channel(z, FLOOR).steady_pressure(area, head), abs=1e-5 * head)
+    assert pressure == wanted and fluid.still(area, SUPPLY)[0] == wanted
 
 
 def plug(face: float, steep: float) -> tuple[CoupledPencil, float, float]:

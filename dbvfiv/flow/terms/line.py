@@ -19,7 +19,25 @@ from ..law import FlowParameter
 from ..term import FlowTerm
 
 
-class Line(FlowTerm):
+class _Pipes(FlowTerm):
+    """Head and inertance of pipes in series, whose `parts`, `section`, `length` and `reservoir` a subclass has."""
+
+    def head(self, stream, parameters):
+        inlet, velocity = stream.area[-1], stream.velocity
+        speed = self.section(inlet)[1] * velocity
+        gained = jnp.minimum(speed, 0.0) if self.reservoir else speed
+        stretch, lost = parameters["pipe_length"] / self.length, 0.0
+        for part in self.parts:
+            diameter, ratio = part.section(inlet)
+            lost = lost + part.lost(diameter, stretch * part.length) * ratio**2
+        return 0.5 * (stream.inner[0] ** 2 - gained**2 + lost * velocity * jnp.abs(velocity))
+
+    def momentum(self, stream, parameters):
+        inertance = sum(part.length * part.section(stream.area[-1])[1] for part in self.parts)
+        return parameters["pipe_length"] / self.length * inertance * stream.velocity
+
+
+class Line(_Pipes):
     """A straight pipe in front of the valve.
 
     Parameters
@@ -81,19 +99,8 @@ class Line(FlowTerm):
         diameter, ratio = self.section(inlet)
         return float(0.5 * self.lost(diameter, self.length) * (ratio * velocity) ** 2)
 
-    def head(self, stream, parameters):
-        velocity = stream.inner[0]
-        diameter, ratio = self.section(stream.area[-1])
-        speed = ratio * velocity
-        gained = jnp.minimum(speed, 0.0) if self.reservoir else speed
-        lost = self.lost(diameter, parameters["pipe_length"])
-        return 0.5 * (velocity**2 - gained**2 + lost * speed * jnp.abs(speed))
 
-    def momentum(self, stream, parameters):
-        return parameters["pipe_length"] * self.section(stream.area[-1])[1] * stream.inner[0]
-
-
-class PiecedLine(FlowTerm):
+class PiecedLine(_Pipes):
     """Pipes in series in front of the valve.
 
     Its parameter is the length of all; another one than its own stretches all pieces alike.
@@ -126,21 +133,6 @@ class PiecedLine(FlowTerm):
     def lost_head(self, inlet: float, velocity: float) -> float:
         """Head lost in all pipes, m2/s2; see `Line.lost_head`."""
         return sum(part.lost_head(inlet, velocity) for part in self.parts)
-
-    def head(self, stream, parameters):
-        velocity, inlet = stream.inner[0], stream.area[-1]
-        speed = self.section(inlet)[1] * velocity
-        gained = jnp.minimum(speed, 0.0) if self.reservoir else speed
-        stretch, lost = parameters["pipe_length"] / self.length, 0.0
-        for part in self.parts:
-            diameter, ratio = part.section(inlet)
-            own = ratio * velocity
-            lost = lost + part.lost(diameter, stretch * part.length) * own * jnp.abs(own)
-        return 0.5 * (velocity**2 - gained**2 + lost)
-
-    def momentum(self, stream, parameters):
-        inertance = sum(part.length * part.section(stream.area[-1])[1] for part in self.parts)
-        return parameters["pipe_length"] / self.length * inertance * stream.inner[0]
 
 
 def from_case(case) -> Line | PiecedLine | None:

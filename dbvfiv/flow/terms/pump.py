@@ -94,12 +94,12 @@ class Pump(FlowTerm):
         return self.changed(reference=float(self._head_at(velocity, inlet_area, parameters)))
 
     def head(self, stream, parameters):
-        return -self.gain(stream.inner[0], stream.area[-1], parameters)
+        return -self.gain(stream.velocity, stream.area[-1], parameters)
 
 
 def with_static_lift(law: FlowLaw, area: np.ndarray, inner: np.ndarray, parameters: Mapping[str, float]) -> FlowLaw:
     """A flow law whose pumps have P_0 in a steady flow of given unknowns: a static lift makes up the difference."""
-    velocity = law.far_velocity(inner)
+    velocity = law.far_velocity(inner, parameters)
 
     def lifted(part):
         if isinstance(part, Pump):

@@ -83,11 +83,11 @@ class Tail(FlowTerm):
         return 0.5 * self.loss * speed * abs(speed)
 
     def head(self, stream, parameters):
-        speed = self.speed(stream.area[-1], stream.inner[0])
+        speed = self.speed(stream.area[-1], stream.velocity)
         return self.lost_head(speed) - self.gained(stream.open_area[0], stream.speed[0], speed)
 
     def momentum(self, stream, parameters):
-        return parameters["tail_length"] * self.speed(stream.area[-1], stream.inner[0])
+        return parameters["tail_length"] * self.speed(stream.area[-1], stream.velocity)
 
 
 def from_case(case) -> Tail | None:

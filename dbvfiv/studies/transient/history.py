@@ -100,7 +100,7 @@ def pumped_flow(model: ValveModel, state: MotionState) -> float:
 def supplied_pressure(motion: ValveMotion, state: MotionState, drive: float) -> float:
     """Pressure at the far end, Pa: that of the drive, or of a pump at its flow."""
     pump = motion.model.pump
-    return drive if pump is None or not motion.fluid.moves else pump.pressure(drive, pumped_flow(motion.model, state))
+    return drive if pump is None else pump.pressure(drive, pumped_flow(motion.model, state))
 
 
 def _whole(name: str, words: str, of: Callable[[Instant], Any], units: str = "J") -> Column:

@@ -480,7 +480,7 @@ class Runner:
     def _beyond_pump(self, state: MotionState) -> str:
         """Sentence where the flow has left the pump's table; empty otherwise."""
         pump = self.model.pump
-        if pump is None or not self.motion.fluid.moves:
+        if pump is None:
             return ""
         flow = pumped_flow(self.model, state)
         if pump.holds(flow):
