@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import math
+import os
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from importlib.util import find_spec
@@ -207,16 +208,10 @@ def require_sheet(path: Path) -> None:
         raise CaseError(
             f"{str(path)!r} needs the package openpyxl (pip install 'dbvfiv[report]'); a name in .csv does not."
         )
-    from ...record.files import check_folder
-
     if path.is_dir() or not path.absolute().parent.is_dir():
         raise CaseError(f"{str(path)!r} cannot be written: it is a folder, or its folder does not exist.")
-    try:
-        check_folder(path.absolute().parent)
-        if path.exists():
-            path.open("a").close()
-    except OSError as error:
-        raise CaseError(f"{str(path)!r} cannot be written ({error.strerror}).") from None
+    if not os.access(path if path.exists() else path.absolute().parent, os.W_OK):
+        raise CaseError(f"{str(path)!r} cannot be written: its folder, or a file of that name, may only be read.")
 
 
 def sheet_rows(states: Sequence[Any], units: Units) -> list[list[str | float | None]]:
