@@ -257,6 +257,8 @@ class CertifiedSpectrum:
             return self.certificate.beside(self.spectrum.count_right_of(self.count.line) - self.unstable_count)
         if not self.count.certain:
             return f"{said} {' '.join(self.count.notes)}"
+        if not self.certificate.certain and self.response_error < OPTIONS.trusted:
+            return f"{said} The structure gains energy in motions that the reduced basis behind that count lacks."
         if not self.certificate.certain:
             return f"{said} The reduced basis behind that count is too coarse (error {self.response_error:.2g})."
         return said
@@ -374,7 +376,7 @@ def _judged(pencil, options, search, workspace, spectrum, basis, finer=0, within
     error = None
     if model is not pencil:
         error = response_error(pencil, model, _checks(spectrum, winding, finer, basis), workspace)
-    trusted = winding.certain and (error is None or error < OPTIONS.trusted)
+    trusted = winding.certain and (error is None or (error < OPTIONS.trusted and basis.holds_what_grows(pencil)))
     certificate = Certificate(listed, winding.number, trusted, winding.line, winding.band)
     return CertifiedSpectrum(spectrum, winding, certificate, error), basis
 

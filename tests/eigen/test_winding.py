@@ -147,6 +147,20 @@ def test_large_pencils_by_basis(velocity, storage, density):
     assert result.response_error < 1e-4
 
 
+@pytest.mark.parametrize("gaining", ["K", "C"])
+def test_what_grows_beyond_a_basis_is_not_certified_as_stable(gaining):
+    """The 24 modes nearest to zero know nothing of the last one, which diverges or is driven by its damping."""
+    squares = np.diag(np.arange(1.0, 81.0) ** 2)
+    parts = {"M": np.eye(80), "C": 0.1 * np.eye(80), "K": squares}
+    steady = certified_spectrum(CoupledPencil(**parts), 3, SearchOptions(method="krylov"), dense=30)
+    assert steady.stable and steady.agrees
+    parts[gaining] = parts[gaining].copy()
+    parts[gaining][-1, -1] = -1e6 if gaining == "K" else -5.0
+    found = certified_spectrum(CoupledPencil(**parts), 3, SearchOptions(method="krylov"), dense=30)
+    lacking = gaining == "K" or np.isinf(found.certificate.band)
+    assert found.stable is not True if lacking else 2 * np.pi * found.certificate.band < 80
+
+
 def test_more_unstable_modes_than_asked_for():
     K = np.diag([-1.0, -2.0, -3.0, 4.0])
     result = certified_spectrum(CoupledPencil(M=np.eye(4), C=0.1 * np.eye(4), K=K), 1)
