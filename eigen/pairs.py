@@ -542,7 +542,11 @@ def eigenvalue_derivative(pencil: CoupledPencil, mode: Mode, change: tuple[np.nd
     def along(f, g):
         return np.vdot(mode.left_q, f) + np.vdot(mode.left_u, g)
 
-    below = along(*pencil.apply_derivative(mode.eigenvalue, mode.q, mode.u))
-    if abs(below) == 0.0:
+    x = mode.q, mode.u
+    below = along(*pencil.apply_derivative(mode.eigenvalue, *x))
+    terms = zip((mode.left_q, mode.left_u), pencil.polynomial(None, x), pencil.polynomial(None, None, x))
+    norm = np.linalg.norm
+    size = sum(norm(w) * (norm(damped) + 2 * abs(mode.eigenvalue) * norm(inert)) for w, damped, inert in terms)
+    if abs(below) <= 1e-7 * size:
         raise ValueError("The eigenvalue is defective; it has no derivative.")
     return complex(-along(*change) / below)
