@@ -14,7 +14,7 @@ from .factor import StructureMatrices, Workspace
 from .krylov import KrylovPairs, krylov_pairs
 from .operator import CoupledPencil, real_apply
 from .pairs import SAME, Found, acceptable, all_pairs, newton, normalised
-from .search import leading_modes
+from .search import by_growth, leading_modes
 from .spectrum import PAIRS, SearchOptions, Spectrum, number_right_of
 
 
@@ -172,7 +172,7 @@ def missing_pairs(
 def joined(spectrum: Spectrum, found: Found, line: float) -> Spectrum:
     """The spectrum with further unstable pairs, sorted; as long as was asked for, if not more are unstable."""
     parts = {name: np.concatenate([getattr(one, name) for one in (spectrum, found)], axis=-1) for name in PAIRS}
-    order = np.lexsort((parts["eigenvalues"].imag, -parts["eigenvalues"].real))
+    order = by_growth(parts["eigenvalues"])
     order = order[: max(spectrum.asked, int(np.sum(parts["eigenvalues"].real > line)))]
     real = found.eigenvalues.imag == 0
     notes = []
@@ -242,12 +242,11 @@ class CertifiedSpectrum:
 
     @property
     def stable(self) -> bool | None:
-        """False if any pair listed is unstable, which is proof; True, for the band counted, if both routes agree that
-        there is none; else None.
+        """False if any pair listed is unstable by more than rounding, which is proof; True, for the band counted, if
+        both routes agree that there is none; else None.
         """
-        if self.spectrum.count_right_of(self.count.line):
-            return False
-        return True if self.agrees else None
+        rounding = 1e-9 * np.abs(self.spectrum.eigenvalues).max(initial=0.0)
+        return False if self.spectrum.count_right_of(self.count.line + rounding) else self.certificate.stable
 
     @property
     def statement(self) -> str:

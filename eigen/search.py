@@ -353,7 +353,8 @@ def _result(pencil, found: Found, count, options) -> Spectrum:
     """Sort, cut to the number asked for, and say what is certified."""
     region = found.region
     _, band = leading_band(found, max(count, options.least), options)
-    order = _by_growth(found.eigenvalues, np.flatnonzero(found.eigenvalues.imag <= band * (1 + 1e-12)))
+    inside = np.flatnonzero(found.eigenvalues.imag <= band * (1 + 1e-12))
+    order = inside[by_growth(found.eigenvalues[inside])]
     if options.limit_point is not None:
         order = order[found.eigenvalues.real[order] > CLEAR * options.limit_point]
     order = order[:count]
@@ -413,11 +414,10 @@ def _within(found, options, low) -> str:
     )
 
 
-def _by_growth(values, chosen):
+def by_growth(values):
     """Largest growth rate first; of those that differ by rounding only, as without damping, the lowest frequency."""
-    values = values[chosen]
     unit = 1e-9 * np.abs(values).max(initial=0.0) or 1.0
-    return chosen[np.lexsort((-values.real, values.imag, -np.round(values.real / unit)))]
+    return np.lexsort((-values.real, values.imag, -np.round(values.real / unit)))
 
 
 def _with_left(pencil, spectrum) -> Spectrum:

@@ -4,7 +4,15 @@ import numpy as np
 import pytest
 import scipy.sparse as sp
 
-from eigen import CoupledPencil, Relaxation, SearchOptions, TransferBasis, certified_spectrum, unstable_count
+from eigen import (
+    CoupledPencil,
+    Relaxation,
+    SearchOptions,
+    TransferBasis,
+    certified_spectrum,
+    leading_modes,
+    unstable_count,
+)
 from eigen.certificate import response_error
 from tests.systems.plate_over_channel import plate_over_channel
 from tests.systems.random_pencils import dense_eigenvalues, random_pencil
@@ -171,6 +179,20 @@ def test_undamped_structure_uses_a_line_beside_the_axis():
     pencil = CoupledPencil(M=np.eye(3), C=np.zeros((3, 3)), K=np.diag([1.0, 4.0, 9.0]))
     count = unstable_count(pencil)
     assert count.line > 0 and count.number == 0 and count.certain
+
+
+def test_rounding_is_no_proof_of_instability():
+    """Gyroscopic forces alone leave all eigenvalues on the axis, a free chain one at zero."""
+    gyroscopic = CoupledPencil(M=np.eye(2), C=[[0.0, 2.0], [-2.0, 0.0]], K=np.diag([1.0, 2.0]))
+    found = certified_spectrum(gyroscopic, 2)
+    assert found.stable and found.count.line > 0 and found.count.certain and found.count.number == 0
+    for n in (4, 5, 6, 8, 10):
+        stiffness = 2 * np.eye(n) - np.eye(n, k=1) - np.eye(n, k=-1)
+        stiffness[0, 0] = stiffness[-1, -1] = 1.0
+        chain = CoupledPencil(M=np.eye(n), C=0.1 * np.eye(n), K=stiffness)
+        assert certified_spectrum(chain, 2).stable is None
+        modes = leading_modes(chain, 3, SearchOptions(method="krylov", shifts=(0.5, 0.8)))
+        assert np.sum(np.abs(modes.eigenvalues) < 1e-9) == 1
 
 
 def test_an_eigenvalue_on_the_line_is_uncertain():
