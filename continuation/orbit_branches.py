@@ -52,6 +52,9 @@ from continuation.options import (
 from continuation.periodic import PeriodicMotion, peak
 from continuation.tracer import as_observers, notify, run_observed
 
+#: Share of the largest motion, and of its own mean, below which the size of an unknown does not go in its series.
+LITTLE_MOVED = 1e-6
+
 
 class OrbitSolver(CycleSolver):
     """Corrector of periodic orbits of a `System`, whose linear equations are solved directly."""
@@ -70,6 +73,14 @@ class OrbitSolver(CycleSolver):
     def sizes(self, motion: PeriodicMotion) -> np.ndarray:
         """(n,) sizes that changes of a motion are measured in."""
         return self.system.sizes(motion)
+
+    def tail(self, motion: PeriodicMotion) -> float:
+        """Share of the last two harmonics in a motion, its unknowns by how far each moves."""
+        c = motion.coefficients
+        moved = np.linalg.norm(c[1:], axis=0)
+        least = LITTLE_MOVED * np.maximum(moved.max(), np.abs(c[0]))  # what moves less is near rounding
+        size = np.maximum(moved, least)
+        return replace(motion, coefficients=c / np.where(size > 0, size, 1.0)).tail
 
     def learn(self, rows: np.ndarray) -> np.ndarray:
         """Nothing: there is no basis to extend."""
