@@ -357,15 +357,17 @@ def resume(
     if not isinstance(branch, Branch):
         raise TypeError(f"A Branch is resumed, not {shown(branch)}.")
     if branch.kind == "equilibria":
-        tracer = branch_tracer(system, branch.fixed, branch.names[0], options, events, spectrum, observers)
+        tracer = branch_tracer(system, branch.mu(-1), branch.names[0], options, events, spectrum, observers)
         return tracer.resume(branch)
     if branch.kind in STARTS:
-        borders = branch.restart["p"], branch.restart["q"]
+        borders, omega = (branch.restart["p"], branch.restart["q"]), 0.0
+        if branch.extra_names:
+            omega = branch.values("omega")[0]
         return curve_tracer(
-            system, branch.kind, branch.fixed, branch.names, borders, options, observers, spectrum, lyapunov
+            system, branch.kind, branch.mu(-1), branch.names, borders, options, observers, spectrum, lyapunov, omega
         ).resume(branch)
     require(len(branch) > 1, "A branch of orbits goes on from two points at least.")
-    follower = _Follower(system, branch.names[0], options, discretisation, branch.fixed)
+    follower = _Follower(system, branch.names[0], options, discretisation, branch.mu(-1))
     follower.restore(branch)
     step = float(np.clip(branch.next_step or follower.options.step, *follower.step_limits))
     # an interruption may have met a special point before the orbit behind it
