@@ -49,6 +49,8 @@ def locate_bogdanov_takens(tracer, z, v, w, tangent, index) -> SpecialPoint:
 class FoldCurveMonitor(Monitor):
     """Cusps (quadratic coefficient zero) and Bogdanov-Takens points (``w' B v`` zero)."""
 
+    kinds = ("cusp", "bogdanov-takens")
+
     def measure(self, tracer, point):
         value = point.local.condition
         system = tracer.problem.system
@@ -99,6 +101,7 @@ class HopfCurveMonitor(Monitor):
 
     def __init__(self, lyapunov=True):
         self.lyapunov = lyapunov
+        self.kinds = ("bogdanov-takens", "zero-hopf", *["generalised hopf"] * lyapunov)
 
     def measure(self, tracer, point):
         value, problem = point.local.condition, tracer.problem

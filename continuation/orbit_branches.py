@@ -25,6 +25,7 @@ from continuation.checks import (
     numbers_of,
     options_of,
     parameters_of,
+    require_kinds,
     require_names,
     shown,
     special_of,
@@ -32,7 +33,7 @@ from continuation.checks import (
 )
 from continuation.curves import STARTS, curve_tracer
 from continuation.cycle_branch import CycleTracer
-from continuation.cycle_points import TORUS, CyclePoint, SpecialCycle
+from continuation.cycle_points import BRANCH_POINT, DOUBLING, TORUS, CyclePoint, SpecialCycle
 from continuation.cycles import Cycle, CycleSolver, cycles_beside_onset
 from continuation.first_order import DirectLinearisation, FirstOrderSystem
 from continuation.harmonics import Harmonics
@@ -410,6 +411,7 @@ class _Follower:
         self.options, self.shape = options_of(ContinuationOptions, options), options_of(OrbitOptions, discretisation)
         options, n = self.options, system_of(system).size
         require_names(options, mu, (parameter,))
+        require_kinds(options, {"fold of cycles", *[BRANCH_POINT, DOUBLING, TORUS] * bool(self.shape.exponents)})
         self.branch = Branch("orbits", 0, (parameter,), (), {name: float(value) for name, value in mu.items()})
         self.step_limits = options.min_step, options.max_step
         unit = (options.state_scale or 1.0) * np.sqrt(n)
