@@ -400,7 +400,7 @@ def _result(pencil, found: Found, count, options) -> Spectrum:
         rejected=found.rejected,
         notes=tuple(notes),
     )
-    return _with_left(pencil, spectrum) if options.left else spectrum
+    return with_left(pencil, spectrum) if options.left else spectrum
 
 
 def _within(found, options, low) -> str:
@@ -420,7 +420,7 @@ def by_growth(values):
     return np.lexsort((-values.real, values.imag, -np.round(values.real / unit)))
 
 
-def _with_left(pencil, spectrum) -> Spectrum:
+def with_left(pencil, spectrum) -> Spectrum:
     """The spectrum with its left vectors scaled."""
     vectors = spectrum.q, spectrum.u, spectrum.left_q, spectrum.left_u
     w, W, error, defective = biorthogonalise(pencil, spectrum.eigenvalues, *vectors)

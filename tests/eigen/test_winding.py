@@ -165,6 +165,8 @@ def test_what_grows_beyond_a_basis_is_not_certified_as_stable(gaining):
     parts[gaining] = parts[gaining].copy()
     parts[gaining][-1, -1] = -1e6 if gaining == "K" else -5.0
     found = certified_spectrum(CoupledPencil(**parts), 3, SearchOptions(method="krylov"), dense=30)
+    whole = certified_spectrum(CoupledPencil(**parts), 3, SearchOptions(method="krylov", left=True))
+    assert whole.stable is False and whole.agrees and whole.spectrum.biorthogonality < 1e-6
     lacking = gaining == "K" or np.isinf(found.certificate.band)
     assert found.stable is not True if lacking else 2 * np.pi * found.certificate.band < 80
 
