@@ -314,8 +314,9 @@ def _write(file, branch: Branch) -> None:
         row[: point.eigenvalues.size] = point.eigenvalues
     file["eigenvalues"] = padded
     tests = file.create_group("tests")
-    for name in sorted({name for p in points for name in p.tests}):
-        tests[name] = np.array([p.tests.get(name, np.nan) for p in points])
+    for number, name in enumerate(sorted({name for p in points for name in p.tests})):
+        item = tests.create_dataset(str(number), data=np.array([p.tests.get(name, np.nan) for p in points]))
+        item.attrs["name"] = name  # an event's own may hold a slash
     for name, array in branch.restart.items():
         file[f"restart/{name}"] = array
     group = file.create_group("special")
@@ -331,7 +332,7 @@ def _write(file, branch: Branch) -> None:
 
 def _read_points(file) -> list[CurvePoint]:
     columns = {name: file[name][()] for name in _NUMBERS}
-    tests = {name: item[()] for name, item in file["tests"].items()}
+    tests = {item.attrs.get("name", key): item[()] for key, item in file["tests"].items()}
     points = []
     for i, values in enumerate(file["eigenvalues"][()]):
         own = {name: column[i] if column.ndim > 1 else column[i].item() for name, column in columns.items()}

@@ -21,6 +21,8 @@ class BranchPointMonitor(Monitor):
     and a zero within one step hide each other: then only a spectrum tells.
     """
 
+    kinds = ("branch point",)
+
     def __init__(self):
         self._b = self._c = None
 

@@ -26,7 +26,7 @@ from continuation.tracer import SHRINK, Tracer
 def branch_tracer(system, mu, parameter, options, events=(), spectrum=None, observers=None):
     """The tracer of a branch with the monitors the options ask for."""
     options, mu, events = options_of(ContinuationOptions, options), parameters_of(mu), events_of(events)
-    require_names(options, mu, (parameter,), events)
+    require_names(options, mu, (parameter,))
     system_of(system)
     problem = Problem(system, mu, (parameter,), None, options.state_scale, options.units([parameter]))
     monitors: list = []

@@ -73,18 +73,22 @@ def spectrum_of(spectrum):
     return spectrum
 
 
-def require_names(options, mu: Mapping[str, float], freed=(), events=()) -> None:
-    """Refuse options that name no parameter or kind, and a start outside the limits of the freed parameters."""
+def require_names(options, mu: Mapping[str, float], freed=()) -> None:
+    """Refuse options that name no parameter, and a start outside the limits of the freed parameters."""
     for name in (*freed, *options.limits, *options.parameter_scales):
         if name not in mu:
             raise NotAParameter.named(name, mu)
-    kinds = {*KINDS, *(event.name for event in events)}
-    for kind in options.stop_at:
-        require(kind in kinds, f"A branch cannot stop at {kind!r}, only at: {', '.join(sorted(kinds))}.")
     for name in freed:
         low, high = options.limits.get(name, (-np.inf, np.inf))
         outside = mu[name] < low or mu[name] > high
         require(not outside, f"The start {name} = {mu[name]:g} is outside its limits {low:g} to {high:g}.")
+
+
+def require_kinds(options, kinds) -> None:
+    """Refuse a kind of special points to stop at that a run with these options does not look for."""
+    for kind in options.stop_at:
+        known = ", ".join(sorted(kinds)) or "nothing"
+        require(kind in kinds, f"This branch cannot stop at {kind!r}; it looks for: {known}.")
 
 
 def events_of(events) -> tuple:
@@ -93,4 +97,5 @@ def events_of(events) -> tuple:
     for event in events:
         if not callable(getattr(event, "function", None)):
             raise TypeError(f"Events are given as Event(name, function), not as {shown(event)}.")
+        require(event.name not in KINDS, f"An event needs a name of its own, not {event.name!r}.")
     return events

@@ -49,6 +49,8 @@ def locate_bogdanov_takens(tracer, z, v, w, tangent, index) -> SpecialPoint:
 class FoldCurveMonitor(Monitor):
     """Cusps (quadratic coefficient zero) and Bogdanov-Takens points (``w' B v`` zero)."""
 
+    kinds = ("cusp", "bogdanov-takens")
+
     def measure(self, tracer, point):
         value = point.local.condition
         system = tracer.problem.system
@@ -99,6 +101,7 @@ class HopfCurveMonitor(Monitor):
 
     def __init__(self, lyapunov=True):
         self.lyapunov = lyapunov
+        self.kinds = ("bogdanov-takens", "zero-hopf", *["generalised hopf"] * lyapunov)
 
     def measure(self, tracer, point):
         value, problem = point.local.condition, tracer.problem
@@ -263,8 +266,8 @@ def continue_hopf(
     return _continue(system, "hopf curve", special, parameters, options, observers, spectrum, lyapunov)
 
 
-def curve_tracer(system, kind, mu, parameters, borders, options, observers, spectrum, lyapunov=True):
-    """Tracer of a fold or Hopf curve with the left and right vectors from which it starts."""
+def curve_tracer(system, kind, mu, parameters, borders, options, observers, spectrum, lyapunov=True, omega=0.0):
+    """Tracer of a fold or Hopf curve with the left and right vectors, and the frequency, from which it starts."""
     options = options_of(ContinuationOptions, options)
     if isinstance(parameters, str) or len(set(parameters)) != 2:
         raise ValueError(f"A curve needs two different parameters, not {shown(parameters)}.")
@@ -272,7 +275,7 @@ def curve_tracer(system, kind, mu, parameters, borders, options, observers, spec
     system_of(system)
     fold = kind == "fold curve"
     condition = (FoldCondition if fold else HopfCondition)(*borders)
-    problem = Problem(system, mu, parameters, condition, options.state_scale, options.units(parameters))
+    problem = Problem(system, mu, parameters, condition, options.state_scale, options.units(parameters), omega or 1.0)
     monitors = [FoldCurveMonitor() if fold else HopfCurveMonitor(lyapunov)]
     return Tracer(
         problem, options, monitors + [CountMonitor(spectrum_of(spectrum))] * bool(options.eigenvalues), observers
@@ -287,9 +290,10 @@ def _continue(system, kind, special, parameters, options, observers, spectrum, l
             f"A {kind} starts at a located point of kind {', '.join(STARTS[kind])}; this is {special!r}."
         )
     borders = special.vectors["left"], special.vectors["right"]
-    tracer = curve_tracer(system, kind, special.mu, parameters, borders, options, observers, spectrum, lyapunov)
+    omega = special.values.get("omega", 0.0)
+    tracer = curve_tracer(system, kind, special.mu, parameters, borders, options, observers, spectrum, lyapunov, omega)
     problem = tracer.problem
-    extra = [special.values["omega"]] if problem.e else []
+    extra = [omega] if problem.e else []
     n = problem.n
     z = problem.pack(special.u, special.mu, extra)
     frame = None

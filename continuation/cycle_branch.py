@@ -319,7 +319,7 @@ class CycleTracer:
         """Series of the next motion: longer where the last one nearly needed it."""
         last, options = self.points[-1].motion, self.shape
         longer = min(last.harmonics.count + 2, options.max_harmonics)
-        return Harmonics(longer) if last.tail > 0.4 * options.tail else last.harmonics
+        return Harmonics(longer) if self.solver.tail(last) > 0.4 * options.tail else last.harmonics
 
     def _plane(self, start: Cycle, end: Cycle, through: Cycle) -> Condition:
         """Normal to the way of coefficients and of the parameter between two cycles, through a third."""

@@ -150,11 +150,12 @@ class CycleSolver:
             cycle = self.solve(guess, mu, free, conditions)
             if np.linalg.norm(cycle.motion.coefficients[1:]) <= least:
                 raise NotConverged("The guess shrank to an equilibrium.", Reason.REST, cycle)
-            if cycle.motion.tail <= shape.tail:
+            share = self.tail(cycle.motion)
+            if share <= shape.tail:
                 return cycle
-            count = min(cycle.motion.harmonics_for(shape.tail), shape.max_harmonics)
+            count = min(cycle.motion.harmonics_for(shape.tail, share), shape.max_harmonics)
             if count <= cycle.motion.harmonics.count:
-                said = Reason.HARMONICS(count=shape.max_harmonics, share=cycle.motion.tail)
+                said = Reason.HARMONICS(count=shape.max_harmonics, share=share)
                 raise NotConverged(said, said.kind)
             guess, mu = cycle.motion.resized(count), cycle.mu
             conditions = tuple(Condition(guess.harmonics.resized(c.row), c.extra, c.value) for c in conditions)
@@ -179,6 +180,10 @@ class CycleSolver:
     def sizes(self, motion: PeriodicMotion) -> np.ndarray:
         """(n,) sizes that changes of a motion are measured in."""
         return self.system.scales
+
+    def tail(self, motion: PeriodicMotion) -> float:
+        """Share of the last two harmonics in a motion."""
+        return motion.tail
 
     def _size(self, change: np.ndarray, motion: PeriodicMotion) -> float:
         c, scale = motion.coefficients, self.sizes(motion)

@@ -132,6 +132,8 @@ def locate_zero(tracer, before, after, indicator, attempt):
 class FoldMonitor(Monitor):
     """Folds: the parameter's part of the tangent changes sign."""
 
+    kinds = ("fold",)
+
     def measure(self, tracer, point):
         point.tests["fold"] = float(point.tangent[tracer.problem.n])
 
@@ -212,7 +214,7 @@ class EventMonitor(Monitor):
     """Sign changes of an `Event`."""
 
     def __init__(self, event: Event):
-        self.event = event
+        self.event, self.kinds = event, (event.name,)
 
     def measure(self, tracer, point):
         value = self.event.function(tracer.problem.u(point.z), tracer.problem.mu(point.z))

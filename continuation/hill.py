@@ -17,8 +17,8 @@ from continuation.harmonics import Harmonics
 from continuation.linear import SYMMETRIC, factorise, product
 from continuation.periodic import by_parts
 
-#: Shifts: distance right of the axis, and how far up the band of exponents, both over omega.
-_RIGHT, _UP = 0.1, (0.0, 0.25, 0.5)
+#: Shifts: distance right of the axis, no round number as exponents may be, and how far up the band, both over omega.
+_RIGHT, _UP = 0.1037, (0.0, 0.25, 0.5)
 #: Steps of an Arnoldi iteration after which its eigenvalues are looked at.
 _STEPS = 60
 #: Least radius about the real shift, over omega, in which all eigenvalues are found: with turns of those whose series
@@ -40,8 +40,9 @@ _CLOSED = 1e-4
 _ALIKE = 0.02
 #: Distance over omega of the exponent of the shift in time from zero up to which exponents are trusted.
 _TRUSTED = 0.05
-#: Distance past half the frequency that the imaginary part of a real negative multiplier may come out, over omega.
-_EDGE = 1e-4
+#: Distance from half the frequency, and from zero, at which the imaginary part of a real multiplier may come out, over
+#: omega; share of a perturbation that others of one exponent lack where it is another one.
+_EDGE, _REAL, _APART = 1e-4, 1e-6, 1e-3
 
 
 @dataclass(frozen=True, eq=False)
@@ -99,8 +100,8 @@ class Exponents:
     @property
     def dimensions(self) -> np.ndarray:
         """(k,) dimensions of the perturbations: 1 where the multiplier is real, 2 of a pair."""
-        high, near = self.values.imag, 1e-3 * self.omega
-        return np.where((np.abs(high) < near) | (np.abs(high - 0.5 * self.omega) < near), 1, 2)
+        high = np.abs(self.values.imag) / self.omega
+        return np.where((high <= _REAL) | (np.abs(high - 0.5) <= _EDGE), 1, 2)
 
     @property
     def stable(self) -> bool:
@@ -200,21 +201,30 @@ def _refined(linear, sigma: complex, x: np.ndarray) -> tuple[complex, np.ndarray
     return complex(np.nan, np.nan), x
 
 
-def _each_once(pairs, inside, omega: float) -> list[tuple[complex, np.ndarray]]:
+def _each_once(pairs, inside, h: Harmonics, omega: float) -> list[tuple[complex, complex, np.ndarray]]:
     """Perturbations with imaginary parts from 0 to omega / 2, each once.
 
     All turns of an exponent by whole frequencies are eigenvalues, but for what the series cuts off. Those in the band
-    come first and are taken. Others are turned into it where nothing like them is known there: a perturbation that is
-    faster than the motion needs fewer harmonics as it is, and its vector stays so.
+    come first and are taken, of a multiple one as many as are independent. Others are turned into it where nothing like
+    them is known there: a perturbation that is faster than the motion needs fewer harmonics as it is, and its vector
+    stays so.
     """
     found: list[tuple[complex, complex, np.ndarray]] = []
+    turned: list[np.ndarray] = []  # what they are as functions of time with their exponents within the band
     for sigma, x in pairs:
-        folded = sigma - 1j * omega * np.round(sigma.imag / omega)
-        if folded.imag < 0:
-            folded, sigma, x = np.conj(folded), np.conj(sigma), x.conj()
+        turn = np.round(sigma.imag / omega)
+        folded = sigma - 1j * omega * turn
+        motion = (h.evaluate(x) * np.exp(2j * np.pi * turn * np.arange(h.samples) / h.samples)[:, None]).ravel()
+        if folded.imag < -_REAL * omega:
+            folded, sigma, x, motion = np.conj(folded), np.conj(sigma), x.conj(), motion.conj()
         near = 1e-6 if inside(sigma) else _ALIKE
-        if all(abs(folded - other) > near * omega for other, _, _ in found):
+        alike = [other for (place, _, _), other in zip(found, turned) if abs(folded - place) <= near * omega]
+        if alike and inside(sigma):
+            space = la.orth(np.stack(alike, axis=1))
+            new = np.linalg.norm(motion - space @ (space.conj().T @ motion)) > _APART * np.linalg.norm(motion)
+        if not alike or (inside(sigma) and new):
             found.append((complex(folded), complex(sigma), x))
+            turned.append(motion)
     return found
 
 
@@ -261,7 +271,7 @@ def _perturbations(reduced, pairs) -> list[tuple[complex, complex, np.ndarray]]:
     inside = lambda sigma: abs(sigma.imag) <= (0.5 + _EDGE) * omega  # noqa: E731
     shaped = ((sigma, reduced.shaped(x)) for sigma, x in pairs)
     kept = [(s, x) for s, x in shaped if _is_whole(h, x) and (inside(s) or _cut_off(reduced, s, x) <= _CLOSED)]
-    found = _each_once(sorted(kept, key=lambda pair: not inside(pair[0])), inside, omega)
+    found = _each_once(sorted(kept, key=lambda pair: not inside(pair[0])), inside, h, omega)
     return sorted(found, key=lambda one: -one[0].real)
 
 
@@ -288,10 +298,11 @@ def _nearest(parts, shift: complex, most: int = 3 * _STEPS):
 
 def _arnoldi(apply, size: int, dtype, most: int):
     """Ritz pairs of the largest eigenvalues that have converged, and the size of the largest that has not (zero where
-    the space is exhausted), every so many steps.
+    the space is exhausted), every so many steps; of a small space at its end. Where an invariant space is complete
+    another one begins: it may hold more vectors of the same eigenvalues.
     """
-    basis = np.zeros((size, 1), dtype)
-    start = np.random.default_rng(0).standard_normal(size)
+    basis, rng = np.zeros((size, 1), dtype), np.random.default_rng(0)
+    start = rng.standard_normal(size)
     basis[:, 0] = start / np.linalg.norm(start)
     h = np.zeros((most + 1, most), dtype)
     for k in range(min(most, size)):
@@ -302,15 +313,19 @@ def _arnoldi(apply, size: int, dtype, most: int):
             part = basis[:, : k + 1].conj().T @ w
             h[: k + 1, k] += part
             w = w - basis[:, : k + 1] @ part
-        h[k + 1, k] = np.linalg.norm(w)
-        done, last = k + 1, abs(h[k + 1, k])
-        ended = last <= 1e-13 * np.abs(h[: k + 2, : k + 1]).max() or done == size
-        if ended or done % _STEPS == 0:
+        done, last = k + 1, np.linalg.norm(w)
+        if last <= 1e-13 * np.abs(h[: k + 1, : k + 1]).max() or done == size:
+            last, w = 0.0, rng.standard_normal(size)
+            for _ in range(2):
+                w = w - basis[:, :done] @ (basis[:, :done].conj().T @ w)
+        h[done, k] = last
+        if done == size or (done % _STEPS == 0 and size > most):
             values, vectors = np.linalg.eig(h[:done, :done])
-            good = (last * np.abs(vectors[-1]) <= 1e-9 * np.abs(values)) & (values != 0)
-            rest = 0.0 if ended else np.abs(values[~good]).max(initial=0.0)
+            size_of = np.abs(values)
+            good = (last * np.abs(vectors[-1]) <= 1e-9 * size_of) & (size_of > 1e-12 * size_of.max())
+            rest = (np.abs(values[~good]).max(initial=0.0) if last else np.inf) if done < size else 0.0
             shapes = basis[:, :done] @ vectors[:, good]
             yield list(zip(values[good].astype(complex), shapes.T)), rest, done
-        if ended:
+        if done == size:
             return
-        basis[:, k + 1] = w / last
+        basis[:, done] = w / np.linalg.norm(w)

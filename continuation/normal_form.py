@@ -89,12 +89,12 @@ class HopfNormalForm:
         Parameters
         ----------
         functional : ndarray, shape (n,), optional
-            The observed quantity ``functional . u``; without it ``2 |q| = 2`` stands for the
-            largest norm over a cycle of a circular motion.
+            The observed quantity ``functional . u``; without it the largest norm over a cycle.
         """
         if self.crossing is None:
             raise ValueError("The crossing speed is unknown: name a parameter.")
-        gain = 2.0 if functional is None else 2.0 * abs(functional @ self.q)
+        largest = np.sqrt(2.0 * (1.0 + abs(self.q @ self.q)))  # of 2 Re(z q) over |z|
+        gain = largest if functional is None else 2.0 * abs(functional @ self.q)
         if self.criticality == "degenerate":
             return float("inf")
         return float(gain * np.sqrt(abs(self.crossing.real / self.c1.real)))

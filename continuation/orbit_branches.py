@@ -25,6 +25,7 @@ from continuation.checks import (
     numbers_of,
     options_of,
     parameters_of,
+    require_kinds,
     require_names,
     shown,
     special_of,
@@ -32,7 +33,7 @@ from continuation.checks import (
 )
 from continuation.curves import STARTS, curve_tracer
 from continuation.cycle_branch import CycleTracer
-from continuation.cycle_points import TORUS, CyclePoint, SpecialCycle
+from continuation.cycle_points import BRANCH_POINT, DOUBLING, TORUS, CyclePoint, SpecialCycle
 from continuation.cycles import Cycle, CycleSolver, cycles_beside_onset
 from continuation.first_order import DirectLinearisation, FirstOrderSystem
 from continuation.harmonics import Harmonics
@@ -52,6 +53,9 @@ from continuation.options import (
 from continuation.periodic import PeriodicMotion, peak
 from continuation.tracer import as_observers, notify, run_observed
 
+#: Share of the largest motion, and of its own mean, below which the size of an unknown does not go in its series.
+LITTLE_MOVED = 1e-6
+
 
 class OrbitSolver(CycleSolver):
     """Corrector of periodic orbits of a `System`, whose linear equations are solved directly."""
@@ -70,6 +74,14 @@ class OrbitSolver(CycleSolver):
     def sizes(self, motion: PeriodicMotion) -> np.ndarray:
         """(n,) sizes that changes of a motion are measured in."""
         return self.system.sizes(motion)
+
+    def tail(self, motion: PeriodicMotion) -> float:
+        """Share of the last two harmonics in a motion, its unknowns by how far each moves."""
+        c = motion.coefficients
+        moved = np.linalg.norm(c[1:], axis=0)
+        least = LITTLE_MOVED * np.maximum(moved.max(), np.abs(c[0]))  # what moves less is near rounding
+        size = np.maximum(moved, least)
+        return replace(motion, coefficients=c / np.where(size > 0, size, 1.0)).tail
 
     def learn(self, rows: np.ndarray) -> np.ndarray:
         """Nothing: there is no basis to extend."""
@@ -346,15 +358,17 @@ def resume(
     if not isinstance(branch, Branch):
         raise TypeError(f"A Branch is resumed, not {shown(branch)}.")
     if branch.kind == "equilibria":
-        tracer = branch_tracer(system, branch.fixed, branch.names[0], options, events, spectrum, observers)
+        tracer = branch_tracer(system, branch.mu(-1), branch.names[0], options, events, spectrum, observers)
         return tracer.resume(branch)
     if branch.kind in STARTS:
-        borders = branch.restart["p"], branch.restart["q"]
+        borders, omega = (branch.restart["p"], branch.restart["q"]), 0.0
+        if branch.extra_names:
+            omega = branch.values("omega")[0]
         return curve_tracer(
-            system, branch.kind, branch.fixed, branch.names, borders, options, observers, spectrum, lyapunov
+            system, branch.kind, branch.mu(-1), branch.names, borders, options, observers, spectrum, lyapunov, omega
         ).resume(branch)
     require(len(branch) > 1, "A branch of orbits goes on from two points at least.")
-    follower = _Follower(system, branch.names[0], options, discretisation, branch.fixed)
+    follower = _Follower(system, branch.names[0], options, discretisation, branch.mu(-1))
     follower.restore(branch)
     step = float(np.clip(branch.next_step or follower.options.step, *follower.step_limits))
     # an interruption may have met a special point before the orbit behind it
@@ -397,6 +411,7 @@ class _Follower:
         self.options, self.shape = options_of(ContinuationOptions, options), options_of(OrbitOptions, discretisation)
         options, n = self.options, system_of(system).size
         require_names(options, mu, (parameter,))
+        require_kinds(options, {"fold of cycles", *[BRANCH_POINT, DOUBLING, TORUS] * bool(self.shape.exponents)})
         self.branch = Branch("orbits", 0, (parameter,), (), {name: float(value) for name, value in mu.items()})
         self.step_limits = options.min_step, options.max_step
         unit = (options.state_scale or 1.0) * np.sqrt(n)

@@ -92,10 +92,10 @@ class PeriodicMotion:
         whole = np.linalg.norm(c[1:])
         return float(np.linalg.norm(c[-4:] if len(c) > 5 else c[-2:]) / whole) if whole else 0.0
 
-    def harmonics_for(self, tail: float) -> int:
+    def harmonics_for(self, tail: float, now: float) -> int:
         """Harmonics with which the last two are expected to have a share, by the mean decay; at least two more."""
         count = self.harmonics.count
-        wanted = count * np.log(tail) / np.log(min(max(self.tail, 1e-300), 0.5))
+        wanted = count * np.log(tail) / np.log(min(max(now, 1e-300), 0.5))
         return int(min(max(np.ceil(wanted), count + 2), count + max(count // 2, 2)))
 
 

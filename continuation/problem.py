@@ -36,9 +36,11 @@ class Problem:
         See `continuation.conditions`.
     state_scale, parameter_scales
         Units of the arclength, see `ContinuationOptions`.
+    extra_scale : float
+        That of the extra numbers.
     """
 
-    def __init__(self, system, mu, names, condition=None, state_scale=None, parameter_scales=None):
+    def __init__(self, system, mu, names, condition=None, state_scale=None, parameter_scales=None, extra_scale=1.0):
         self.system = system
         self.fixed = {name: float(value) for name, value in mu.items()}
         self.names = tuple(names)
@@ -57,7 +59,8 @@ class Problem:
         self.grows = state_scale is None and own is None
         self.state_scale = state_scale = state_scale or 1.0
         self.parameter_scale = np.array([scales.get(name, 1.0) for name in self.names])
-        self.weights = np.concatenate([weights / state_scale**2, parameter, np.ones(self.e)])
+        self.extra_scale = extra_scale
+        self.weights = np.concatenate([weights / state_scale**2, parameter, np.full(self.e, extra_scale**-2.0)])
 
     def rescale(self, state_scale: float) -> None:
         """Measure the state in another unit."""
@@ -262,7 +265,7 @@ def correct(problem, z, frame, newton, normal=None, step_tolerance=1e-8) -> Corr
         last = max(
             _relative(problem.u(step), problem.u(z), problem.state_scale),
             _relative(problem.p(step), problem.p(z), problem.parameter_scale),
-            _relative(problem.extra(step), problem.extra(z), 1.0),
+            _relative(problem.extra(step), problem.extra(z), problem.extra_scale),
         )
         z = z + step
     return Correction(z, None, Reason.ITERATIONS(), iteration, size)

@@ -68,6 +68,8 @@ class SpectrumMonitor(Monitor):
         ``(u, mu, count, near) -> Spectrum``; the system's own by default.
     """
 
+    kinds = ("hopf", "zero eigenvalue", "stability change")
+
     def __init__(self, spectrum=None):
         self._spectrum = spectrum
         self._past = None
@@ -279,6 +281,8 @@ class CountMonitor(SpectrumMonitor):
     The count tells whether the bifurcation is the first loss of stability: 0 on the
     boundary of the stable region.
     """
+
+    kinds = ()
 
     def measure(self, tracer, point):
         values, _ = self.modes(tracer, point)

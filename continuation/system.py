@@ -36,6 +36,8 @@ class System:
     identity_mass: bool = False
     #: Relative step for the central differences in parameters.
     parameter_step: float = 6e-6
+    #: Sizes of parameters that are not of order one, by name: steps are a share of them where a value is small.
+    parameter_sizes: Mapping[str, float] = {}
 
     def __repr__(self) -> str:
         return f"<{type(self).__name__}: {self.size} unknowns>"
@@ -48,17 +50,17 @@ class System:
         """Linearisation at a state."""
         raise NotImplementedError(f"{type(self).__name__} has no linearisation.")
 
-    def _sides(self, mu: Parameters, name: str):
+    def _slope(self, function, mu: Parameters, name: str, step: float = 0.0, least: float = 1e-3):
+        """Central difference of a function of the parameters."""
         if name not in mu:
             raise NotAParameter.named(name, mu)
-        h = self.parameter_step * max(1e-3, abs(mu[name]))
+        h = (step or self.parameter_step) * max(least * self.parameter_sizes.get(name, 1.0), abs(mu[name]))
         up, down = mu[name] + h, mu[name] - h
-        return {**mu, name: up}, {**mu, name: down}, up - down
+        return (function({**mu, name: up}) - function({**mu, name: down})) / (up - down)
 
     def d_parameter(self, u, mu, name):
         """``dF/dmu_name``, shape (n,)."""
-        up, down, width = self._sides(mu, name)
-        return (self.residual(u, up) - self.residual(u, down)) / width
+        return self._slope(lambda at: self.residual(u, at), mu, name)
 
     def d2(self, u, mu, a, b):
         """``F_uu[a, b]``."""
@@ -70,13 +72,14 @@ class System:
 
     def d2_parameter(self, u, mu, name, a):
         """``d(F_u a)/dmu_name``."""
-        up, down, width = self._sides(mu, name)
-        return (self.linear(u, up).matvec(a) - self.linear(u, down).matvec(a)) / width
+        return self._slope(lambda at: self.linear(u, at).matvec(a), mu, name)
 
     def d_parameters2(self, u, mu, first, second):
         """``d2F/(dmu_first dmu_second)``; needed only at branch points."""
-        up, down, width = self._sides(mu, second)
-        return (self.d_parameter(u, up, first) - self.d_parameter(u, down, first)) / width
+        if type(self).d_parameter is not System.d_parameter:
+            return self._slope(lambda at: self.d_parameter(u, at, first), mu, second)
+        wide = {"step": 1e-4, "least": 0.1}  # rounding of F is divided by two steps
+        return self._slope(lambda at: self._slope(lambda x: self.residual(u, x), at, first, **wide), mu, second, **wide)
 
     def mass_d(self, u, mu, c, a):
         """``d(B(u) c)/du [a]``."""

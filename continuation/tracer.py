@@ -14,6 +14,7 @@ import numpy as np
 from scipy.optimize import brentq
 
 from continuation.branch import Branch, CurvePoint
+from continuation.checks import require_kinds
 from continuation.options import NotConverged, Reason, Said, SingularSystem
 from continuation.problem import Local, Problem, correct
 
@@ -38,7 +39,9 @@ def _rms(values: np.ndarray) -> float:
 
 
 class Monitor:
-    """Test functions of a curve and the events between two of its points."""
+    """Test functions of a curve and the events between two of its points, of some kinds."""
+
+    kinds: tuple[str, ...] = ()
 
     def measure(self, tracer, point) -> None:
         """Evaluate the test functions at a point."""
@@ -162,6 +165,7 @@ class Tracer:
     def __init__(self, problem: Problem, options, monitors=(), observers=None):
         self.problem, self.options = problem, options
         self.monitors = list(monitors)
+        require_kinds(options, {kind for monitor in self.monitors for kind in monitor.kinds})
         self.observers = as_observers(observers)
         self.frame = problem.natural_frame()
         # Retries that are left, and the length of the curve for which they must do.

@@ -11,7 +11,7 @@ import scipy.linalg as la
 import scipy.sparse as sp
 import scipy.sparse.linalg as spla
 
-from .factor import Workspace, first_regular
+from .factor import Workspace, first_regular, negative_directions
 from .operator import CoupledPencil
 
 #: Squares of lengths that rounding leaves, relative to one; negative ones beyond its root are more than that.
@@ -231,6 +231,11 @@ class TransferBasis:
         other._extend(pencil.M, np.hstack(columns), compression)
         return other
 
+    def holds_what_grows(self, pencil: CoupledPencil) -> bool:
+        """True where all motions with negative stiffness or damping of a pencil are in the space, skew parts aside."""
+        inside = (np.linalg.eigvalsh(self.V.T @ ((A + A.T) @ self.V)) for A in (pencil.K, pencil.C))
+        return all(negative_directions(A) <= np.sum(x < 0) for A, x in zip((pencil.K, pencil.C), inside))
+
     def _extend(self, mass, X, compression: float = COMPRESSION):
         """Append what vectors have outside the space, as far as it matters."""
         room = self.V.shape[0] - self.V.shape[1]
@@ -287,7 +292,9 @@ def _frequencies(pencil, squares, vectors, steps: int = 4):
 
 
 def lowest_modes(pencil, count, workspace=None):
-    """Squares of the lowest angular frequencies of the symmetric structure, ascending, and its modes."""
+    """Squares of the lowest angular frequencies of the symmetric structure, ascending, and its modes; of a large one
+    those nearest to zero.
+    """
     symmetric = ((pencil.K + pencil.K.T) * 0.5).tocsr()
     count = min(count, pencil.n)
     if count >= pencil.n - 1 or pencil.n < 60:

@@ -13,9 +13,9 @@ from .count import Count, unstable_count
 from .factor import StructureMatrices, Workspace
 from .krylov import KrylovPairs, krylov_pairs
 from .operator import CoupledPencil, real_apply
-from .pairs import SAME, Found, acceptable, all_pairs, newton, normalised
-from .search import leading_modes
-from .spectrum import PAIRS, SearchOptions, Spectrum, number_right_of
+from .pairs import SAME, Found, acceptable, all_pairs, left_by_inverse_iteration, newton, normalised
+from .search import by_growth, leading_modes, with_left
+from .spectrum import SearchOptions, Spectrum, number_right_of
 
 
 @dataclass(frozen=True)
@@ -143,10 +143,8 @@ def missing_pairs(
     Returns
     -------
     Found or None
-        None if left vectors are wanted as well, or none was found.
+        None if none was found.
     """
-    if spectrum.left_q is not None:
-        return None
     values, q, u, _, _ = all_pairs(pencil if basis is None else pencil.projected(basis.V), left=False)
     end = 2 * np.pi * (options.whole if options.max_frequency is None else options.max_frequency)
     apart = np.abs(values[:, None] - spectrum.eigenvalues).min(axis=1, initial=np.inf) > OPTIONS.apart * np.abs(values)
@@ -166,13 +164,17 @@ def missing_pairs(
     if not pairs:
         return None
     values, q, u, residual, backward = (np.stack(part, axis=-1) for part in zip(*pairs))
-    return Found(values, *normalised(q, u), residual, backward)
+    found = Found(values, *normalised(q, u), residual, backward)
+    if spectrum.left_q is not None:
+        left = zip(*(left_by_inverse_iteration(pencil, value, workspace) for value in values))
+        found.left_q, found.left_u = (np.stack(part, axis=-1).conj() for part in left)
+    return found
 
 
-def joined(spectrum: Spectrum, found: Found, line: float) -> Spectrum:
+def joined(pencil: CoupledPencil, spectrum: Spectrum, found: Found, line: float) -> Spectrum:
     """The spectrum with further unstable pairs, sorted; as long as was asked for, if not more are unstable."""
-    parts = {name: np.concatenate([getattr(one, name) for one in (spectrum, found)], axis=-1) for name in PAIRS}
-    order = np.lexsort((parts["eigenvalues"].imag, -parts["eigenvalues"].real))
+    parts = {name: np.concatenate([getattr(one, name) for one in (spectrum, found)], axis=-1) for name in found.parts}
+    order = by_growth(parts["eigenvalues"])
     order = order[: max(spectrum.asked, int(np.sum(parts["eigenvalues"].real > line)))]
     real = found.eigenvalues.imag == 0
     notes = []
@@ -190,12 +192,13 @@ def joined(spectrum: Spectrum, found: Found, line: float) -> Spectrum:
         if chosen.any():
             frequencies = ", ".join(f"{value.imag / (2 * np.pi):.4g}" for value in found.eigenvalues[chosen])
             notes.append(f"Unstable modes at {frequencies} Hz lie {where}; the independent count pointed to them.")
-    return replace(
+    spectrum = replace(
         spectrum,
         **{name: part[..., order] for name, part in parts.items()},
         refined=spectrum.refined + found.eigenvalues.size,
         notes=(*spectrum.notes, *notes),
     )
+    return spectrum if found.left_q is None else with_left(pencil, spectrum)
 
 
 #: Multiples of it, modulo one, fill an interval evenly and never repeat.
@@ -242,12 +245,11 @@ class CertifiedSpectrum:
 
     @property
     def stable(self) -> bool | None:
-        """False if any pair listed is unstable, which is proof; True, for the band counted, if both routes agree that
-        there is none; else None.
+        """False if any pair listed is unstable by more than rounding, which is proof; True, for the band counted, if
+        both routes agree that there is none; else None.
         """
-        if self.spectrum.count_right_of(self.count.line):
-            return False
-        return True if self.agrees else None
+        rounding = 1e-9 * np.abs(self.spectrum.eigenvalues).max(initial=0.0)
+        return False if self.spectrum.count_right_of(self.count.line + rounding) else self.certificate.stable
 
     @property
     def statement(self) -> str:
@@ -257,6 +259,8 @@ class CertifiedSpectrum:
             return self.certificate.beside(self.spectrum.count_right_of(self.count.line) - self.unstable_count)
         if not self.count.certain:
             return f"{said} {' '.join(self.count.notes)}"
+        if not self.certificate.certain and self.response_error < OPTIONS.trusted:
+            return f"{said} The structure gains energy in motions that the reduced basis behind that count lacks."
         if not self.certificate.certain:
             return f"{said} The reduced basis behind that count is too coarse (error {self.response_error:.2g})."
         return said
@@ -358,7 +362,7 @@ def _judged(pencil, options, search, workspace, spectrum, basis, finer=0, within
     if winding.number > listed_unstable(spectrum, winding):
         distant = missing_pairs(pencil, spectrum, basis, winding.line, options, workspace)
         if distant is not None:
-            spectrum = joined(spectrum, distant, winding.line)
+            spectrum = joined(pencil, spectrum, distant, winding.line)
             if basis is not None:
                 basis = basis.enlarged(pencil, distant.q)
                 model = pencil.projected(basis.V)
@@ -374,7 +378,7 @@ def _judged(pencil, options, search, workspace, spectrum, basis, finer=0, within
     error = None
     if model is not pencil:
         error = response_error(pencil, model, _checks(spectrum, winding, finer, basis), workspace)
-    trusted = winding.certain and (error is None or error < OPTIONS.trusted)
+    trusted = winding.certain and (error is None or (error < OPTIONS.trusted and basis.holds_what_grows(pencil)))
     certificate = Certificate(listed, winding.number, trusted, winding.line, winding.band)
     return CertifiedSpectrum(spectrum, winding, certificate, error), basis
 

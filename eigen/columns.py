@@ -406,7 +406,8 @@ def _corrected(model: ReducedColumn, points, leading: list[np.ndarray]) -> tuple
         return known[i]
 
     def error(i) -> float:
-        return (np.abs(change(i)) / np.maximum(np.abs(leading[i][: OPTIONS.held]), 1.0)).max(initial=0.0)
+        size = np.maximum(np.abs(leading[i][: OPTIONS.held]), model.reduction.slow)
+        return (np.abs(change(i)) / size).max(initial=0.0)
 
     found, trusted = list(leading), np.zeros(len(points), bool)
     if model.error > OPTIONS.tolerance:

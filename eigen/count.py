@@ -108,8 +108,8 @@ def unstable_count(
     pencil : CoupledPencil
         M symmetric, positive definite; treated densely. The poles of what relaxes have to lie left of the line.
     line : float, optional
-        Growth rate, 1/s. Default 0; for a structure without any damping, whose eigenvalues
-        may lie on the imaginary axis, a small positive value, which `Count.line` reports.
+        Growth rate, 1/s. Default 0; for a structure without any damping, but gyroscopic, whose
+        eigenvalues may lie on the imaginary axis, a small positive value, which `Count.line` reports.
     band : float
         Hz. Count only eigenvalues up to this frequency: the path turns off to the right there.
         For structures with hardly any damping, or a pencil that is only good up to there.
@@ -317,5 +317,5 @@ class _Walk:
 def counted_line(pencil: CoupledPencil, scale: float) -> float:
     """Growth rate to count from: zero, or without any damping a small share of a typical frequency."""
     relaxes = pencil.relaxation is not None and pencil.relaxation.strengths.any()
-    undamped = (pencil.C.nnz == 0 or abs(pencil.C).max() == 0) and not relaxes
+    undamped = abs(pencil.C + pencil.C.T).max() <= 1e-12 * abs(pencil.C).max() and not relaxes
     return 1e-3 * scale if undamped else 0.0

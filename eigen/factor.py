@@ -261,6 +261,8 @@ class ScaledLU:
     Parameters
     ----------
     matrix : sparse, shape (n, n)
+    pivoting : float
+        Share of a column below which a pivot is not taken from the diagonal.
 
     Raises
     ------
@@ -268,7 +270,7 @@ class ScaledLU:
         If a pivot is exactly zero.
     """
 
-    def __init__(self, matrix: sp.csc_matrix):
+    def __init__(self, matrix: sp.csc_matrix, pivoting: float = 0.01):
         matrix = sp.csc_matrix(matrix)
         size = np.abs(matrix.diagonal())
         typical = size.max(initial=0.0) or 1.0
@@ -278,7 +280,7 @@ class ScaledLU:
             self._lu = spla.splu(
                 (D @ matrix @ D).tocsc(),
                 permc_spec="MMD_AT_PLUS_A",
-                diag_pivot_thresh=0.01,  # below this share of a column a pivot is not taken from the diagonal
+                diag_pivot_thresh=pivoting,
                 options={"SymmetricMode": True},
             )
         except RuntimeError as error:
@@ -297,6 +299,16 @@ class ScaledLU:
     def solve_transposed(self, b: np.ndarray) -> np.ndarray:
         """Solve with the transpose (not the adjoint)."""
         return self.solve(b, "T")
+
+
+def negative_directions(matrix) -> int:
+    """Number of negative eigenvalues of the symmetric part of a real matrix, those near rounding left out: of the
+    pivots on its diagonal (Sylvester's law of inertia).
+    """
+    symmetric = sp.csc_matrix(0.5 * (matrix + matrix.T))
+    size = np.abs(symmetric.diagonal())
+    room = 1e-10 * np.where(size > 0, size, size.max(initial=0.0) or 1.0)
+    return int(np.sum(ScaledLU(symmetric + sp.diags(room), pivoting=0.0)._lu.U.diagonal() < 0))
 
 
 def petsc_is_complex() -> bool:

@@ -215,6 +215,7 @@ def _ratio(a, b):
 
 
 SAME = 1e-6  # relative distance below which two shifts are taken to have found one eigenvalue
+ZERO = 1e-13  # distance over the largest eigenvalue within which two are one, as those that are zero
 TIGHT = 1e-9  # residual above which the inner unknowns of the fluid are computed afresh
 
 
@@ -370,9 +371,10 @@ def merge(found: Found, batch: Found) -> None:
     """Add what is new; of an eigenvalue found twice keep the pair of smaller residual."""
     partner = np.full(batch.eigenvalues.size, -1)
     taken = np.zeros(found.eigenvalues.size, bool)
+    rounding = ZERO * np.abs(np.append(found.eigenvalues, batch.eigenvalues)).max(initial=0.0)
     for i in np.argsort(batch.residual):
         distance = np.where(taken, np.inf, np.abs(found.eigenvalues - batch.eigenvalues[i]))
-        if distance.size and distance.min() <= SAME * abs(batch.eigenvalues[i]):
+        if distance.size and distance.min() <= max(SAME * abs(batch.eigenvalues[i]), rounding):
             partner[i] = int(np.argmin(distance))
             taken[partner[i]] = True
     for i in np.flatnonzero(partner >= 0):
@@ -466,7 +468,9 @@ def biorthogonalise(pencil: CoupledPencil, eigenvalues, q, u, w, W, cluster: flo
     for i in range(k):
         if done[i]:
             continue
-        near = np.abs(eigenvalues - eigenvalues[i]) <= cluster * max(abs(eigenvalues[i]), 1e-300)
+        near = np.abs(eigenvalues - eigenvalues[i]) <= max(
+            cluster * abs(eigenvalues[i]), ZERO * np.abs(eigenvalues).max()
+        )
         group = np.flatnonzero(near & ~done)
         done[group] = True
         block = table[np.ix_(group, group)]
@@ -542,7 +546,11 @@ def eigenvalue_derivative(pencil: CoupledPencil, mode: Mode, change: tuple[np.nd
     def along(f, g):
         return np.vdot(mode.left_q, f) + np.vdot(mode.left_u, g)
 
-    below = along(*pencil.apply_derivative(mode.eigenvalue, mode.q, mode.u))
-    if abs(below) == 0.0:
+    x = mode.q, mode.u
+    below = along(*pencil.apply_derivative(mode.eigenvalue, *x))
+    terms = zip((mode.left_q, mode.left_u), pencil.polynomial(None, x), pencil.polynomial(None, None, x))
+    norm = np.linalg.norm
+    size = sum(norm(w) * (norm(damped) + 2 * abs(mode.eigenvalue) * norm(inert)) for w, damped, inert in terms)
+    if abs(below) <= 1e-7 * size:
         raise ValueError("The eigenvalue is defective; it has no derivative.")
     return complex(-along(*change) / below)

@@ -181,6 +181,11 @@ class FamilyReduction:
                 return np.sort(np.sqrt(np.maximum(found, 0.0))) / (2 * np.pi)
         return np.zeros(0)
 
+    @property
+    def slow(self) -> float:
+        """Size of eigenvalues, 1/s, below which their errors are relative to it."""
+        return 1e-2 * self.coarse.lowest_frequency
+
     def operator(self, mu: Hashable) -> CoupledPencil:
         """Full operator at a parameter point, with the scale of inner unknowns that reduced ones have."""
         return PencilFamily.at(self.family, mu)
@@ -318,5 +323,5 @@ class FamilyReduction:
         return max((self._change(*own) for own in pairs), default=0.0)
 
     def _change(self, pairs: Pairs, mu: Hashable, corrected: tuple[np.ndarray, np.ndarray] | None = None) -> float:
-        change = np.abs(self.correction(pairs, mu, corrected)) / np.maximum(np.abs(pairs.values), 1.0)
+        change = np.abs(self.correction(pairs, mu, corrected)) / np.maximum(np.abs(pairs.values), self.slow)
         return float(change.max(initial=0.0))

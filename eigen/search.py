@@ -353,7 +353,8 @@ def _result(pencil, found: Found, count, options) -> Spectrum:
     """Sort, cut to the number asked for, and say what is certified."""
     region = found.region
     _, band = leading_band(found, max(count, options.least), options)
-    order = _by_growth(found.eigenvalues, np.flatnonzero(found.eigenvalues.imag <= band * (1 + 1e-12)))
+    inside = np.flatnonzero(found.eigenvalues.imag <= band * (1 + 1e-12))
+    order = inside[by_growth(found.eigenvalues[inside])]
     if options.limit_point is not None:
         order = order[found.eigenvalues.real[order] > CLEAR * options.limit_point]
     order = order[:count]
@@ -399,7 +400,7 @@ def _result(pencil, found: Found, count, options) -> Spectrum:
         rejected=found.rejected,
         notes=tuple(notes),
     )
-    return _with_left(pencil, spectrum) if options.left else spectrum
+    return with_left(pencil, spectrum) if options.left else spectrum
 
 
 def _within(found, options, low) -> str:
@@ -413,14 +414,13 @@ def _within(found, options, low) -> str:
     )
 
 
-def _by_growth(values, chosen):
+def by_growth(values):
     """Largest growth rate first; of those that differ by rounding only, as without damping, the lowest frequency."""
-    values = values[chosen]
     unit = 1e-9 * np.abs(values).max(initial=0.0) or 1.0
-    return chosen[np.lexsort((-values.real, values.imag, -np.round(values.real / unit)))]
+    return np.lexsort((-values.real, values.imag, -np.round(values.real / unit)))
 
 
-def _with_left(pencil, spectrum) -> Spectrum:
+def with_left(pencil, spectrum) -> Spectrum:
     """The spectrum with its left vectors scaled."""
     vectors = spectrum.q, spectrum.u, spectrum.left_q, spectrum.left_u
     w, W, error, defective = biorthogonalise(pencil, spectrum.eigenvalues, *vectors)

@@ -308,7 +308,7 @@ class LoadCurve:
             limits={LOAD: ahead or (-np.inf, np.inf)},
             parameter_scales={LOAD: self._unit},
             locate=False,
-            stop_at=frozenset({"fold"}),
+            stop_at=frozenset({"fold"} if self.stops_at_limit else ()),
             newton=ContinuationNewton(
                 max(self.newton.tolerance, _POINTS, self._system.rounding), _AHEAD if ahead else _BETWEEN
             ),

@@ -101,10 +101,13 @@ def test_start_exactly_at_a_fold():
     assert len(branch) > 10
 
 
-def test_events_are_located_and_can_end_the_branch():
-    crossing = Event("x is one half", lambda u, mu: u[0] - 0.5)
+def test_events_are_located_and_can_end_the_branch(tmp_path):
+    crossing = Event("x/2 is 1/4", lambda u, mu: u[0] - 0.5)
     branch = on_cusp([crossing])
-    (point,) = branch.of_kind("x is one half")
+    branch.save(tmp_path / "branch.h5")
+    again = Branch.load(tmp_path / "branch.h5")
+    assert np.array_equal(again.values(crossing.name), branch.values(crossing.name))
+    (point,) = again.of_kind(crossing.name)
     assert abs(point.u[0] - 0.5) < 1e-9 and abs(point.mu["a"] + 0.5 - 0.125) < 1e-9
     short = on_cusp([Event("x is one half", lambda u, mu: u[0] - 0.5, stop=True)])
     assert short.reason == "stopped at: x is one half" and len(short) < len(branch)

@@ -14,6 +14,7 @@ from continuation import (
     resume,
 )
 from continuation.jax_system import JaxSystem
+from tests.systems.brusselator import brusselator
 from tests.systems.following import follow, hopf_of
 from tests.systems.normal_forms import bautin, bogdanov_takens, cusp
 
@@ -76,6 +77,18 @@ def test_generalised_hopf_point():
     # From there the curve starts too, of an equilibrium that stays where it is.
     other = continue_hopf(bautin(), point, ("mu", "nu"), ContinuationOptions(limits={"nu": (-1, 1)}, direction=-1))
     assert other.values("nu")[-1] == -1 and np.abs(other.values("mu")).max() < 1e-9
+
+
+def test_the_unit_of_time_does_not_matter_to_a_hopf_curve():
+    plain, options = brusselator(), ContinuationOptions(limits={"A": (0.5, 2.0)})
+    lengths = []
+    for unit in (1.0, 1e3, 1e-3):
+        system = JaxSystem(lambda u, mu, unit=unit: unit * plain._residual(u, mu), 2)
+        hopf = hopf_of(system, [1.0, 1.0], {"A": 1.0, "B": 1.0}, "B", (0.5, 4.0))
+        curve = continue_hopf(system, hopf, ("B", "A"), options)
+        assert curve.reason.kind is Reason.LIMIT and curve.values("A")[-1] == 2.0
+        lengths.append(len(curve))
+    assert max(lengths) - min(lengths) <= 2
 
 
 def test_zero_hopf_point_and_counts():

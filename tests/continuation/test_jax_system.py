@@ -52,6 +52,30 @@ def test_parameter_derivatives_against_the_defaults_of_the_base(system, name):
     )
 
 
+def test_second_differences_beside_zero():
+    """Branches u = 1.3 and u = 1.3 + mu; the residual is linear in the parameter, and its terms cancel."""
+
+    class Crossing(System):
+        size = 1
+
+        def residual(self, u, mu):
+            c = np.exp(1.3)
+            return (1 + mu["mu"]) * np.exp(u) - (c + c * mu["mu"]) - (u - 0.3) * np.exp(u) + c * (u - 0.3)
+
+    for value in (0.0, 1e-10, -2e-11):
+        assert abs(Crossing().d_parameters2(np.array([1.3]), {"mu": value}, "mu", "mu")[0]) < 1e-4
+
+
+def test_a_parameter_far_from_one_has_a_size():
+    class Small(System):
+        size, parameter_sizes = 1, {"mu": 1e-9}
+
+        def residual(self, u, mu):
+            return u * np.log(mu["mu"])
+
+    assert np.isclose(Small().d_parameter(np.array([1.4]), {"mu": 1e-10}, "mu")[0], 1.4e10, rtol=1e-6)
+
+
 def test_mass_derivatives(system):
     def mass(u, mu, v):
         return system.linear(u, mu).mass_matvec(v)

@@ -32,6 +32,7 @@ def test_stuart_landau_also_behind_a_mass_that_depends_on_state_and_parameter(ma
     assert form.criticality == "super" and form.side() == 1
     # The cycle is exactly |z| = sqrt(mu), and turns at w - c mu.
     assert np.isclose(form.amplitude_coefficient(np.array([1.0, 0.0])), 1.0, rtol=1e-10)
+    assert np.isclose(form.amplitude_coefficient(), 1.0, rtol=1e-10)
     assert np.isclose(form.frequency(0.3), 2.0 - 0.7 * 0.3, rtol=1e-10)
     assert np.isnan(form.radius(-0.1))
 

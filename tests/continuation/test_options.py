@@ -102,6 +102,12 @@ WRONG = [
     (started(options=ContinuationOptions(limits={"C": (0, 1)})), "'C' is not one of: A, B"),
     (started(options=ContinuationOptions(limits={"B": (2, 3)})), "start B = 1 is outside its limits 2 to 3"),
     (started(options=ContinuationOptions(stop_at="hopff")), "cannot stop at 'hopff'"),
+    (started(options=ContinuationOptions(stop_at="hopf")), "cannot stop at 'hopf'; it looks for: branch point, fold"),
+    (started(events=Event("fold", lambda u, mu: u[0])), "a name of its own, not 'fold'"),
+    (
+        lambda branch: orbits_from_hopf(SYSTEM, branch.special[0], "B", ContinuationOptions(stop_at="fold")),
+        "cannot stop at 'fold'",
+    ),
     (started(mu={"A": "one", "B": 1.0}), "'A' must be a number, not 'one'"),
     (started(mu={"A": np.nan, "B": 1.0}), "residual is not finite"),
     (started(mu=[1.0, 1.0]), "given by name"),
@@ -156,6 +162,11 @@ def test_wrong_uses_are_answered_by_a_sentence(branch, use, said):
         use(branch)
     text = str(error.value)
     assert text[0].isupper() and text.endswith(".") and not isinstance(error.value, AttributeError)
+
+
+def test_a_resumed_branch_begins_at_its_last_point(branch):
+    longer = resume(SYSTEM, branch, ContinuationOptions(limits={"B": (1.5, 2.5)}))
+    assert branch.mu(0)["B"] == 1.0 and longer.mu(-1)["B"] == 2.5
 
 
 def test_one_event_may_stand_alone_and_end_a_branch():

@@ -55,6 +55,50 @@ def test_stuart_landau_is_exact(system):
     assert np.allclose(np.linalg.norm(orbit(t), axis=1), np.sqrt(0.3), rtol=1e-9)
 
 
+def circle_with(others):
+    """z' = (1 + i) z - z|z|^2 with further unknowns beside it."""
+
+    def residual(u, mu):
+        r2 = u[0] ** 2 + u[1] ** 2
+        return jnp.stack([u[0] - u[1] - r2 * u[0], u[0] + u[1] - r2 * u[1], *others(u, mu["mu"])])
+
+    return residual
+
+
+def test_multiple_exponents_count_as_often_as_they_are():
+    system = JaxSystem(circle_with(lambda u, mu: (mu * u[2], mu * u[3])), 4)
+    orbit = find_orbit(system, np.hstack([CIRCLE, np.zeros((60, 2))]), 6.0, {"mu": 0.1})
+    assert np.allclose(orbit.exponents, [0.1, 0.1, -2.0], atol=1e-8) and orbit.floquet.unstable == 2
+    twice = JaxSystem(lambda u, mu: jnp.concatenate([circle_with(lambda *_: ())(v, mu) for v in (u[:2], u[2:])]), 4)
+    exponents = find_orbit(twice, np.hstack([CIRCLE, CIRCLE]), 6.0, {"mu": 0.0}).exponents
+    assert np.allclose(exponents, [0.0, -2.0, -2.0], atol=1e-7)
+
+
+def test_a_slow_modulation_is_no_real_multiplier():
+    """A pair mu + 5e-4 i beside a cycle of frequency 1."""
+
+    def slow(u, mu):
+        s2 = u[2] ** 2 + u[3] ** 2
+        return mu * u[2] - 5e-4 * u[3] - s2 * u[2], 5e-4 * u[2] + mu * u[3] - s2 * u[3]
+
+    system = JaxSystem(circle_with(slow), 4)
+    orbit = find_orbit(system, np.hstack([CIRCLE, np.zeros((60, 2))]), 6.0, {"mu": -0.05})
+    assert len(orbit.exponents) == 3
+    branch = continue_orbits(system, orbit, "mu", ContinuationOptions(limits={"mu": (-0.05, 0.05)}))
+    assert [s.kind for s in branch.special] == ["torus"] and abs(branch.special[0].mu["mu"]) < 1e-6
+    assert np.isclose(branch.special[0].values["angle"], 2 * np.pi * 5e-4, rtol=1e-3)
+    assert branch.unstable[0] == 0 and branch.unstable[-1] == 2
+
+
+def test_a_small_unknown_is_resolved_in_any_unit():
+    largest = []
+    for unit in (1.0, 1e-10):
+        filtered = circle_with(lambda u, mu, unit=unit: (5 * (unit * jnp.exp(20 * (u[0] - 1)) - u[2]),))
+        orbit = find_orbit(JaxSystem(filtered, 3), np.hstack([CIRCLE, np.zeros((60, 1))]), 6.0, {"mu": 0.0})
+        largest.append(orbit.extrema()[1][2] / unit)
+    assert np.isclose(largest[1], largest[0], rtol=1e-4)
+
+
 def test_linearisation_by_differences():
     """With a mass that depends on the state."""
     system, rng = FirstOrderSystem(warped_stuart_landau()), np.random.default_rng(0)

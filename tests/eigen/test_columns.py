@@ -84,6 +84,19 @@ def test_cells_agree_with_dense_eigenvalues(alpha, beta, law):
     assert set(column.unstable > 0) == {True, False} or beta == 0
 
 
+def test_errors_are_relative_however_slow_a_family_is():
+    """The chain with time in units of 1e-6."""
+    slow, unit = Chain(), 1e6
+    slow.mass = slow.mass * unit**2
+    points = conditions(0.0, 2e-4, 0.0)
+    columns = [
+        ColumnSolver().solve(Chain(), points),
+        ColumnSolver().solve(slow, [Point(p.inertia * unit**2, 0.0, p.beta * unit, p.law) for p in points]),
+    ]
+    assert columns[1].model.error == pytest.approx(columns[0].model.error, rel=0.1)
+    assert columns[1].leading * unit == pytest.approx(columns[0].leading, rel=1e-5)
+
+
 def test_a_band_that_is_asked_for_ends_list_and_count():
     condition = Point(100.0, 0.0, 2e-4, 0.0)
     whole, part = (ColumnSolver().solve(Chain(band), [condition] * 3) for band in (None, 20.0))
@@ -146,6 +159,7 @@ def test_counts_need_no_damping_at_all():
 def test_corrected_eigenvalues_are_sorted_by_growth_rate():
     """Corrections of 5e-4 of the size exchange the first two."""
     change = np.array([-0.05, 0.05])
-    model = SimpleNamespace(error=0.0, corrected=lambda point, values: change)
+    reduction = SimpleNamespace(slow=0.0)
+    model = SimpleNamespace(error=0.0, corrected=lambda point, values: change, reduction=reduction)
     (found,), trusted = _corrected(model, [None], [np.array([-1.0 + 100j, -1.01 + 101j])])
     assert trusted.all() and found == pytest.approx([-0.96 + 101j, -1.05 + 100j])

@@ -102,3 +102,10 @@ def test_derivative_needs_left_vectors():
     mode = leading_modes(pencil := CoupledPencil(M=np.eye(1), C=[[0.1]], K=[[1.0]]), 1).mode(0)
     with pytest.raises(ValueError, match="left"):
         eigenvalue_derivative(pencil, mode, (mode.q, mode.u))
+
+
+def test_a_defective_eigenvalue_has_no_derivative():
+    pencil = CoupledPencil(M=[[1.0]], C=[[2.2]], K=[[1.21]])  # (s + 1.1)^2
+    mode = leading_modes(pencil, 1, SearchOptions(left=True)).mode(0)
+    with pytest.raises(ValueError, match="defective"):
+        eigenvalue_derivative(pencil, mode, (mode.eigenvalue * mode.q, mode.u))

@@ -4,7 +4,15 @@ import numpy as np
 import pytest
 import scipy.sparse as sp
 
-from eigen import CoupledPencil, Relaxation, SearchOptions, TransferBasis, certified_spectrum, unstable_count
+from eigen import (
+    CoupledPencil,
+    Relaxation,
+    SearchOptions,
+    TransferBasis,
+    certified_spectrum,
+    leading_modes,
+    unstable_count,
+)
 from eigen.certificate import response_error
 from tests.systems.plate_over_channel import plate_over_channel
 from tests.systems.random_pencils import dense_eigenvalues, random_pencil
@@ -147,6 +155,22 @@ def test_large_pencils_by_basis(velocity, storage, density):
     assert result.response_error < 1e-4
 
 
+@pytest.mark.parametrize("gaining", ["K", "C"])
+def test_what_grows_beyond_a_basis_is_not_certified_as_stable(gaining):
+    """The 24 modes nearest to zero know nothing of the last one, which diverges or is driven by its damping."""
+    squares = np.diag(np.arange(1.0, 81.0) ** 2)
+    parts = {"M": np.eye(80), "C": 0.1 * np.eye(80), "K": squares}
+    steady = certified_spectrum(CoupledPencil(**parts), 3, SearchOptions(method="krylov"), dense=30)
+    assert steady.stable and steady.agrees
+    parts[gaining] = parts[gaining].copy()
+    parts[gaining][-1, -1] = -1e6 if gaining == "K" else -5.0
+    found = certified_spectrum(CoupledPencil(**parts), 3, SearchOptions(method="krylov"), dense=30)
+    whole = certified_spectrum(CoupledPencil(**parts), 3, SearchOptions(method="krylov", left=True))
+    assert whole.stable is False and whole.agrees and whole.spectrum.biorthogonality < 1e-6
+    lacking = gaining == "K" or np.isinf(found.certificate.band)
+    assert found.stable is not True if lacking else 2 * np.pi * found.certificate.band < 80
+
+
 def test_more_unstable_modes_than_asked_for():
     K = np.diag([-1.0, -2.0, -3.0, 4.0])
     result = certified_spectrum(CoupledPencil(M=np.eye(4), C=0.1 * np.eye(4), K=K), 1)
@@ -157,6 +181,20 @@ def test_undamped_structure_uses_a_line_beside_the_axis():
     pencil = CoupledPencil(M=np.eye(3), C=np.zeros((3, 3)), K=np.diag([1.0, 4.0, 9.0]))
     count = unstable_count(pencil)
     assert count.line > 0 and count.number == 0 and count.certain
+
+
+def test_rounding_is_no_proof_of_instability():
+    """Gyroscopic forces alone leave all eigenvalues on the axis, a free chain one at zero."""
+    gyroscopic = CoupledPencil(M=np.eye(2), C=[[0.0, 2.0], [-2.0, 0.0]], K=np.diag([1.0, 2.0]))
+    found = certified_spectrum(gyroscopic, 2)
+    assert found.stable and found.count.line > 0 and found.count.certain and found.count.number == 0
+    for n in (4, 5, 6, 8, 10):
+        stiffness = 2 * np.eye(n) - np.eye(n, k=1) - np.eye(n, k=-1)
+        stiffness[0, 0] = stiffness[-1, -1] = 1.0
+        chain = CoupledPencil(M=np.eye(n), C=0.1 * np.eye(n), K=stiffness)
+        assert certified_spectrum(chain, 2).stable is None
+        modes = leading_modes(chain, 3, SearchOptions(method="krylov", shifts=(0.5, 0.8)))
+        assert np.sum(np.abs(modes.eigenvalues) < 1e-9) == 1
 
 
 def test_an_eigenvalue_on_the_line_is_uncertain():
