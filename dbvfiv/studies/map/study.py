@@ -322,7 +322,8 @@ def run(session: Session, record: GrowingRecord, workers: int | None = None) -> 
     checks, curves = check_cells(plan, columns, walk, case.map.checks), linked(plan, columns)
     record.note(_CHECKS, checks=checks)
     record.note(_CURVES, curves=[asdict(curve) for curve in curves])
-    for sentence in (*(doubts(plan, curves) if case.map.curve else ()), *_doubts(plan, columns, checks)):
+    unsure = doubts(plan, curves) if case.map.curve else ()
+    for sentence in (*unsure, *_doubts(plan, columns, checks), *walk.about_rubbers()):
         record.warn(sentence)
     if case.map.samples:
         chances.find_chances(case, record, processes)

@@ -71,6 +71,8 @@ def run(session: Session, record: GrowingRecord) -> None:
             record.fail(f"{variant.prefix(asked[0])}{sentence}")
         for sentence in found.warnings:
             record.warn(f"{variant.prefix(asked[0])}{sentence}")
+    for sentence in walk.about_rubbers():
+        record.warn(sentence)
 
 
 def _points(record: Record, variant: Variant) -> list[OnsetPoint]:

@@ -391,7 +391,8 @@ def run(session: Session, record: GrowingRecord) -> None:
         except (CaseError, SolveError, ArithmeticError) as error:
             record.fail(f"At {PARAMETERS[asked.parameter].text(value)}: {error}")
         record.item(value)
-    for sentence in filter(None, (ended_early(record, case), outside_band(case, record.column(PEAKS, "frequency")))):
+    outside = outside_band(case, record.column(PEAKS, "frequency"))
+    for sentence in filter(None, (ended_early(record, case), outside, *walk.about_rubbers())):
         record.warn(sentence)
 
 
