@@ -480,7 +480,8 @@ class MapResult(StudyResult):
         return f"{lost} of {len(self.columns)} columns were not reached"
 
     def lines(self) -> list[str]:
-        lines = [f"At {describe_fixed(self.case, *self.moved)}:"]
+        alone = "" if self.classes else f"; {self.plan.classes[0].alone}"
+        lines = [f"At {describe_fixed(self.case, *self.moved)}{alone}:"]
         for i in range(len(self.plan.laws)):
             lines.append(self._cells_line(i))
             lines += [self._curve_line(curve) for curve in self.curves if curve.law == i]
@@ -505,6 +506,7 @@ class MapResult(StudyResult):
         gaps, direct = int((how == MISSING).sum()) - invalid, int((how == DIRECT).sum())
         sealed = int(self.grid("sealed")[law].sum())
         name = LAWS.get(self.plan.laws[law], f"blend {self.plan.laws[law]:g}")
+        name += f", class {self.plan.classes[0].name}" if self.classes else ""
         return (
             f"{name}: {how.shape[1]} x {how.shape[0]} cells, {unstable} unstable, {number[STABLE]} stable, "
             f"{int(certified.sum())} of {how.size} certified"
@@ -517,11 +519,18 @@ class MapResult(StudyResult):
         )
 
     def _verdicts(self, law: int) -> list[list[dict[str, Any]]]:
-        """Verdicts on the cells of the grid, (y, x)."""
+        """Verdicts on the cells of the grid in all classes of motion, (y, x)."""
         found = {column.value: column for column in self.columns if column.level == 0}
-        gap = Verdict.undecided("The column of this cell was not solved.").summary()
+        gap = Verdict.undecided("The column of this cell was not solved.")
+        names = [motion.name for motion in self.plan.classes]
+        parts = dict(zip(names, (law, *range(len(self.plan.laws), len(self.plan.parts)))))
+
+        def verdict(across: float, i: int) -> Verdict:
+            column = found.get(across)
+            return Verdict.joined({name: column.verdict(part, i) for name, part in parts.items()}) if column else gap
+
         table = [
-            [found[across].verdict(law, i).summary() if across in found else gap for across in self.plan.across.values]
+            [verdict(across, i).summary() for across in self.plan.across.values]
             for i in range(len(self.plan.along.values))
         ]
         return [list(row) for row in zip(*table)] if self.plan.transposed else table

@@ -522,6 +522,7 @@ class SweepResult(StudyResult):
             "",
             *crossings,
             *checked,
+            f"Modes are of {variants(self.case, 'sweep')[0].motion.alone}.",
             *(f"Note: {note}" for note in self.notes),
         ]
 
