@@ -385,7 +385,8 @@ def onset(result: StudyResult) -> Figure:
     for row in result.points:
         _mark(row, scale, axis.parameter, top, bottom)
     # room for the words at the marks
-    top.set_ylim(low, max(1.1 * np.nanmax(result.growth_rates, initial=0.0), -0.3 * low))
+    rates = [result.growth_rates.ravel(), *(part["scan"]["growth_rate"] for part in result.classes)]
+    top.set_ylim(low, max(1.1 * np.nanmax(np.concatenate(rates), initial=0.0), -0.3 * low))
     top.set_ylabel("Growth rate, 1/s")
     bottom.set_ylabel("Frequency, Hz")
     bottom.set_ylim(bottom=0)
@@ -433,17 +434,17 @@ def _draw_scan(result: StudyResult, values: np.ndarray, top, bottom) -> float:
 
 
 def _mark(row: dict, scale: float, parameter: str, top, bottom) -> None:
-    """An onset with its uncertainty and its numbers: full where it is supercritical, hollow where it is subcritical."""
+    """An onset with its uncertainty and numbers: full where supercritical, hollow where subcritical, else grey."""
     x = row["value"] / scale
-    inside = "white" if row["criticality"] == "sub" else PUBLISHED
+    inside = {"super": PUBLISHED, "sub": "white"}.get(row["criticality"], "0.75")
     look = {"marker": "o", "ms": 7, "color": PUBLISHED, "mfc": inside, "ls": "none", "zorder": 5}
     top.plot(x, 0.0, **look)
     bottom.plot(x, row["frequency"], **look)
     if row["uncertainty"] is not None:
         reach = row["uncertainty"] / scale
         top.plot([x - reach, x + reach], [0, 0], color=ACCENT, lw=3.5, alpha=0.75, zorder=4, solid_capstyle="butt")
-    kind = {"super": "supercritical", "sub": "subcritical"}.get(row["criticality"], "")
-    told = (PARAMETERS[parameter].amount(row["value"], 4), f"{digits(row['frequency'])} Hz", kind)
+    kind, doubt = CRITICALITY.get(row["criticality"], ""), "" if row["confirmed"] else "not confirmed"
+    told = (PARAMETERS[parameter].amount(row["value"], 4), f"{digits(row['frequency'])} Hz", kind, doubt)
     words = "\n".join(filter(None, told))
     # on the side of the mark that the curve leaves free
     place = {"xytext": (9, -8), "va": "top"} if row["gains"] else {"xytext": (9, 8), "va": "bottom"}
