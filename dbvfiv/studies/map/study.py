@@ -13,6 +13,7 @@ import numpy as np
 
 from eigen.columns import DIRECT, MISSING
 
+from ...case.parameters import PARAMETERS
 from ...errors import CaseError, SolveError
 from ...fit.cards import outside_band
 from ...model.leading import other_end
@@ -70,8 +71,7 @@ def check_cells(
         try:
             cell = walk.cell(plan.place(usable[i].value, kept.value, plan.laws[law]))
         except (SolveError, CaseError) as error:
-            at = f"{plan.x.parameter} = {x:.6g}, {plan.y.parameter} = {y:.6g}"
-            walk.observer.warn(f"The cell at {at} was not solved again: {error}")
+            walk.observer.warn(f"The cell at {plan.told(x, y)} was not solved again: {error}")
             continue
         leading, true = (complex(v[0]) if len(v) else complex(np.nan) for v in (kept.eigenvalues, cell.leading))
         error, unstable = abs(leading - true) / max(abs(true), 1.0), cell.certificate.unstable
@@ -169,7 +169,8 @@ def _doubts(plan: MapPlan, columns: Iterable[MapColumn], checks: Iterable[dict[s
             said.append(f"{prefix}{len(lost)} cells have no steady state that was found; the first: {lost[0]}")
         if refused:
             first = next(c for c in solved if c.refusal)
-            said.append(f"{prefix}{refused} cells are not valid; the first at {first.value:.6g}: {first.refusal}")
+            at = PARAMETERS[plan.across.parameter].named(first.value)
+            said.append(f"{prefix}{refused} cells are not valid; the first at {at}: {first.refusal}")
         if left_open:
             said.append(f"{prefix}{len(left_open)} cells are left open. {left_open[0]}")
         if doubtful:
@@ -189,8 +190,7 @@ def _doubts(plan: MapPlan, columns: Iterable[MapColumn], checks: Iterable[dict[s
             apart = f"differs by {check['error']:.1e}"
             if check["error"] <= ACCEPTED:
                 apart = f"has {check['unstable']} unstable eigenvalues and the cell another number"
-            at = f"{plan.x.parameter} = {check['x']:.6g}, {plan.y.parameter} = {check['y']:.6g}"
-            said.append(f"At {at} the full pencil {apart}.")
+            said.append(f"At {plan.told(check['x'], check['y'])} the full pencil {apart}.")
     frequencies = [s.verdict.frequency for c in solved for row in c.samples.values() for s in row]
     return [*said, *filter(None, [outside_band(plan.case, frequencies)])]
 
@@ -238,7 +238,7 @@ def tables_of(_mesh: MeshData | None) -> tuple[TableSpec, ...]:
 
 def gap_sentence(plan: MapPlan, column: MapColumn) -> str:
     """Why there is no column."""
-    return f"{plan.across.parameter} = {column.value:.6g}: {column.failure}"
+    return f"{PARAMETERS[plan.across.parameter].named(column.value)}: {column.failure}"
 
 
 def keep_column(record: GrowingRecord, column: MapColumn) -> None:
@@ -545,12 +545,10 @@ class MapResult(StudyResult):
 
     def _curve_line(self, curve: OnsetCurve) -> str:
         kind = "exact" if curve.exact else "not exact"
-        return (
-            f"  {curve.title}, {kind}, {len(curve.x)} points: {self.plan.x.parameter} "
-            f"{min(curve.x):.6g} to {max(curve.x):.6g}, "
-            f"{self.plan.y.parameter} {min(curve.y):.6g} to {max(curve.y):.6g}, "
-            f"{min(curve.frequency):.4g} to {max(curve.frequency):.4g} Hz"
-        )
+        rows = ((self.plan.x.parameter, curve.x), (self.plan.y.parameter, curve.y))
+        spans = ", ".join(f"{name} {PARAMETERS[name].span(min(row), max(row))}" for name, row in rows)
+        hertz = f"{min(curve.frequency):.4g} to {max(curve.frequency):.4g} Hz"
+        return f"  {curve.title}, {kind}, {len(curve.x)} points: {spans}, {hertz}"
 
 
 def _axis(axis) -> dict[str, Any]:

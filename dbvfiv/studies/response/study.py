@@ -501,7 +501,7 @@ class ResponseResult(StudyResult):
         return f"There is no response at {lost} of the states"
 
     def lines(self) -> list[str]:
-        row = PARAMETERS[self.parameter]
+        row = self.case.units.parameter(self.parameter)
         said = [f"At {describe_fixed(self.case, self.parameter)}; {self.noise}:"]
         head = f"{self.parameter:>14}{'damping, %':>12}{'at, Hz':>10}{'lip rms, um':>13}{'flow rms, L/s':>15}"
         said.append(f"{head}{'correlation, s':>16}")

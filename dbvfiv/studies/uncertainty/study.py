@@ -489,7 +489,7 @@ class UncertaintyResult(StudyResult):
         return f"Under {law} {same} of {count} samples have the outcome of {self.case.fluid.continuity}."
 
     def lines(self) -> list[str]:
-        row = PARAMETERS[self.parameter]
+        row = self.case.units.parameter(self.parameter)
         fixed = describe_fixed(self.case, self.parameter, *(one.name for one in self.plan.inputs))
         place = f"{self.parameter}, {row.shown_unit}".rstrip(", ")
         head = f"{place:>16}{'flutters':>10}  {'95 % interval':<17}{'not valid':>10}{'undecided':>10}{'samples':>9}"
@@ -519,7 +519,7 @@ class UncertaintyResult(StudyResult):
         said, never = ("-" if one is None else f"{one:.3g}" for one in (flutters, invalid))
         interval = "{:.2g} to {:.2g}".format(*point["interval"])
         spread = "-" if middle is None else "{} ({} to {})".format(*(digits(100 * x) for x in (middle, low, high)))
-        value = point["value"] / PARAMETERS[self.parameter].scale
+        value = point["value"] / self.case.units.parameter(self.parameter).scale
         counts = f"{never:>10}{point['undecided']:10d}{point['samples']:9d}"
         return f"{value:16.6g}{said:>10}  {interval:<17}{counts}  {spread}"
 

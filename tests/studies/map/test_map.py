@@ -49,7 +49,7 @@ def test_a_check_whose_state_is_not_found_again_ends_no_map(case):
     walk = SimpleNamespace(cell=cell, observer=SimpleNamespace(warn=said.append))
     checks = check_cells(plan, columns, walk, 12)
     assert len(checks) + len(said) == 12 and min(check["x"] for check in checks) > 3000.0
-    assert said and all(text.startswith("The cell at pressure = 1000, density = ") for text in said)
+    assert said and all(text.startswith("The cell at pressure = 1 kPa, density = ") for text in said)
 
 
 def test_cells_whose_mode_grows_too_slowly_to_be_counted_are_uncertain(case):
