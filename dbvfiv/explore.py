@@ -62,6 +62,8 @@ class Answer:
         True of the full operator with its independent count.
     classes : dict of Verdict
         Of a confirmed answer those of the classes of motion it joins, by their names.
+    warnings : tuple of str
+        Of a confirmed answer what is to be said of the rubber in its steady state.
     """
 
     place: Mu
@@ -71,6 +73,7 @@ class Answer:
     bound: float = np.nan
     confirmed: bool = False
     classes: Mapping[str, Verdict] = field(default_factory=dict)
+    warnings: tuple[str, ...] = ()
 
     def summary(self) -> dict[str, Any]:
         """Plain SI numbers for JSON."""
@@ -82,6 +85,7 @@ class Answer:
             "eigenvalues": [[float(value.real), float(value.imag)] for value in self.eigenvalues],
             "bound": float(self.bound) if np.isfinite(self.bound) else None,
             "confirmed": self.confirmed,
+            "warnings": list(self.warnings),
         }
 
 
@@ -257,7 +261,8 @@ class Explorer:
         eigenvalues = np.concatenate([sample.eigenvalues for sample in found.values()])
         eigenvalues = eigenvalues[np.argsort(-eigenvalues.real, kind="stable")]
         verdicts = {name: sample.verdict for name, sample in found.items()}
-        return Answer(place, state, Verdict.joined(verdicts), eigenvalues, 0.0, True, verdicts)
+        said = tuple(self.walk.about_rubbers(place))
+        return Answer(place, state, Verdict.joined(verdicts), eigenvalues, 0.0, True, verdicts, said)
 
     def _confirmed(self, walk: StabilityWalk, place: Mu) -> Sample:
         """Sample of the motions of a class, by the full operator."""

@@ -35,6 +35,12 @@ def test_predictions_are_what_is_confirmed(explorer, asked):
     assert error <= max(10 * predicted.bound, 1e-7) and predicted.bound <= 1e-6
 
 
+def test_a_confirmed_answer_on_the_fit_of_a_rubber_says_so():
+    keys = COARSE | {"materials.constants": "published", "drive.pressure": 36e3}
+    (said,) = dbvfiv.load(thesis_case(keys)).explore().confirm().summary()["warnings"]
+    assert said.startswith("The rubber's constants are unstable here: at 36000 Pa")
+
+
 THIN = {"valve.thickness_factor": 0.586, "materials.strain_level": 0.1, "drive.head": "0.1506 m"}
 WET = THIN | {"fluid.density": 813.1, "outside.fluid": "same", "outside.lips": "open", "mesh.element": "MITC4"}
 

@@ -108,6 +108,10 @@ class Parameter:
         """Two values with their unit, "1 to 6 kPa"."""
         return f"{low / self.scale:.6g} to {self.amount(high)}"
 
+    def named(self, value: float) -> str:
+        """A value behind the name, "pressure = 6 kPa"."""
+        return f"{self.name} = {self.amount(value)}"
+
     def text(self, value: float) -> str:
         """A value for people, "6 kPa" or "α = 5 1/s"."""
         return f"{self.symbol} = {self.amount(value)}" if self.symbol else self.amount(value)

@@ -171,8 +171,6 @@ def find_equilibrium(model: ValveModel, pressure: float, observer: Observer | No
         If it is not reached.
     """
     observer = Observer() if observer is None else observer
-    for sentence in model_warnings(model):
-        observer.warn(sentence)
     state = LoadPath(model, SteadyOptions.of(model.case), observer=observer).go_to(pressure)
     for sentence in state_warnings(model, [state]):
         observer.warn(sentence)

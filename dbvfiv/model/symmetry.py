@@ -48,6 +48,11 @@ class Symmetry:
         return self.signs == (1, 1)
 
     @property
+    def alone(self) -> str:
+        """Words of a study that looks at no other class."""
+        return f"class {self.name} alone ({self.words})"
+
+    @property
     def sway_axis(self) -> int | None:
         """Axis, 0 or 1, along which the sections move as a whole; None where they do not."""
         return {(-1, 1): 0, (1, -1): 1}.get(self.signs)
@@ -108,8 +113,7 @@ def equilibria_of(part: Part) -> Symmetry:
 
 def only_class_of(part: Part) -> str:
     """Words of the class that studies without a choice of classes look at."""
-    own = equilibria_of(part)
-    return f"class {own.name} alone ({own.words})"
+    return equilibria_of(part).alone
 
 
 def symmetry_named(name: str) -> Symmetry:

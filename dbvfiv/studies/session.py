@@ -281,7 +281,7 @@ class Session:
     def equilibrium(self, observer: Observer, known: Sequence[SteadyState] = ()) -> SteadyState:
         """The steady state at drive.pressure: one known already, the valve at rest, or by load steps.
 
-        What is worth knowing about model and state is told to the observer, again where the state is known.
+        What is worth knowing about the state is told to the observer, again where it is known.
 
         Raises
         ------
@@ -292,7 +292,7 @@ class Session:
         starts = known or [start for start in [self.start] if start is not None and start.pressure == pressure]
         if not starts and pressure != model.flow.back:
             return find_equilibrium(model, pressure, observer)
-        for sentence in (*model_warnings(model), *state_warnings(model, starts)):
+        for sentence in state_warnings(model, starts):
             observer.warn(sentence)
         # flow and jet follow the density of this case
         return redescribe(model, starts[0]) if starts else rest_state(model)
@@ -375,6 +375,8 @@ class Session:
             for note in record.notes("settled")[-1:]:  # of the first attempt where it goes on
                 for sentence in note.get("warnings", ()):
                     record.warn(sentence)
+            for sentence in model_warnings(self.described):
+                record.warn(sentence)
             try:
                 study.run(self, record, **_with_files(study, record, choices))
                 complete = True

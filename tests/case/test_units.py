@@ -78,9 +78,10 @@ def test_a_bar_speaks_in_heads():
     assert progress._bar.text == "equilibrium at 1 m, 3 iterations"
 
 
-def test_a_range_of_heads_makes_a_table_of_heads(command_line):
+@pytest.mark.parametrize(("unit", "heads"), [("m", "0.5 m:2 m:2"), ("psi", "0.5 psi:2 psi:2")])
+def test_a_range_of_pressures_makes_a_table_in_their_unit(command_line, unit, heads):
     keys = [*THESIS_SET, "--set=mesh.around=6", "--set=mesh.along=8", "--set=damping.alpha=5"]
-    said = command_line("sweep", *keys, "--over", "pressure=0.5 m:2 m:2").out.splitlines()
-    unit = next(i for i, line in enumerate(said) if line.split()[:2] == ["m", "1/s"])
-    assert [float(line.split()[0]) for line in said[unit + 1 : unit + 3]] == [0.5, 2.0]
-    assert any(line.endswith("checked at pressure 0.5, 2 m.") for line in said), said
+    said = command_line("sweep", *keys, "--over", f"pressure={heads}").out.splitlines()
+    head = next(i for i, line in enumerate(said) if line.split()[:2] == [unit, "1/s"])
+    assert [float(line.split()[0]) for line in said[head + 1 : head + 3]] == [0.5, 2.0]
+    assert any(line.endswith(f"checked at pressure 0.5, 2 {unit}.") for line in said), said

@@ -19,6 +19,7 @@ from dbvfiv.studies.onset import study as onset_study
 from dbvfiv.studies.onset.line import intervals_of
 from dbvfiv.studies.stability.samples import Sample
 from dbvfiv.studies.stability.verdict import FLUTTERS, NOT_VALID, OUTCOMES, STABLE, UNDECIDED
+from dbvfiv.studies.sweep import figures as sweep_figures
 from eigen.columns import DIRECT
 
 
@@ -99,6 +100,21 @@ def test_branches_are_told_apart_without_colour(sweep):
     assert len(markers) == len(sweep.branches) and len(set(markers)) == len(markers)
 
 
+def test_the_ground_of_a_sweep_is_red_where_modes_take_turns_and_hatched_where_none_is_known():
+    """B is unstable up to 0.6 and A from 0.4 on; at the last value nothing is known."""
+    rates = {"A": [-4.0, 6.0, 6.0, np.nan], "B": [6.0, -4.0, -4.0, np.nan]}
+    branches = [SimpleNamespace(growth_rate=np.array(rate)) for rate in rates.values()]
+    result = SimpleNamespace(
+        parameter="alpha", axis=SimpleNamespace(log=False), branches=branches, unstable_count=np.array([2, 2, 2, -1])
+    )
+    result.crossings = lambda: [SimpleNamespace(value=value) for value in (0.4, 0.6)]
+    axes = new_figure().add_subplot()
+    sweep_figures._shade(axes, result, np.arange(4.0))
+    red, hatched = axes.patches
+    assert (red.get_x(), red.get_width()) == (0.0, 2.0) and red.get_facecolor()[0] > red.get_facecolor()[2]
+    assert (hatched.get_x(), hatched.get_width(), bool(hatched.get_hatch())) == (2.0, 1.0, True)
+
+
 # -- onsets and maps
 
 
@@ -106,6 +122,7 @@ def onset_result(values, growth, certified=None):
     case = thesis_case({"onset.over": f"pressure={values[0]:g}:{values[-1] + 1:g}:5"})
     rows = np.stack([growth, *(np.full(len(growth), -100.0 * k) for k in (1, 2, 3))], axis=1)
     point = {"value": 9e3, "frequency": 37.0, "growth_rate": 0.0, "criticality": "super", "uncertainty": 200.0}
+    point |= {"confirmed": True}
     point |= {"edge": True, "gains": False}
     points = [point] if len(values) > 1 else []
     certified = np.ones(len(values), bool) if certified is None else np.array(certified)
@@ -132,7 +149,18 @@ def test_onsets_say_static_pressure_and_keep_legend_and_title_apart():
     figure.canvas.draw()
     (legend,) = figure.legends
     assert legend.get_window_extent().y1 <= figure.axes[1].get_window_extent().y0
-    assert any("9 kPa" in text and "supercritical" in text for text in texts(figure))
+    assert any("9 kPa" in text and text.endswith("supercritical") for text in texts(figure))
+
+
+def test_onsets_that_are_not_confirmed_look_so_and_growth_of_another_class_is_in_the_frame():
+    result = onset_result([2e3, 6e3, 9e3, 20e3], np.array([50.0, 20.0, 0.0, -30.0]))
+    result.points[0] |= {"criticality": None, "confirmed": False}
+    scan = {"values": [2e3, 20e3], "growth_rate": [-5.0, 90.0], "frequency": [40.0, 40.0]}
+    result.classes = [{"symmetry": "SA", "scan": scan}]
+    figure = onset_study.onset(result)
+    assert any(text.endswith("37 Hz\nnot confirmed") for text in texts(figure))
+    mark = next(line for line in figure.axes[0].lines if line.get_marker() == "o")
+    assert mark.get_markerfacecolor() == "0.75" and figure.axes[0].get_ylim()[1] > 90.0
 
 
 def test_onsets_shade_what_is_certified_alone_and_hatch_the_rest():

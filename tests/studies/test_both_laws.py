@@ -39,6 +39,7 @@ def test_they_are_printed_side_by_side_and_kept(command_line, tmp_path):
     out = command_line("modes", *OPTIONS, "--law=both", "--count=3", "-o", tmp_path / "both.h5").out
     assert "Flutters under quasi-steady continuity: " in out and "Stable under storage continuity: " in out
     assert out.count("growth rate") == 0 and "disagree" in out
+    assert out.count("Modes are of class SS alone (both lips open and close).") == 1
     read = dbvfiv.load_result(tmp_path / "both.h5")
     law, other = read.other_law
     assert law == "storage" and len(other.modes) == 3

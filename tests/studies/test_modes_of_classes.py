@@ -65,6 +65,7 @@ def test_they_come_back_from_a_file(four, tmp_path):
     assert stored.summary() == four.summary() and stored.lines() == four.lines()
     for name, certificate in four.certificates.items():
         assert np.array_equal(stored.certificates[name].phase, certificate.phase)
+    assert "alone" not in four.sentence
     assert "class" in four.lines()[0] and any("sway together in y" in line for line in four.lines())
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -38,9 +39,13 @@ def test_onset_names_the_most_unstable_class(onset):
     for value, growth, name in zip(leading["values"], leading["growth_rate"], leading["symmetry"]):
         found = make().modes("6 kPa", density=value, count=3, symmetry=name)
         assert found.modes[0].growth_rate == pytest.approx(growth, rel=1e-6)
+    (edge,) = [point["value"] for point in onset.points if point["edge"]]
+    outcomes = ["flutters" if value < edge else "stable" for value in leading["values"]]
+    assert [v["outcome"] for v in leading["verdict"]] == outcomes
+    assert leading["verdict"][-1]["reason"].startswith("In SS: ") and all(v["certain"] for v in leading["verdict"])
     rates = [[part["scan"]["growth_rate"][0], *[leading["growth_rate"][0]]] for part in said["classes"]]
     assert all(own < most for own, most in rates)
-    assert "class" in onset.lines()[1] and onset.lines()[2].endswith("SS")
+    assert "class" in onset.lines()[1] and onset.lines()[2].endswith("SS") and "alone" not in onset.lines()[0]
 
 
 def test_stretches_are_those_of_all_classes(onset):
@@ -48,6 +53,16 @@ def test_stretches_are_those_of_all_classes(onset):
     low, high = onset.values[[0, -1]]
     assert onset.unstable_intervals == [(low, edge)]
     assert onset.stable_intervals == [(edge, high)]
+
+
+def test_without_an_onset_the_valve_is_stable_up_to_the_band_of_all_classes(onset):
+    parts = [replace(part, samples=part.samples[-1:], points=()) for part in (onset.own, *onset._classes)]
+    narrow = replace(parts[2], samples=(replace(parts[2].samples[0], band=30.0),))
+    said = onset._without_onset([*parts[:2], narrow, parts[3]])
+    assert said.startswith("No onset: the valve is stable from ")
+    assert said.endswith(" for modes up to 30 Hz in classes SS, SA, AS, AA.")
+    assert onset._without_onset(parts[:1]).endswith(" in class SS.")
+    assert onset._line(onset.own.points[0].summary()).endswith("  SS")  # as of another flow model
 
 
 def test_onsets_come_back_from_a_file(onset, tmp_path):

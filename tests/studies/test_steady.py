@@ -19,6 +19,7 @@ from dbvfiv.studies.session import Session
 from dbvfiv.studies.stability.place import redesigned
 from dbvfiv.studies.steady import study
 from dbvfiv.studies.steady.study import PARTED, _met, parted_width
+from tests.small_valves import SMALL
 
 
 @pytest.fixture(scope="module")
@@ -140,6 +141,23 @@ def test_folded_wall_is_told():
     assert "Half the wall exceeds the radius" in sentence and "z 0.21" in sentence
     thin = ValveModel(thesis_case({"mesh.around": 28, "mesh.along": 24, "valve.thickness_factor": 0.5}))
     assert not list(model_warnings(thin))
+
+
+RANGES = {
+    "sweep": {"sweep.over": "pressure=6e3:36e3:2", "sweep.count": 2},
+    "onset": {"onset.over": "density=900:1000:2", "onset.coarse_mesh": 0, "onset.normal_form": False},
+    "map": {"map.x": "pressure=6e3:36e3:2", "map.y": "density=900:1000:2", "map.checks": 0, "map.curve": False},
+    "uncertainty": {"uncertainty.samples": 16, "uncertainty.inputs": {"density": "normal(1 %)"}},
+}
+
+
+@pytest.mark.parametrize("kind", RANGES)
+def test_studies_over_parameters_judge_wall_and_rubber(kind):
+    """Their verdicts rest on Rayleigh damping, and hold for the fit of the rubber and not for the rubber."""
+    keys = {"materials.constants": "published", "drive.pressure": 36e3} | RANGES[kind]
+    said = Session(thesis_case(SMALL | keys)).perform(kind).warnings
+    for words in ("Half the wall exceeds the radius", "The rubber's constants are unstable here: at 36000 Pa"):
+        assert sum(words in sentence for sentence in said) == 1
 
 
 def one_iteration(model) -> SteadyOptions:

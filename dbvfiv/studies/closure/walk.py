@@ -15,7 +15,7 @@ from scipy.integrate import trapezoid
 from ...errors import SolveError
 from ...model.classes import linearise_class
 from ...model.closed import ClosedValve, area_under, load_steps
-from ...model.equilibria import model_warnings, state_warnings
+from ...model.equilibria import state_warnings
 from ...model.load_curve import LoadCurve
 from ...model.load_steps import LoadSteps
 from ...model.newton import NewtonResult
@@ -286,7 +286,7 @@ class ClosureWalk:
         again. One that is not reached ends the list, for those after it lie beyond it.
         """
         record = self.record
-        self._warn([*model_warnings(self.model), *self.model.start_warnings()])
+        self._warn(self.model.start_warnings())
         if not record.notes(STATES):
             record.note(STATES, reference_opening=self.model.reference_opening)
         try:

@@ -134,7 +134,7 @@ def run(
         check=check,
     )
     result = IdentifyResult(record, session)
-    for sentence in result.doubts:
+    for sentence in (*result.doubts, *walk.about_rubbers()):
         record.warn(sentence)
     if posterior is not None:
         write_case(result.posterior_case(), posterior)

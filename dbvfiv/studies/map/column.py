@@ -14,7 +14,7 @@ import numpy as np
 from eigen.columns import MISSING
 
 from ...case.axis import Axis, Level
-from ...case.parameters import Mu
+from ...case.parameters import PARAMETERS, Mu
 from ...errors import CaseError, JumpError, SolveError
 from ...model.symmetry import Symmetry, chosen_symmetries
 from ...texts import shortly
@@ -119,6 +119,10 @@ class MapPlan:
         """Parameters of a cell."""
         named = {self.across.parameter: across, self.along.parameter: along}
         return self.base.at(**({"storage": law} | named))
+
+    def told(self, x: float, y: float) -> str:
+        """Values of both axes with their units, "pressure = 6 kPa, density = 10 kg/m³"."""
+        return f"{PARAMETERS[self.x.parameter].named(x)}, {PARAMETERS[self.y.parameter].named(y)}"
 
     def line(self, walk: StabilityWalk, across: float, part: int, edges: bool) -> ParameterLine:
         """Line of the cells of a column in a part."""

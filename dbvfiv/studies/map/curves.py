@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 
 from ...case.axis import Level
+from ...case.parameters import PARAMETERS
 from ...texts import shortly
 from ..stability.line import ACCURATE
 from .column import MapColumn, MapPlan
@@ -336,10 +337,8 @@ def doubts(plan: MapPlan, curves) -> Iterator[str]:
     """Sentences about curves that are not exact."""
     for curve in curves:
         if not curve.exact:
-            yield (
-                f"The {curve.title} near {plan.x.parameter} = {curve.x[0]:.6g}, {plan.y.parameter} = {curve.y[0]:.6g} "
-                f"is not exact: {curve.reason}."
-            )
+            at = plan.told(float(curve.x[0]), float(curve.y[0]))
+            yield f"The {curve.title} near {at} is not exact: {curve.reason}."
 
 
 def _chains(web: Web) -> list[list[tuple[int, int]]]:
@@ -378,17 +377,18 @@ def _curve(plan: MapPlan, web: Web, chain) -> OnsetCurve:
     along = np.array([onset.along for onset in onsets])
     x, y = (along, across) if plan.transposed else (across, along)
     mismatch = float(np.max([onset.residual for onset in onsets]))
-    reason = _reason(web, chain, mismatch)
+    reason = _reason(plan, web, chain, mismatch)
     frequency = np.array([onset.frequency for onset in onsets])
     level = plan.curves[web.number][1]
     words = "" if level == Level() else level.words
     return OnsetCurve(web.law, x, y, frequency, not reason, mismatch, reason, words)
 
 
-def _reason(web: Web, chain, mismatch: float) -> str:
+def _reason(plan: MapPlan, web: Web, chain, mismatch: float) -> str:
     if not mismatch <= ACCURATE:
         return "not all of its points were corrected with the full matrices"
     for i, k in chain:
         if not (web.is_known(i, k, 1) and web.is_known(i, k, -1)):
-            return f"it is not known between the columns beside {web.columns[i].value:.6g}"
+            at = PARAMETERS[plan.across.parameter].named(web.columns[i].value)
+            return f"it is not known between the columns beside {at}"
     return ""

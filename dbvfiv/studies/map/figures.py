@@ -178,9 +178,8 @@ def _headline(figure: Figure, result: StudyResult) -> None:
 def _vouched(result: StudyResult) -> str:
     certified, found = certified_cells(result), result.grid("unstable") >= 0
     text = f"{int(certified.sum())} of {int(found.sum())} cells certified by two counts"
-    if len(result.plan.classes) > 1:
-        names = ", ".join(motion.name for motion in result.plan.classes)
-        text += f" in classes {names} (curves: {result.plan.classes[0].name})"
+    own, *others = (motion.name for motion in result.plan.classes)
+    text += f" in classes {', '.join([own, *others])} (curves: {own})" if others else f" in class {own} alone"
     if not certified.all():
         text += ", the others hatched"
     if invalid_cells(result).any():

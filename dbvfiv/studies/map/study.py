@@ -13,6 +13,7 @@ import numpy as np
 
 from eigen.columns import DIRECT, MISSING
 
+from ...case.parameters import PARAMETERS
 from ...errors import CaseError, SolveError
 from ...fit.cards import outside_band
 from ...model.leading import other_end
@@ -70,8 +71,7 @@ def check_cells(
         try:
             cell = walk.cell(plan.place(usable[i].value, kept.value, plan.laws[law]))
         except (SolveError, CaseError) as error:
-            at = f"{plan.x.parameter} = {x:.6g}, {plan.y.parameter} = {y:.6g}"
-            walk.observer.warn(f"The cell at {at} was not solved again: {error}")
+            walk.observer.warn(f"The cell at {plan.told(x, y)} was not solved again: {error}")
             continue
         leading, true = (complex(v[0]) if len(v) else complex(np.nan) for v in (kept.eigenvalues, cell.leading))
         error, unstable = abs(leading - true) / max(abs(true), 1.0), cell.certificate.unstable
@@ -169,7 +169,8 @@ def _doubts(plan: MapPlan, columns: Iterable[MapColumn], checks: Iterable[dict[s
             said.append(f"{prefix}{len(lost)} cells have no steady state that was found; the first: {lost[0]}")
         if refused:
             first = next(c for c in solved if c.refusal)
-            said.append(f"{prefix}{refused} cells are not valid; the first at {first.value:.6g}: {first.refusal}")
+            at = PARAMETERS[plan.across.parameter].named(first.value)
+            said.append(f"{prefix}{refused} cells are not valid; the first at {at}: {first.refusal}")
         if left_open:
             said.append(f"{prefix}{len(left_open)} cells are left open. {left_open[0]}")
         if doubtful:
@@ -189,8 +190,7 @@ def _doubts(plan: MapPlan, columns: Iterable[MapColumn], checks: Iterable[dict[s
             apart = f"differs by {check['error']:.1e}"
             if check["error"] <= ACCEPTED:
                 apart = f"has {check['unstable']} unstable eigenvalues and the cell another number"
-            at = f"{plan.x.parameter} = {check['x']:.6g}, {plan.y.parameter} = {check['y']:.6g}"
-            said.append(f"At {at} the full pencil {apart}.")
+            said.append(f"At {plan.told(check['x'], check['y'])} the full pencil {apart}.")
     frequencies = [s.verdict.frequency for c in solved for row in c.samples.values() for s in row]
     return [*said, *filter(None, [outside_band(plan.case, frequencies)])]
 
@@ -238,7 +238,7 @@ def tables_of(_mesh: MeshData | None) -> tuple[TableSpec, ...]:
 
 def gap_sentence(plan: MapPlan, column: MapColumn) -> str:
     """Why there is no column."""
-    return f"{plan.across.parameter} = {column.value:.6g}: {column.failure}"
+    return f"{PARAMETERS[plan.across.parameter].named(column.value)}: {column.failure}"
 
 
 def keep_column(record: GrowingRecord, column: MapColumn) -> None:
@@ -322,7 +322,8 @@ def run(session: Session, record: GrowingRecord, workers: int | None = None) -> 
     checks, curves = check_cells(plan, columns, walk, case.map.checks), linked(plan, columns)
     record.note(_CHECKS, checks=checks)
     record.note(_CURVES, curves=[asdict(curve) for curve in curves])
-    for sentence in (*(doubts(plan, curves) if case.map.curve else ()), *_doubts(plan, columns, checks)):
+    unsure = doubts(plan, curves) if case.map.curve else ()
+    for sentence in (*unsure, *_doubts(plan, columns, checks), *walk.about_rubbers()):
         record.warn(sentence)
     if case.map.samples:
         chances.find_chances(case, record, processes)
@@ -479,7 +480,8 @@ class MapResult(StudyResult):
         return f"{lost} of {len(self.columns)} columns were not reached"
 
     def lines(self) -> list[str]:
-        lines = [f"At {describe_fixed(self.case, *self.moved)}:"]
+        alone = "" if self.classes else f"; {self.plan.classes[0].alone}"
+        lines = [f"At {describe_fixed(self.case, *self.moved)}{alone}:"]
         for i in range(len(self.plan.laws)):
             lines.append(self._cells_line(i))
             lines += [self._curve_line(curve) for curve in self.curves if curve.law == i]
@@ -504,6 +506,7 @@ class MapResult(StudyResult):
         gaps, direct = int((how == MISSING).sum()) - invalid, int((how == DIRECT).sum())
         sealed = int(self.grid("sealed")[law].sum())
         name = LAWS.get(self.plan.laws[law], f"blend {self.plan.laws[law]:g}")
+        name += f", class {self.plan.classes[0].name}" if self.classes else ""
         return (
             f"{name}: {how.shape[1]} x {how.shape[0]} cells, {unstable} unstable, {number[STABLE]} stable, "
             f"{int(certified.sum())} of {how.size} certified"
@@ -516,11 +519,18 @@ class MapResult(StudyResult):
         )
 
     def _verdicts(self, law: int) -> list[list[dict[str, Any]]]:
-        """Verdicts on the cells of the grid, (y, x)."""
+        """Verdicts on the cells of the grid in all classes of motion, (y, x)."""
         found = {column.value: column for column in self.columns if column.level == 0}
-        gap = Verdict.undecided("The column of this cell was not solved.").summary()
+        gap = Verdict.undecided("The column of this cell was not solved.")
+        names = [motion.name for motion in self.plan.classes]
+        parts = dict(zip(names, (law, *range(len(self.plan.laws), len(self.plan.parts)))))
+
+        def verdict(across: float, i: int) -> Verdict:
+            column = found.get(across)
+            return Verdict.joined({name: column.verdict(part, i) for name, part in parts.items()}) if column else gap
+
         table = [
-            [found[across].verdict(law, i).summary() if across in found else gap for across in self.plan.across.values]
+            [verdict(across, i).summary() for across in self.plan.across.values]
             for i in range(len(self.plan.along.values))
         ]
         return [list(row) for row in zip(*table)] if self.plan.transposed else table
@@ -535,12 +545,10 @@ class MapResult(StudyResult):
 
     def _curve_line(self, curve: OnsetCurve) -> str:
         kind = "exact" if curve.exact else "not exact"
-        return (
-            f"  {curve.title}, {kind}, {len(curve.x)} points: {self.plan.x.parameter} "
-            f"{min(curve.x):.6g} to {max(curve.x):.6g}, "
-            f"{self.plan.y.parameter} {min(curve.y):.6g} to {max(curve.y):.6g}, "
-            f"{min(curve.frequency):.4g} to {max(curve.frequency):.4g} Hz"
-        )
+        rows = ((self.plan.x.parameter, curve.x), (self.plan.y.parameter, curve.y))
+        spans = ", ".join(f"{name} {PARAMETERS[name].span(min(row), max(row))}" for name, row in rows)
+        hertz = f"{min(curve.frequency):.4g} to {max(curve.frequency):.4g} Hz"
+        return f"  {curve.title}, {kind}, {len(curve.x)} points: {spans}, {hertz}"
 
 
 def _axis(axis) -> dict[str, Any]:

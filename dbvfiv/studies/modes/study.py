@@ -223,8 +223,11 @@ class ModesResult(StudyResult):
 
     @property
     def sentence(self) -> str:
-        """The verdict in a sentence for people, which names the continuity law and what is outside."""
-        return self.verdict.sentence(self.law)
+        """The verdict in a sentence for people, which names the continuity law and what is outside, and the class of
+        motion where only one was searched.
+        """
+        alone = [f"Modes are of {symmetry_named(name).alone}." for name in self._classes]
+        return " ".join([self.verdict.sentence(self.law), *(alone if len(alone) == 1 else ())])
 
     @property
     def law(self) -> str:

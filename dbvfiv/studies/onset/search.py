@@ -110,11 +110,11 @@ class OnsetSearch:
         """Sentences about what is not known: stretches of the scan without a certificate, and a band that was searched
         instead of all frequencies.
         """
-        name, said = self.axis.parameter, []
+        row, said = PARAMETERS[self.axis.parameter], []
         for low, high in joined_stretches([self.scan.uncertain]):
             within = [s.left_open or s.failure or s.refusal for s in self._scanned if low <= s.value <= high]
             why = next(filter(None, within), "Spectrum and independent count do not agree everywhere.")
-            said.append(f"Between {name} = {low:.6g} and {high:.6g} nothing is claimed. {why}")
+            said.append(f"Between {row.named(low)} and {row.amount(high)} nothing is claimed. {why}")
         bands = [s.verdict.band for s in self.line.samples.values() if np.isfinite(s.verdict.band)]
         if bands:
             said.append(f"Verdicts hold for modes up to {digits(min(bands), 4)} Hz; {other_end(self.walk.case)}.")
@@ -216,19 +216,19 @@ class OnsetSearch:
         apart = np.abs(spectrum.eigenvalues - eigenvalue)
         if not len(spectrum) or apart.min() > SAME * abs(eigenvalue):
             raise SolveError(
-                f"At {self.axis.parameter} = {place[self.axis.parameter]:.6g} the full pencil has no mode "
+                f"At {PARAMETERS[self.axis.parameter].named(place[self.axis.parameter])} the full pencil has no mode "
                 f"near {abs(eigenvalue.imag) / (2 * np.pi):.4g} Hz that is neutral, so no onset is claimed there."
             )
         return spectrum.mode(int(np.argmin(apart)))
 
 
 def _confirmed(below: Side, above: Side, gains: bool, certified: bool, line: float) -> tuple[bool, str]:
-    for side in (below, above):
+    for where, side in (("below", below), ("above", above)):
         if side.unstable_count != side.unstable_count_independent:
             return (
                 False,
                 (
-                    f"at {side.value:.6g} the spectrum lists {side.unstable_count} unstable eigenvalues and the "
+                    f"{where} it the spectrum lists {side.unstable_count} unstable eigenvalues and the "
                     f"independent count finds {side.unstable_count_independent}."
                 ),
             )
@@ -373,7 +373,7 @@ def run_onset(
         points = with_uncertainty(case, variant, points, observer, warnings, known)
     for p in points:
         if not p.confirmed:
-            warnings.append(f"The onset at {parameter} = {p.value:.6g} is not confirmed: {p.note}")
+            warnings.append(f"The onset at {PARAMETERS[parameter].named(p.value)} is not confirmed: {p.note}")
     warnings += filter(None, [outside_band(case, [p.frequency for p in points])])
     points = tuple(sorted(points, key=lambda p: p.value))
     samples, said = tuple(search.asked), (tuple(failures), tuple(warnings))

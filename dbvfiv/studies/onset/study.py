@@ -21,7 +21,7 @@ from ..session import Session, Study
 from ..stability.dimensions import Variant, compare_ranges, leading_class, own_variant, variants
 from ..stability.place import check_scan, describe_fixed, fixed_conditions
 from ..stability.samples import SAMPLE_TABLE, Sample, keep_samples, read_samples
-from ..stability.verdict import DIVERGES, FLUTTERS, NOT_VALID, STABLE, UNDECIDED, Verdict, lowered
+from ..stability.verdict import NOT_VALID, Verdict, lowered
 from ..stability.walk import StabilityWalk
 from .line import FoundOnsets, Interval, OnsetPoint, joined_stretches
 from .search import FINE, run_onset
@@ -71,6 +71,8 @@ def run(session: Session, record: GrowingRecord) -> None:
             record.fail(f"{variant.prefix(asked[0])}{sentence}")
         for sentence in found.warnings:
             record.warn(f"{variant.prefix(asked[0])}{sentence}")
+    for sentence in walk.about_rubbers():
+        record.warn(sentence)
 
 
 def _points(record: Record, variant: Variant) -> list[OnsetPoint]:
@@ -175,7 +177,9 @@ class OnsetResult(StudyResult):
 
     @cached_property
     def leading(self) -> dict[str, Any]:
-        """Growth rate, frequency and class of the most unstable motion at the values that all classes were asked at."""
+        """Growth rate, frequency and class of the most unstable motion at the values that all classes were asked at;
+        where others than that of the equilibria were, the verdict on them all too.
+        """
         scans = {found.variant.symmetry: found.scan() for found in (self.own, *self._classes)}
         values = sorted(set.intersection(*(set(scan["values"]) for scan in scans.values())))
         rows = [[scan["values"].index(value) for value in values] for scan in scans.values()]
@@ -185,6 +189,9 @@ class OnsetResult(StudyResult):
         )
         found = leading_class(list(scans), rates, frequencies)
         found["symmetry"] = [name or self._own for name in found["symmetry"]]
+        if self._classes:
+            verdicts = [[Verdict.read(scan["verdict"][i]) for i in at] for scan, at in zip(scans.values(), rows)]
+            found["verdict"] = [Verdict.joined(dict(zip(scans, own))).summary() for own in zip(*verdicts)]
         return {"values": values} | found | {"certified": certified.all(axis=0).tolist()}
 
     def _intervals(self, join: Callable, name: str) -> list[Interval]:
@@ -238,14 +245,18 @@ class OnsetResult(StudyResult):
         return f"Parts of the range were not reached: {lost} states failed"
 
     def lines(self) -> list[str]:
-        fixed = f"At {describe_fixed(self.case, self.parameter)}:"
-        if self.other_law is not None:
-            return [*self._table(fixed, self.points), *self._other_lines(), self.comparison]
-        return self._table(fixed, self.points)
+        fixed, alone = f"At {describe_fixed(self.case, self.parameter)}", f"; {self.own.variant.motion.alone}"
+        lines = self._table(f"{fixed}{'' if self.classes else alone}:", self.points, [self.own, *self._classes])
+        if self.other_law is None:
+            return lines
+        law, points = self.other_law["continuity"], self.other_law["points"]
+        other = [found for variant, found in self.variants.items() if variant.continuity == law]
+        return [*lines, *self._table(f"Under {law} continuity{alone}:", points, other), self.comparison]
 
-    def _table(self, fixed: str, points) -> list[str]:
+    def _table(self, fixed: str, points, parts: Sequence[FoundOnsets]) -> list[str]:
+        """Lines on the points of some classes under one flow model."""
         if not points:
-            return [fixed, self._without_onset()]
+            return [fixed, self._without_onset(parts)]
         unit = self._row.shown_unit
         head = (
             f"{self.parameter + (f', {unit}' if unit else ''):>16} {'+-':>9} {'Hz':>8}  "
@@ -253,19 +264,6 @@ class OnsetResult(StudyResult):
         )
         head += "  class" if self.classes else ""
         return [fixed, head, *(self._line(point) for point in points)]
-
-    def _other_lines(self) -> list[str]:
-        other = self.other_law
-        fixed = f"Under {other['continuity']} continuity:"
-        if other["points"]:
-            return self._table(fixed, other["points"])
-        outcomes = {verdict["outcome"] for verdict in other["scan"].get("verdict", ())}
-        sure = outcomes and (outcomes == {STABLE} or outcomes <= {FLUTTERS, DIVERGES}) and not other["uncertain"]
-        said = f"No onset: the valve is {'stable' if outcomes == {STABLE} else 'unstable'} over the range."
-        return [
-            fixed,
-            said if sure else "No onset was found, and none is ruled out: at some values nothing is known.",
-        ]
 
     @property
     def _row(self) -> Parameter:
@@ -277,28 +275,27 @@ class OnsetResult(StudyResult):
         """Class of the equilibria."""
         return self.own.variant.symmetry
 
-    def _without_onset(self) -> str:
-        row = self._row
-        low, high = self.values[[0, -1]] if len(self.values) else (math.nan, math.nan)
-        scanned = f"from {row.span(low, high)}"
+    def _without_onset(self, parts: Sequence[FoundOnsets]) -> str:
+        values, verdicts = parts[0].values.tolist(), parts[0].verdicts
+        scanned = f"from {self._row.span(*(values[:1] + values[-1:] or (math.nan, math.nan)))}"
         if not self.complete:
-            return f"No onset has been located yet: the search ended early, after {len(self.values)} values {scanned}."
-        sure, outcomes = sum(self.leading["certified"]), [verdict.outcome for verdict in self.verdicts]
-        invalid = outcomes.count(NOT_VALID)
-        if outcomes and invalid == len(outcomes):
-            return f"Not valid {scanned}: {lowered(self.verdicts[0].reason)}"
-        unclear = self.uncertain_intervals or not all(self.leading["certified"])
-        if unclear or len(set(outcomes)) != 1 or UNDECIDED in outcomes:
+            return f"No onset has been located yet: the search ended early, after {len(values)} values {scanned}."
+        invalid = [verdict.outcome for verdict in verdicts].count(NOT_VALID)
+        if values and invalid == len(values):
+            return f"Not valid {scanned}: {lowered(verdicts[0].reason)}"
+        sure = set.intersection(*(set(part.values[part.certified].tolist()) for part in parts))
+        states = [{verdict.stable for verdict in part.verdicts} for part in parts]
+        unclear = any(part.uncertain_intervals or not part.certified.all() for part in parts)
+        if unclear or any(known not in ({True}, {False}) for known in states):
             but = f" {invalid} of them are not valid: the constants of the rubber do not hold." if invalid else ""
             return (
-                f"No onset was found, and none is ruled out: {sure} of {len(self.values)} values {scanned} carry "
+                f"No onset was found, and none is ruled out: {len(sure)} of {len(values)} values {scanned} carry "
                 f"two counts that agree.{but}"
             )
-        state = "unstable" if outcomes[0] != STABLE or self.unstable_intervals else "stable"
-        band = min(verdict.band for verdict in self.verdicts)
+        band = min(verdict.band for part in parts for verdict in part.verdicts)
         scanned += f" for modes up to {digits(band, 4)} Hz" if np.isfinite(band) else ""
-        which = f" in classes {', '.join([self._own, *(c['symmetry'] for c in self.classes)])}" if self.classes else ""
-        return f"No onset: the valve is {state} {scanned}{which}."
+        which = ("class " if len(parts) == 1 else "classes ") + ", ".join(part.variant.symmetry for part in parts)
+        return f"No onset: the valve is {'unstable' if {False} in states else 'stable'} {scanned} in {which}."
 
     def _line(self, point: dict[str, Any]) -> str:
         scale = self._row.scale
@@ -308,9 +305,10 @@ class OnsetResult(StudyResult):
         spread = " " * 9 if point["uncertainty"] is None else f"{point['uncertainty'] / scale:9.2g}"
         below, above = (point[side]["growth_rate"] for side in ("below", "above"))
         mark = "" if point["confirmed"] else "  not confirmed"
+        mark += f"  {point.get('symmetry', self._own)}" if self.classes else ""
         return (
             f"{point['value'] / scale:16.8g} {spread} {point['frequency']:8.3f}  "
-            f"{words:<28}{below:11.4g}{above:11.4g}{mark}" + (f"  {point['symmetry']}" if self.classes else "")
+            f"{words:<28}{below:11.4g}{above:11.4g}{mark}"
         )
 
 
@@ -387,7 +385,8 @@ def onset(result: StudyResult) -> Figure:
     for row in result.points:
         _mark(row, scale, axis.parameter, top, bottom)
     # room for the words at the marks
-    top.set_ylim(low, max(1.1 * np.nanmax(result.growth_rates, initial=0.0), -0.3 * low))
+    rates = [result.growth_rates.ravel(), *(part["scan"]["growth_rate"] for part in result.classes)]
+    top.set_ylim(low, max(1.1 * np.nanmax(np.concatenate(rates), initial=0.0), -0.3 * low))
     top.set_ylabel("Growth rate, 1/s")
     bottom.set_ylabel("Frequency, Hz")
     bottom.set_ylim(bottom=0)
@@ -435,17 +434,17 @@ def _draw_scan(result: StudyResult, values: np.ndarray, top, bottom) -> float:
 
 
 def _mark(row: dict, scale: float, parameter: str, top, bottom) -> None:
-    """An onset with its uncertainty and its numbers: full where it is supercritical, hollow where it is subcritical."""
+    """An onset with its uncertainty and numbers: full where supercritical, hollow where subcritical, else grey."""
     x = row["value"] / scale
-    inside = "white" if row["criticality"] == "sub" else PUBLISHED
+    inside = {"super": PUBLISHED, "sub": "white"}.get(row["criticality"], "0.75")
     look = {"marker": "o", "ms": 7, "color": PUBLISHED, "mfc": inside, "ls": "none", "zorder": 5}
     top.plot(x, 0.0, **look)
     bottom.plot(x, row["frequency"], **look)
     if row["uncertainty"] is not None:
         reach = row["uncertainty"] / scale
         top.plot([x - reach, x + reach], [0, 0], color=ACCENT, lw=3.5, alpha=0.75, zorder=4, solid_capstyle="butt")
-    kind = {"super": "supercritical", "sub": "subcritical"}.get(row["criticality"], "")
-    told = (PARAMETERS[parameter].amount(row["value"], 4), f"{digits(row['frequency'])} Hz", kind)
+    kind, doubt = CRITICALITY.get(row["criticality"], ""), "" if row["confirmed"] else "not confirmed"
+    told = (PARAMETERS[parameter].amount(row["value"], 4), f"{digits(row['frequency'])} Hz", kind, doubt)
     words = "\n".join(filter(None, told))
     # on the side of the mark that the curve leaves free
     place = {"xytext": (9, -8), "va": "top"} if row["gains"] else {"xytext": (9, 8), "va": "bottom"}

@@ -391,7 +391,8 @@ def run(session: Session, record: GrowingRecord) -> None:
         except (CaseError, SolveError, ArithmeticError) as error:
             record.fail(f"At {PARAMETERS[asked.parameter].text(value)}: {error}")
         record.item(value)
-    for sentence in filter(None, (ended_early(record, case), outside_band(case, record.column(PEAKS, "frequency")))):
+    outside = outside_band(case, record.column(PEAKS, "frequency"))
+    for sentence in filter(None, (ended_early(record, case), outside, *walk.about_rubbers())):
         record.warn(sentence)
 
 
@@ -500,7 +501,7 @@ class ResponseResult(StudyResult):
         return f"There is no response at {lost} of the states"
 
     def lines(self) -> list[str]:
-        row = PARAMETERS[self.parameter]
+        row = self.case.units.parameter(self.parameter)
         said = [f"At {describe_fixed(self.case, self.parameter)}; {self.noise}:"]
         head = f"{self.parameter:>14}{'damping, %':>12}{'at, Hz':>10}{'lip rms, um':>13}{'flow rms, L/s':>15}"
         said.append(f"{head}{'correlation, s':>16}")

@@ -24,9 +24,9 @@ from ...errors import CaseError, NotValidError, SolveError
 from ...materials.laws import MaterialError
 from ...model.classes import linearise_class
 from ...model.dynamics import LinearisedState
-from ...model.equilibria import LoadPath, SteadyOptions
+from ...model.equilibria import LoadPath, SteadyOptions, state_warnings
 from ...model.leading import LEAST_MODES, LeadingSearch, select_search
-from ...model.material_stability import material_stability
+from ...model.material_stability import beyond_levels, material_stability
 from ...model.state import SteadyState
 from ...model.symmetry import Symmetry, equilibria_of
 from ...model.valve import ValveModel
@@ -264,17 +264,31 @@ class StabilityWalk:
         ------
         SolveError
         """
+        self._recollect()
+        return self._reach(place)
+
+    def _recollect(self) -> None:
+        """Find the states that were recalled again."""
         while self._recalled:
             with suppress(SolveError):  # that run went on without it too
                 self._reach(self._recalled[0])
             del self._recalled[0]
-        return self._reach(place)
+
+    def about_rubbers(self, place: Mu | None = None) -> list[str]:
+        """Sentences on the rubbers in the steady state of a place, or in all that were found of the case's own design,
+        by an earlier run too. Where rubbers have loss factors, verdicts say that constants do not hold.
+        """
+        self._recollect()
+        base = Mu.of(self.case)
+        own, asks = self.built(place or base), beyond_levels if base.loss_factor else state_warnings
+        states = [self.state(place)] if place else [own.described[pressure] for pressure in sorted(own.described)]
+        return [*asks(own.model, states)]
 
     def recall(self, place: Mu) -> None:
         """Say that a state was found at a place by an earlier run.
 
         The next new state is reached from where that run stood, with the same digits: states that were recalled are
-        found again before it, and not at all if none follows.
+        found again before it, or at last for `about_rubbers`.
         """
         if not self._key(place):  # states of other designs are found from rest each
             self._recalled.append(place)

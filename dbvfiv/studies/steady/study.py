@@ -26,7 +26,6 @@ from ...model.equilibria import (
     LoadPath,
     SteadyOptions,
     first_opening,
-    model_warnings,
     redescribe,
     state_warnings,
 )
@@ -71,8 +70,6 @@ def run(session: Session, record: GrowingRecord) -> None:
     model, steady, case = session.model, session.case.steady, session.case
     keep_measured(record, "steady.measured", steady.measured, MEASURED, case.fluid.density)
     record.begin("steady", len(steady.pressures))
-    for sentence in model_warnings(model):
-        record.warn(sentence)
     states: list[SteadyState] = []
     try:
         reach_states(model, case, record, STATES, steady.pressures, states, record.item)

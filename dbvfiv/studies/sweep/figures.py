@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from itertools import groupby
 from typing import Any
 
 import matplotlib
@@ -32,7 +33,12 @@ from ..result import StudyResult
 
 #: Confidence below which a match is drawn as doubtful.
 DOUBTFUL = 0.5
-_STABLE_GROUND = "#1f4e790d"
+#: Of strips without a mode that is known, of stable ones, and of those with an unstable mode.
+_GROUNDS = (
+    {"facecolor": "#ececec", "edgecolor": "#9a9a9a", "hatch": "////", "lw": 0},
+    {"color": "#1f4e790d", "lw": 0},
+    {"color": DANGER, "lw": 0},
+)
 
 
 def draw(result: StudyResult) -> Iterator[tuple[str, Callable[[], Figure]]]:
@@ -75,7 +81,8 @@ def curves(result: StudyResult) -> Figure:
         labels.append("doubtful match")
     growth.legend(handles, labels, loc="upper left", bbox_to_anchor=(1.01, 1.02), title="mode")
     word = "certified against full solves" if result.certified else "not certified"
-    words = f"Red ground: at least one unstable mode. The sweep is {word}."
+    hatched = " Hatched: no mode is known." if (result.unstable_count < 0).any() else ""
+    words = f"Red ground: at least one unstable mode.{hatched} The sweep is {word}."
     if result.crossings():
         words += "\nDiamonds: interpolated between the values computed; `dbvfiv onset` finds them exactly."
     figure.supxlabel(words, x=0.01, ha="left", fontsize=9)
@@ -128,17 +135,19 @@ def _share(at: float, x: np.ndarray, log: bool) -> float:
 
 
 def _shade(axes, result: StudyResult, x: np.ndarray) -> None:
-    """Ground red where a mode is unstable, its edges at the crossings."""
-    factor = 1.0 / PARAMETERS[result.parameter].scale
-    edges = sorted(
-        {float(x[0]), float(x[-1]), *(factor * c.value for c in result.crossings() if x[0] < factor * c.value < x[-1])}
-    )
-    if len(edges) == 1:  # a single value
-        edges = list(limits(x, result.axis.log))
-    for low, high in zip(edges[:-1], edges[1:]):
-        inside = result.unstable_count[(x >= low) & (x <= high)]
-        unstable = bool(inside.size) and (inside > 0).mean() > 0.5
-        axes.axvspan(low, high, color=DANGER if unstable else _STABLE_GROUND, lw=0, zorder=0)
+    """Ground red where a mode is unstable, its edges at the crossings; hatched beside values without a mode."""
+    place, crossings = np.log if result.axis.log else np.asarray, result.crossings()
+    met = np.array([crossing.value for crossing in crossings]) / PARAMETERS[result.parameter].scale
+    edges = np.unique([*x, *met]) if len(x) > 1 else np.array(limits(x, result.axis.log))
+    middles = 0.5 * (place(edges[:-1]) + place(edges[1:]))
+    growth = np.array([np.interp(middles, place(x), branch.growth_rate) for branch in result.branches])
+    # a mode that is not followed is counted at both ends of a strip without a crossing
+    counted = np.interp(middles, place(x), result.unstable_count > 0) == 1.0
+    counted &= ~(np.isin(edges[:-1], met) | np.isin(edges[1:], met))
+    looks = np.where((growth > 0).any(axis=0) | counted, 2, np.isfinite(growth).any(axis=0)).tolist()
+    for look, strips in groupby(range(len(looks)), looks.__getitem__):
+        first, *_, last = [*strips] * 2
+        axes.axvspan(edges[first], edges[last + 1], zorder=0, **_GROUNDS[look])
 
 
 def root_locus(result: StudyResult) -> Figure:

@@ -300,7 +300,7 @@ def run(session: Session, record: GrowingRecord) -> None:
     record.note("over", remarks=notes, checks=checks)
     leading = [sample.verdict.frequency for sample in tracking.samples if sample.verdict.holds]
     outside = outside_band(case, [frequency for frequency in leading if np.isfinite(frequency)])
-    for note in filter(None, (*notes, outside)):
+    for note in filter(None, (*notes, outside, *walk.about_rubbers())):
         record.warn(note)
     if interrupted:
         raise KeyboardInterrupt
@@ -502,8 +502,8 @@ class SweepResult(StudyResult):
 
     def lines(self) -> list[str]:
         crossings = [crossing_line(self, crossing) for crossing in self.crossings()]
-        unit, scale = _shown(self.case, self.parameter)
-        places = ", ".join(f"{check['value'] / scale:.4g}" for check in self.checks)
+        row = self.case.units.parameter(self.parameter)
+        unit, places = row.shown_unit, ", ".join(f"{check['value'] / row.scale:.4g}" for check in self.checks)
         word = "Certified" if self.certified else "Not certified"
         checked = (
             [f"{word}: checked at {self.parameter} {places} {unit}".rstrip() + "."]
@@ -516,21 +516,15 @@ class SweepResult(StudyResult):
             "",
             *crossings,
             *checked,
+            f"Modes are of {variants(self.case, 'sweep')[0].motion.alone}.",
             *(f"Note: {note}" for note in self.notes),
         ]
 
 
-def _shown(case: Case, parameter: str) -> tuple[str, float]:
-    """Unit of a table over a parameter, and its SI value: SI, or heads where pressures are given so."""
-    if parameter == "pressure" and case.units.heads:
-        return case.units.name("pressure"), case.units.factor("pressure")
-    return PARAMETERS[parameter].quantity.si, 1.0
-
-
 def _columns(case: Case) -> tuple[Column, ...]:
     """Columns of the printed table: a value of the parameter, the leading mode, unstable eigenvalues."""
-    unit, scale = _shown(case, case.sweep.axis.parameter)
-    value = Shown(case.sweep.axis.parameter, unit, 12, lambda row: f"{row['value'] / scale:.6g}")
+    shown = case.units.parameter(case.sweep.axis.parameter)
+    value = Shown(shown.name, shown.shown_unit, 12, lambda row: f"{row['value'] / shown.scale:.6g}")
     others = Shown("growth rate", "1/s", 12, ".4f"), Shown("frequency", "Hz", 11, ".4f"), Shown("unstable", "", 9, "d")
     names = ("value", "growth_rate", "frequency", "unstable")
     return tuple(Column(name, "", "", shown=shown) for name, shown in zip(names, (value, *others)))

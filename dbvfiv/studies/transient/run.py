@@ -6,12 +6,13 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 
 from ...errors import CaseError
-from ...model.equilibria import model_warnings
+from ...model.equilibria import state_warnings
 from ...model.material_stability import material_stability
 from ...model.valve import ValveModel
 from ...motion.control import Drive, RunOptions, step_control
@@ -35,8 +36,8 @@ SHUT = 0.5
 BORNE = 1e-3
 #: Numbers of the mass flow that stand in the document of a verdict itself.
 NUMBERS = ("amplitude", "frequency", "mean", "cycles_observed", "periodicity_error")
-#: Kind of the note that says why the constants of the rubber do not hold at the state that was kicked.
-REFUSAL = "not valid"
+#: Kinds of notes: why the constants of the rubber do not hold in the first state, and what else was said of it there.
+REFUSAL, RUBBER = "not valid", "rubber"
 
 
 @dataclass(frozen=True)
@@ -341,7 +342,7 @@ class Runner:
         self.progress = progress = Progress(state, energy=energy, control=tuple(self.control.pack()))
         if eigenvalue is not None:
             progress.eigenvalue = eigenvalue
-            self._judge_rubber(state, inlet)
+        self._judge_rubber(state, inlet)
         row = self._reader.first(progress, inlet)
         self.history.append(row)
         self._row = row
@@ -353,7 +354,7 @@ class Runner:
         """Go on from the last restart point of the record, which must hold the rows up to that and no more."""
         self.progress = progress = Progress.read(self.record, wall=self.motion.wall)
         self._begin(progress.steps)
-        for note in self.record.notes(REFUSAL)[-1:]:
+        for note in (*self.record.notes(REFUSAL), *self.record.notes(RUBBER)):
             self.record.warn(note["text"])
         self.control.unpack(progress.control)
         self.stepper.forget()
@@ -368,12 +369,15 @@ class Runner:
         return first_state(self.motion, self.case, inlet, self.record)
 
     def _judge_rubber(self, state: MotionState, inlet: float) -> None:
-        """Note where the constants of rubbers with loss factors do not hold at the state that is kicked."""
+        """Say what is worth knowing of the rubbers in the first state, and note where constants of those with loss
+        factors do not hold.
+        """
+        for sentence in state_warnings(self.model, [SimpleNamespace(q=state.q, pressure=inlet)]):
+            self.record.note(RUBBER, text=sentence)
+            self.record.warn(sentence)
         loss = self.motion.mu.loss_factor
-        found = material_stability(self.model, state.q, inlet, loss) if loss else None
-        if found is not None and not found.holds:
+        if loss and not (found := material_stability(self.model, state.q, inlet, loss)).holds:
             self.record.note(REFUSAL, text=found.sentence)
-            self.record.warn(found.sentence)
 
     # -- the loop
     # ----
@@ -381,8 +385,6 @@ class Runner:
     def _begin(self, done: int) -> None:
         total = max(done, math.ceil(self.options.duration / self.options.control.step * (1 - 1e-9)))
         self.record.begin("transient", total)
-        for sentence in model_warnings(self.model):
-            self.record.warn(sentence)
 
     def _go(self) -> Runner:
         progress, every = self.progress, self.options.judge_every

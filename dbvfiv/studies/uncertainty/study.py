@@ -157,6 +157,8 @@ def _states_of_case(plan: Plan, walk: StabilityWalk, record: GrowingRecord) -> l
             states.append(None)
     if all(state is None for state in states):
         raise SolveError(f"The valve of the case has no steady state: {record.failures[0]}")
+    for sentence in walk.about_rubbers():
+        record.warn(sentence)
     return states
 
 
@@ -493,7 +495,7 @@ class UncertaintyResult(StudyResult):
         return f"Under {law} {same} of {count} samples have the outcome of {self.case.fluid.continuity}."
 
     def lines(self) -> list[str]:
-        row = PARAMETERS[self.parameter]
+        row = self.case.units.parameter(self.parameter)
         fixed = describe_fixed(self.case, self.parameter, *(one.name for one in self.plan.inputs))
         place = f"{self.parameter}, {row.shown_unit}".rstrip(", ")
         head = f"{place:>16}{'flutters':>10}  {'95 % interval':<17}"
@@ -524,7 +526,7 @@ class UncertaintyResult(StudyResult):
         said, *others = ("-" if one is None else f"{one:.3g}" for one in chances)
         interval = "{:.2g} to {:.2g}".format(*point["interval"])
         spread = "-" if middle is None else "{} ({} to {})".format(*(digits(100 * x) for x in (middle, low, high)))
-        value = point["value"] / PARAMETERS[self.parameter].scale
+        value = point["value"] / self.case.units.parameter(self.parameter).scale
         counts = "".join(f"{one:>10}" for one in others) + f"{point['undecided']:10d}{point['samples']:9d}"
         return f"{value:16.6g}{said:>10}  {interval:<17}{counts}  {spread}"
 

@@ -49,7 +49,7 @@ def test_a_check_whose_state_is_not_found_again_ends_no_map(case):
     walk = SimpleNamespace(cell=cell, observer=SimpleNamespace(warn=said.append))
     checks = check_cells(plan, columns, walk, 12)
     assert len(checks) + len(said) == 12 and min(check["x"] for check in checks) > 3000.0
-    assert said and all(text.startswith("The cell at pressure = 1000, density = ") for text in said)
+    assert said and all(text.startswith("The cell at pressure = 1 kPa, density = ") for text in said)
 
 
 def test_cells_whose_mode_grows_too_slowly_to_be_counted_are_uncertain(case):
@@ -67,6 +67,7 @@ def test_cells_whose_mode_grows_too_slowly_to_be_counted_are_uncertain(case):
     assert other.endswith("the full pencil has 2 unstable eigenvalues and the cell another number.")
     assert far.endswith("the full pencil differs by 2.0e-04.")
     result = SimpleNamespace(plan=plan, columns=columns)
+    assert {v["outcome"] for row in MapResult._verdicts(result, 0) for v in row} == {"undecided"}  # and not stable
     note = {"symmetry": "SA", "motion": "sway", "certified": np.ones((10, 6), bool)}
     assert MapResult._class_line(result, 1, note) == "class SA (sway): 0 cells unstable, 0 stable, 60 of 60 certified."
 
@@ -225,6 +226,7 @@ def test_cells_that_the_count_does_not_confirm_are_uncertain(case, monkeypatch):
         keep_column(record, column)
     results = MapResult(record)
     # an unstable eigenvalue of the full pencil is proof without the count
+    assert results.lines()[0].endswith("; class SS alone (both lips open and close):")
     assert " 11 unstable, 0 stable, 0 of 20 certified" in results.lines()[1]
     axes = stability_map(results).axes[0]
     assert any(getattr(part, "get_hatch", lambda: None)() for part in axes.collections)

@@ -105,7 +105,10 @@ def test_a_curve_that_is_not_followed_says_so(case, monkeypatch):
     monkeypatch.setattr("dbvfiv.studies.map.study.ROUNDS", 0)
     result = run_map(case.replace({"map.curve": True, "map.refine": 0, "map.checks": 0}))
     assert result.curves and not any(curve.exact for curve in result.curves)
-    assert all(any(f"= {curve.x[0]:.6g}" in sentence for sentence in result.warnings) for curve in result.curves)
+    for curve, line in zip(result.curves, result.lines()[2:]):
+        at = f"pressure = {curve.x[0] / 1e3:.6g} kPa, density = {curve.y[0]:.6g} kg/m³"
+        assert any(f"near {at} is not exact" in sentence for sentence in result.warnings)
+        assert f": pressure {min(curve.x) / 1e3:.6g} to {max(curve.x) / 1e3:.6g} kPa, density " in line
 
 
 def test_contours_are_where_the_leading_mode_has_their_damping(coarse_case):

@@ -30,7 +30,7 @@ from dbvfiv.studies.transient.history import (
     rows_to_keep,
     tables_of,
 )
-from dbvfiv.studies.transient.run import REFUSAL, Runner, assess
+from dbvfiv.studies.transient.run import Runner, assess
 from tests.observers import Stop
 
 from .runs import SHORT, transient
@@ -179,16 +179,11 @@ def test_rounded_times_meet_the_end_and_the_states(step, duration, every):
     assert saved == pytest.approx(every * np.arange(1, round(duration / every) + 1), abs=1e-9)
 
 
-def test_what_is_said_of_the_rubber_is_said_again(tmp_path, valve, monkeypatch):
-    path, start = tmp_path / "run.h5", Runner.start
-
-    def refused(runner, first=None):
-        runner.record.note(REFUSAL, text="The constants do not hold.")
-        return start(runner, first)
-
-    monkeypatch.setattr(Runner, "start", refused)
-    assert transient(valve(SHORT), output=path, observer=Stop(9)).interrupted
-    assert "The constants do not hold." in dbvfiv.resume(path).warnings
+def test_what_is_said_of_the_rubber_is_said_again(tmp_path, valve):
+    path, state = tmp_path / "run.h5", {"transient.start": "steady", "drive.pressure": 36e3}
+    run = transient(valve(SHORT | state | {"materials.constants": "published"}), output=path, observer=Stop(9))
+    (said,) = [text for text in run.warnings if "The rubber's constants are unstable here: at 36000 Pa" in text]
+    assert run.interrupted and said in dbvfiv.resume(path).warnings
 
 
 def test_a_state_in_whose_write_a_run_is_interrupted_is_kept_once(tmp_path, valve, monkeypatch):
