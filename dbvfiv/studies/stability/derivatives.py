@@ -319,8 +319,10 @@ def require_number(model: ValveModel, name: str) -> None:
 
 def _has(model: ValveModel, name: str) -> bool:
     """True where a parameter of the table acts on the valve and has one value there."""
-    if name in ("density", "storage"):
-        return model.flow.has_fluid and model.flow.unsteady and not (name == "storage" and model.case.is_compressed)
+    if name == "density":
+        return model.flow.has_fluid
+    if name == "storage":
+        return model.flow.has_fluid and model.flow.unsteady and not model.case.is_compressed
     if name in ("angle", "strain"):
         return design_value(model.case, name) is not None
     try:
@@ -400,15 +402,14 @@ def changed(model: ValveModel, pressure: float, mu: Mu, name: str, value: float)
     case = model.case
     if name in _PRESSURE:
         return model, value, mu
-    if name in SURROUNDINGS:
-        mu = mu.at(**{name: value})
-        return model if is_surrounding(case, name) else ValveModel(redesigned(case, {name: value})), pressure, mu
-    if name in DESIGN:
-        return ValveModel(redesigned(case, {name: value})), pressure, mu
+    if name in SURROUNDINGS and is_surrounding(case, name):
+        return model, pressure, mu.at(**{name: value})
     if name.startswith("layer "):
         return model.with_section(_section(model.shell.section, name, value)), pressure, mu
-    moved = {each: value for each in SURROUNDINGS if PARAMETERS[each].key == name and each in mu}
-    return ValveModel(redesigned(case, {name: value})), pressure, mu.at(**moved)
+    new = ValveModel(redesigned(case, {name: value}))
+    before, after = Mu.of(case), Mu.of(new.case)  # a key of one piece of the line moves the length of the whole
+    moved = {each: getattr(after, each) for each in SURROUNDINGS if each in mu}
+    return new, pressure, mu.at(**{each: own for each, own in moved.items() if own != getattr(before, each)})
 
 
 def _section(section, name, value):
