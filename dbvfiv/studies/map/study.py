@@ -24,7 +24,7 @@ from ..case import Case
 from ..result import StudyResult
 from ..session import Session, Study
 from ..stability.dimensions import certified_in_all, flow_models, leading_class
-from ..stability.place import check_scan, describe_fixed, fixed_conditions
+from ..stability.place import check_scan, describe_fixed, fixed_conditions, require_kept_head
 from ..stability.samples import SAMPLE_TABLE, SAMPLES, Sample, keep_samples, read_samples
 from ..stability.verdict import DIVERGES, FLUTTERS, NOT_VALID, OUTCOMES, STABLE, Verdict
 from ..stability.walk import StabilityWalk
@@ -285,7 +285,9 @@ def rows_to_keep(known: Record, case: Case) -> dict[str, int]:
 
 def check(case: Case) -> None:
     """Refuse axes of what the case does not have, and flow models that do not differ."""
-    check_scan(case, *(axis.parameter for axis in case.map.axes))
+    names = [axis.parameter for axis in case.map.axes]
+    check_scan(case, *names)
+    require_kept_head(case, *names)
     flow_models(case, "map")
 
 

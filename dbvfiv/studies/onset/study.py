@@ -26,7 +26,7 @@ from ..stability.dimensions import (
     own_variant,
     variants,
 )
-from ..stability.place import check_scan, describe_fixed, fixed_conditions
+from ..stability.place import check_scan, describe_fixed, fixed_conditions, require_kept_head
 from ..stability.samples import SAMPLE_TABLE, Sample, keep_samples, read_samples
 from ..stability.verdict import DIVERGES, FLUTTERS, NOT_VALID, STABLE, UNDECIDED, Verdict, lowered
 from ..stability.walk import StabilityWalk
@@ -58,6 +58,7 @@ class _Keeper(Observer):
 def check(case: Case) -> None:
     """Refuse a range of what the case does not have, and flow models that do not differ."""
     check_scan(case, case.onset.axis.parameter)
+    require_kept_head(case, case.onset.axis.parameter)
     variants(case, "onset")
 
 

@@ -26,6 +26,7 @@ from eigen.pairs import eigenvalue_derivative
 from eigen.spectrum import Mode
 
 from ...case.parameters import DESIGN, PARAMETERS, SURROUNDINGS, Mu
+from ...case.quantity import GRAVITY
 from ...errors import CaseError, SolveError
 from ...flow.outside.shape import ShapeDerivative
 from ...model.dynamics import LinearisedState, linearise
@@ -168,6 +169,8 @@ class Neighbourhood:
     def slope(self, name: str) -> Sensitivity:
         """Derivatives by one parameter.
 
+        Behind a pump the pressure follows its curve; by the pressure itself they are those of a static lift.
+
         At an end of what a parameter may be, such as the strain level of 10 %, those towards its inside, to second
         order as central ones are. Strain levels are interpolated linearly between the tests: at one of those, 20 or
         40 %, the derivative is the mean of both sides.
@@ -184,12 +187,28 @@ class Neighbourhood:
         spans = spans_about(self.model.case, name, value, self.step * (abs(value) or 1.0))
         near, *far = (self._between(name, value, *ends) for ends in spans)
         if not far:
-            return near
+            return self._behind_pump(near)
         values = [mode.eigenvalue for mode in self.modes]
         sizes = np.array([*(np.abs(self.sums) @ np.abs(values) if values else ()), *self.performance.values()])
         if not near.is_like(*far, np.abs(sizes) / (abs(value) or 1.0)):
             raise SolveError(f"Nothing can be differentiated by {name} at {value:g}: next to it is another valve.")
-        return near.towards(*far)
+        return self._behind_pump(near.towards(*far))
+
+    def _behind_pump(self, found: Sensitivity) -> Sensitivity:
+        """Derivatives with the pressure that a pump gives at the flow that changes with a parameter."""
+        pump, flows = self.model.pump, found.performance["flow"]
+        if pump is None or found.parameter in _PRESSURE or not flows:
+            return found
+        by = self._by_pressure
+        rise = pump.density * GRAVITY * pump.slope(self.performance["flow"])
+        apart = rise * flows / (1.0 - rise * by.performance["flow"])
+        eigenvalues = tuple(own + apart * other for own, other in zip(found.eigenvalues, by.eigenvalues))
+        performance = {name: own + apart * by.performance[name] for name, own in found.performance.items()}
+        return replace(found, eigenvalues=eigenvalues, performance=performance)
+
+    @cached_property
+    def _by_pressure(self) -> Sensitivity:
+        return self.slope(_PRESSURE[0])
 
     def _between(self, name: str, value: float, low: float, high: float) -> Sensitivity:
         """Differences between two values of a parameter."""
@@ -306,6 +325,8 @@ def require_number(model: ValveModel, name: str) -> None:
     CaseError
     """
     known = parameters_of(model)
+    if name in ("density", PARAMETERS["density"].key) and model.pump is not None:
+        require_parameter(model.case, "density")
     if name not in known:
         try:
             key_of(model.case, name, "sensitivity.of")
@@ -320,7 +341,7 @@ def require_number(model: ValveModel, name: str) -> None:
 def _has(model: ValveModel, name: str) -> bool:
     """True where a parameter of the table acts on the valve and has one value there."""
     if name == "density":
-        return model.flow.has_fluid
+        return model.flow.has_fluid and model.pump is None
     if name == "storage":
         return model.flow.has_fluid and model.flow.unsteady and not model.case.is_compressed
     if name in ("angle", "strain"):
