@@ -92,7 +92,9 @@ _DATE = re.compile(r"\d{1,4}[-./]\d{1,2}[-./]\d{1,4}[T ]\s*\d{1,2}:\d{2}")
 #: A date and a time of day in columns of their own.
 _DAY = re.compile(r"\d{1,4}[-./]\d{1,2}[-./]\d{1,4}")
 _CLOCK = re.compile(r"\d{1,2}:\d{2}(:\d{2}([.,]\d+)?)?(\s*[AP]M)?", re.IGNORECASE)
-_DAYS = ("%Y-%m-%d", "%Y/%m/%d", "%d.%m.%Y", "%m/%d/%Y", "%d/%m/%Y", "%d-%m-%Y")
+_DAYS = ("%Y-%m-%d", "%Y/%m/%d", "%d.%m.%Y", "%d-%m-%Y")
+#: Those that only a whole file tells apart.
+_SLASHED, _SLASHES = re.compile(r"\d{1,2}/\d{1,2}/\d{4}(?=[T ])"), ("%m/%d/%Y", "%d/%m/%Y")
 _CLOCKS = ("%H:%M:%S.%f", "%H:%M:%S", "%H:%M", "%I:%M:%S %p", "%I:%M:%S.%f %p")
 #: Numbers beyond this are no measurement, and their squares would overflow.
 _LARGEST = 1e100
@@ -196,7 +198,8 @@ def read_table(path: str | Path) -> Table:
     rows = [(number, _cells(_REMARK.sub("", line), separator)) for number, line in bodies]
     parted = _parted_dates(rows)
     rows = [(number, _joined(cells, parted)) for number, cells in rows]
-    numbers = [[_number(cell, decimal) for cell in cells] for _, cells in rows]
+    days = _days_of({found[0] for _, cells in rows for cell in cells if (found := _SLASHED.match(cell.strip(' "')))})
+    numbers = [[_number(cell, decimal, days) for cell in cells] for _, cells in rows]
     first = next((i for i, row in enumerate(numbers) if _is_data(row)), None)
     if first is None:
         raise ValueError(_why_no_data(rows, numbers))
@@ -269,7 +272,27 @@ def _cells(line: str, separator: str) -> list[str]:
         return [cell.strip().strip('"') for cell in line.strip().split(separator)]
 
 
-def _number(cell: str, decimal: str) -> float | None:
+def _days_of(slashed: set[str]) -> tuple[str, ...]:
+    """Forms of dates to read a file by: of those with slashes the one that reads more of its dates, of two that read as
+    many the one that has them closer together.
+    """
+
+    def doubts(form: str) -> tuple[int, float]:
+        found = [moment for day in slashed if (moment := _read(day, form)) is not None]
+        return len(slashed) - len(found), float(np.ptp(found)) if found else 0.0
+
+    return (*_DAYS, min(_SLASHES, key=doubts))
+
+
+def _read(text: str, form: str) -> float | None:
+    """Seconds since 1970 of a date in a form, None where it is in another one."""
+    try:
+        return datetime.strptime(text, form).replace(tzinfo=UTC).timestamp()
+    except ValueError:
+        return None
+
+
+def _number(cell: str, decimal: str, days: tuple[str, ...] = _DAYS + _SLASHES) -> float | None:
     """Value of a cell; NaN where it says that a value is missing, None where it is text."""
     text = cell.strip().strip('"')
     if text.lower() in _MISSING:
@@ -279,27 +302,23 @@ def _number(cell: str, decimal: str) -> float | None:
             return None
         text = text.replace(",", ".")
     if not _NUMBER.fullmatch(text):
-        return _moment(text)
+        return _moment(text, days)
     value = float(text.replace("d", "e").replace("D", "e"))
     return value if abs(value) < _LARGEST else None
 
 
-def _moment(text: str) -> float | None:
+def _moment(text: str, days: tuple[str, ...]) -> float | None:
     """Seconds since 1970 of a date with a time of day, None where the text is none."""
     if not _DATE.match(text):
         return None
     try:
-        return datetime.fromisoformat(text).replace(tzinfo=UTC).timestamp()
+        found = datetime.fromisoformat(text)
+        return (found if found.tzinfo else found.replace(tzinfo=UTC)).timestamp()
     except ValueError:
         pass
     day, _, clock = text.replace("T", " ").partition(" ")
-    for form in _DAYS:
-        for time in _CLOCKS:
-            try:
-                return datetime.strptime(f"{day} {clock.strip()}", f"{form} {time}").replace(tzinfo=UTC).timestamp()
-            except ValueError:
-                continue
-    return None
+    tried = (_read(f"{day} {clock.strip()}", f"{form} {time}") for form in days for time in _CLOCKS)
+    return next((moment for moment in tried if moment is not None), None)
 
 
 def _is_data(row: list[float | None]) -> bool:

@@ -43,6 +43,15 @@ def test_two_equal_pieces_are_one_pipe(elastic):
     assert swing > 0 and np.abs(second - first).max() < 1e-8 * np.abs(first).max()
 
 
+def test_derivatives_by_the_pieces_add_up_to_those_by_one_pipe():
+    one, two = (load_small(STATE, with_waves(keys)) for keys in (ONE, TWO))
+    whole = one.sensitivity(["pipe_length", "wave_speed"]).sensitivities
+    names = [f"upstream.pieces.{i}.{name}" for name in ("length", "wave_speed") for i in (0, 1)]
+    found = [each.derivative for each in two.sensitivity(names).sensitivities]
+    assert found[0] + found[1] == pytest.approx(2 * whole[0].derivative, rel=1e-4)
+    assert found[2] + found[3] == pytest.approx(whole[1].derivative, rel=1e-4)
+
+
 @pytest.mark.slow
 def test_over_the_density_waves_keep_their_speeds():
     """Studies over the density reduce the line at unit density."""

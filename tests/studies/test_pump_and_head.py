@@ -81,6 +81,17 @@ def test_modes_see_the_slope_and_sweeps_keep_the_pressure(waves):
     assert growth == pytest.approx(middle.modes[0].growth_rate, rel=1e-6, abs=1e-8)
 
 
+def test_derivatives_move_along_the_curve_of_the_pump():
+    """Against the operating points of a thicker and a thinner wall."""
+    (found,) = load(PUMP).sensitivity(["thickness"]).sensitivities
+    sides = [load(PUMP, {"valve.thickness_factor": factor}).modes(count=1) for factor in (0.998, 1.002)]
+    flow, rate = np.diff([(side.state.volume_flow, side.modes[0].growth_rate) for side in sides], axis=0)[0] / 0.004
+    assert found.performance["flow"] == pytest.approx(flow, rel=1e-3)
+    assert found.growth_rate == pytest.approx(rate, rel=1e-3)
+    with pytest.raises(CaseError, match="Over the density a pump has no steady state to keep"):
+        load(PUMP).sensitivity(["fluid.density"])
+
+
 def test_a_run_stays_at_the_operating_point_and_comes_back_to_it(operating):
     steady = {"transient.start": "steady", "transient.step": 4e-3}
     run = load(PUMP, steady, {"transient.duration": 0.04}).transient()
@@ -169,6 +180,14 @@ def test_a_flow_beyond_the_table_is_told():
 def test_what_has_no_meaning_with_a_pump_is_refused():
     with pytest.raises(CaseError, match="Over the density a pump has no steady state to keep"):
         load(PUMP).sweep("density=100:1000:3")
+    point = "another operating point at each value"
+    with pytest.raises(CaseError, match=f"Over pipe_length a pump has {point}; set upstream.length for each"):
+        load(PUMP).sweep("pipe_length=10:30:3")
+    for study in ("onset", "cycle"):
+        with pytest.raises(CaseError, match=f"Over thickness a pump has {point}"):
+            getattr(load(PUMP), study)("thickness=0.9:1.1:3")
+    with pytest.raises(CaseError, match=f"Over strain a pump has {point}"):
+        load(PUMP).map("strain=0.2:0.4:3", "beta=0.5 ms:2 ms:3")
     with pytest.raises(CaseError, match=r"transient\.ramp is given beside a pump"):
         load(PUMP, {"transient.ramp": 0.1})
     with pytest.raises(CaseError, match=r"no wave_speed to change"):

@@ -11,9 +11,11 @@ import pytest
 import dbvfiv
 from dbvfiv.model.symmetry import SYMMETRIES
 from dbvfiv.studies.case import thesis_case
-from dbvfiv.studies.onset.line import joined_stretches
-from dbvfiv.studies.onset.study import common_stretches, merge_points
-from dbvfiv.studies.stability.dimensions import leading_class
+from dbvfiv.studies.onset.line import FoundOnsets, joined_stretches
+from dbvfiv.studies.onset.study import OnsetResult, common_stretches, merge_points
+from dbvfiv.studies.stability.dimensions import Variant, leading_class
+from dbvfiv.studies.stability.samples import Sample
+from eigen.columns import DIRECT
 
 OTHERS = ["SA", "AS", "AA"]
 SMALL = {"mesh.around": 8, "mesh.along": 14, "drive.pressure": "6 kPa", "damping.alpha": 0}
@@ -89,6 +91,19 @@ def test_leading_takes_the_largest_growth_rate():
     rates, frequencies = [[[-1.0, np.nan]], [[0.0, 1.0]]], [[[9.0, np.nan]], [[2.0, 3.0]]]
     cells = leading_class(["SS", "AA"], np.array(rates), np.array(frequencies))
     assert cells["symmetry"] == [["AA", None]] and cells["growth_rate"][0][0] == 0.0 and cells["frequency"][0][0] == 2.0
+
+
+def test_a_valve_that_is_unstable_in_a_certain_class_is_so_whatever_another_one_leaves_open():
+    values = (1.0, 2.0, 3.0)
+    grows = tuple(Sample(v, np.array([5 + 60j]), 2, 2, True, how=DIRECT) for v in values)
+    calm = tuple(Sample(v, np.array([-1 + 50j]), 0, 0, v != 2.0, how=DIRECT) for v in values)
+    found = OnsetResult.__new__(OnsetResult)
+    parts = {Variant("storage", name): samples for name, samples in (("SS", grows), ("SA", calm))}
+    found.__dict__["variants"] = {variant: FoundOnsets(variant, samples, ()) for variant, samples in parts.items()}
+    assert found.leading["certified"] == [True] * 3
+    assert found.unstable_intervals == [(1.0, 3.0)] and found.uncertain_intervals == []
+    found.variants[Variant("storage", "SS")] = FoundOnsets(Variant("storage", "SS"), grows[:2], (), missed=(3.0,))
+    assert found.unstable_intervals == [(1.0, 2.0)] and found.uncertain_intervals == [(2.0, 3.0)]
 
 
 def test_maps_hold_every_class():

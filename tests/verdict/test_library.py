@@ -8,6 +8,7 @@ import pytest
 
 from dbvfiv.drawing.signal import signal
 from dbvfiv.verdict import judge_record
+from dbvfiv.verdict.table import read_table
 from tests.pages import table_of
 from tests.verdict.library import EACH, records
 
@@ -155,16 +156,20 @@ def test_a_level_without_noise_is_no_oscillation():
 
 
 @pytest.mark.parametrize(
-    ("form", "separator", "decimal"),
+    ("form", "separator", "decimal", "day"),
     [
-        ("%d.%m.%Y %H:%M:%S.%f", ";", ","),
-        ("%m/%d/%Y,%H:%M:%S.%f", ",", "."),
-        ("%m/%d/%Y %I:%M:%S.%f %p", ",", "."),
-        ("%Y-%m-%d;%H:%M:%S.%f", ";", "."),
+        ("%d.%m.%Y %H:%M:%S.%f", ";", ",", 14),
+        ("%m/%d/%Y,%H:%M:%S.%f", ",", ".", 14),
+        ("%m/%d/%Y %I:%M:%S.%f %p", ",", ".", 14),
+        ("%Y-%m-%d;%H:%M:%S.%f", ";", ".", 14),
+        ("%d/%m/%Y %H:%M:%S.%f", ",", ".", 5),
+        ("%d/%m/%Y,%H:%M:%S.%f", ",", ".", 12),
     ],
 )
-def test_dates_of_control_systems_are_read(form, separator, decimal, command_line, tmp_path):
-    start, head = datetime(2026, 3, 14, 11, 59, 57), "stamp" if separator not in form else f"date{separator}time"
+def test_dates_of_control_systems_are_read(form, separator, decimal, day, command_line, tmp_path):
+    """Those with the day before a slash over the midnights after which they were in another month."""
+    start = datetime(2026, 3, day, 23 if "%d/%m" in form else 11, 59, 57)
+    head = "stamp" if separator not in form else f"date{separator}time"
     rows = [f"{head}{separator}p [bar]"]
     for k in range(300):
         stamp = (start + timedelta(milliseconds=20 * k)).strftime(form)
@@ -173,6 +178,7 @@ def test_dates_of_control_systems_are_read(form, separator, decimal, command_lin
     (tmp_path / "scada.csv").write_text(text)
     told = command_line("verdict", tmp_path / "scada.csv")
     assert told.status == 0 and told.out.startswith("p [bar]: limit cycle") and "5 +- " in told.out
+    assert "gap" not in told.out + told.err
 
 
 def test_dates_and_numbered_samples_are_read(command_line, tmp_path):
@@ -183,6 +189,8 @@ def test_dates_and_numbered_samples_are_read(command_line, tmp_path):
     (tmp_path / "numbered.csv").write_text("\n".join(["sample,p", *(f"{i},{v:.8f}" for i, v in enumerate(values))]))
     told = command_line("verdict", tmp_path / "iso.csv")
     assert told.status == 0 and "limit cycle" in told.out and "5 +- " in told.out
+    (tmp_path / "winter.csv").write_text("when,p\n2026-10-25T02:59:59+02:00,1\n2026-10-25T02:00:00+01:00,2\n")
+    assert np.diff(read_table(tmp_path / "winter.csv").values[:, 0]) == [1.0]
     asked = command_line("verdict", tmp_path / "numbered.csv")
     assert asked.status == 2 and "give their rate with --rate" in asked.err
     assert "5 +- " in command_line("verdict", tmp_path / "numbered.csv", "-c", "p", "--rate", "100").out

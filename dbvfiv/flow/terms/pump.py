@@ -16,6 +16,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
+import jax
 import jax.numpy as jnp
 import numpy as np
 from scipy.interpolate import PchipInterpolator
@@ -66,6 +67,10 @@ class Pump(FlowTerm):
         from_row = flow - jnp.asarray(self.flow)[jnp.maximum(place - 1, 0)]
         a, b, c, d = jnp.asarray(self.series)[:, place]
         return ((a * from_row + b) * from_row + c) * from_row + d
+
+    def slope(self, flow: float) -> float:
+        """Rise of the head with the flow, s/m2."""
+        return float(jax.grad(self.curve)(flow))
 
     def holds(self, flow: float) -> bool:
         """True where a flow rate, m3/s, is within the pump's table."""

@@ -31,7 +31,7 @@ from ..case import Case
 from ..orbits import MODES, Follower, Orbit
 from ..result import StudyResult
 from ..session import Session, Study, print_rows
-from ..stability.place import check_scan, describe_fixed, fixed_conditions, models_of
+from ..stability.place import check_scan, describe_fixed, fixed_conditions, models_of, require_kept_head
 from ..stability.verdict import Verdict
 from ..stability.walk import StabilityWalk
 from .start import find_onset, given_motion
@@ -562,12 +562,18 @@ class CycleResult(StudyResult):
         return found
 
 
+def check(case: Case) -> None:
+    """Refuse a range of what the case does not have."""
+    check_scan(case, case.cycle.axis.parameter)
+    require_kept_head(case, case.cycle.axis.parameter)
+
+
 STUDY = Study(
     "cycle",
     tables_of,
     run,
     CycleResult,
-    lambda case: check_scan(case, case.cycle.axis.parameter),
+    check,
     rows_to_keep,
     live=lambda case: print_rows(COLUMNS),
 )

@@ -2,7 +2,7 @@
 
 The cells of a column share the steady state of each sampled valve, and all valves a space of their leading motions (see
 `dbvfiv.studies.stability.neighbours`), made along the whole column. A cell counts as undecided where the growth rates
-of a valve are not clear of the errors of that space.
+of a valve are not clear of the errors of that space, and where the constants of its rubber do not hold.
 """
 
 from __future__ import annotations
@@ -100,7 +100,7 @@ class Chances:
                 undecided += 1
                 continue
             flutters += [one is not None and one.outcome == FLUTTERS for one in found]
-            undecided += [one is None or one.stable is None and one.holds for one in found]
+            undecided += [one is None or one.stable is None for one in found]
         return {"flutters": flutters.tolist(), "undecided": undecided.tolist()}
 
 

@@ -89,7 +89,7 @@ class Web:
         From the number of an onset to that of the one it is linked with in the next, or last, column.
     tips : list of Tip
     gaps : set of int
-        Columns with a gap between them and the next.
+        Columns with a gap between them and the next: one without a state, or in which nothing is valid.
     """
 
     number: int
@@ -115,7 +115,8 @@ class Web:
             [plan.coordinate(plan.across, column.value) for column in usable],
             [[_onset(plan, row) for row in column.onsets if int(row[0]) == number] for column in usable],
         )
-        lost = [column.value for column in ordered if column.failure]
+        refused = [column for column in ordered if any(s.refusal for s in column.samples.get(law, ()))]
+        lost = [c.value for c in ordered if c.failure] + [c.value for c in refused if not c.has(law)]
         web.gaps = {
             i
             for i, (a, b) in enumerate(zip(usable[:-1], usable[1:]))
@@ -123,7 +124,8 @@ class Web:
         }
         web.ahead, web.behind = [{} for _ in usable], [{} for _ in usable]
         for i in range(len(usable) - 1):
-            web._link(i)
+            if i not in web.gaps:
+                web._link(i)
         for i in range(len(usable)):
             for side in (1, -1):
                 web.tips += web._tips_beside(i, side)
@@ -158,6 +160,8 @@ class Web:
 
     def _tips_beside(self, i: int, side: int) -> list[Tip]:
         loose, rows = self.loose(i, side), self.onsets[i]
+        if min(i, i + side) in self.gaps:
+            return []
         pairs = sorted(
             (abs(rows[k].y - rows[m].y), k, m)
             for a, k in enumerate(loose)

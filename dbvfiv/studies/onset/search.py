@@ -33,7 +33,7 @@ from .line import FoundOnsets, OnsetPoint, Side, joined_stretches
 
 #: Meshes of a run: that of the case, and the coarser one for the uncertainty.
 FINE, COARSE = 0, 1
-#: Relative distance from an onset at which it is confirmed on both sides.
+#: Relative distance from an onset, of a pressure from that behind the valve, at which it is confirmed on both sides.
 ASIDE = 2e-3
 #: Largest relative difference of a mode on the small model and with the full matrices.
 SAME = 1e-3
@@ -180,8 +180,11 @@ class OnsetSearch:
         found = self.line.locate(crossing, self.case.onset.tolerance)
         mode = self.critical(self.place(found.value), found.eigenvalue)
         eigenvalue, value = complex(mode.eigenvalue), found.value
-        width = ASIDE * abs(value) if value else ASIDE * (values[-1] - values[0])
-        sides = [self._beside(v) for v in (value - width, value + width)]
+        row, back = PARAMETERS[self.axis.parameter], 0.0
+        if row.name == "pressure":  # the wall sees what is beyond that behind the valve
+            back = self.walk.built(self.place(value)).model.flow.back
+        width = ASIDE * (abs(value - back) or values[-1] - values[0])
+        sides = [self._beside(min(max(v, row.low), row.high)) for v in (value - width, value + width)]
         below, above = (Side.of(sample, eigenvalue) for sample in sides)
         certified, line = all(s.certified for s in sides), max(s.line for s in sides)
         confirmed, note = _confirmed(below, above, crossing.gains, certified, line)

@@ -18,8 +18,15 @@ from ...texts import digits
 from ..case import Case
 from ..result import StudyResult
 from ..session import Session, Study
-from ..stability.dimensions import Variant, compare_ranges, leading_class, own_variant, variants
-from ..stability.place import check_scan, describe_fixed, fixed_conditions
+from ..stability.dimensions import (
+    Variant,
+    certified_in_all,
+    compare_ranges,
+    leading_class,
+    own_variant,
+    variants,
+)
+from ..stability.place import check_scan, describe_fixed, fixed_conditions, require_kept_head
 from ..stability.samples import SAMPLE_TABLE, Sample, keep_samples, read_samples
 from ..stability.verdict import NOT_VALID, Verdict, lowered
 from ..stability.walk import StabilityWalk
@@ -51,6 +58,7 @@ class _Keeper(Observer):
 def check(case: Case) -> None:
     """Refuse a range of what the case does not have, and flow models that do not differ."""
     check_scan(case, case.onset.axis.parameter)
+    require_kept_head(case, case.onset.axis.parameter)
     variants(case, "onset")
 
 
@@ -189,10 +197,11 @@ class OnsetResult(StudyResult):
         )
         found = leading_class(list(scans), rates, frequencies)
         found["symmetry"] = [name or self._own for name in found["symmetry"]]
+        verdicts = [[Verdict.read(scan["verdict"][i]) for i in at] for scan, at in zip(scans.values(), rows)]
         if self._classes:
-            verdicts = [[Verdict.read(scan["verdict"][i]) for i in at] for scan, at in zip(scans.values(), rows)]
             found["verdict"] = [Verdict.joined(dict(zip(scans, own))).summary() for own in zip(*verdicts)]
-        return {"values": values} | found | {"certified": certified.all(axis=0).tolist()}
+        grows = np.array([[each.stable is False for each in own] for own in verdicts])
+        return {"values": values} | found | {"certified": certified_in_all(certified, grows).tolist()}
 
     def _intervals(self, join: Callable, name: str) -> list[Interval]:
         parts = [getattr(found, name) for found in (self.own, *self._classes)]
@@ -211,7 +220,7 @@ class OnsetResult(StudyResult):
     @property
     def uncertain_intervals(self) -> list[Interval]:
         """Intervals of the scanned range in which neither stability nor instability is claimed."""
-        return self._intervals(joined_stretches, "uncertain_intervals")
+        return stretches_without(self._intervals(joined_stretches, "uncertain_intervals"), self.unstable_intervals)
 
     @property
     def disagreements(self) -> list[tuple[float, float, str]]:
@@ -323,6 +332,14 @@ def common_stretches(parts: Sequence[Sequence[Interval]]) -> list[Interval]:
         pairs = ((max(a, c), min(b, d)) for a, b in found for c, d in part)
         found = [(low, high) for low, high in pairs if low < high]
     return sorted(found)
+
+
+def stretches_without(parts: Sequence[Interval], taken: Sequence[Interval]) -> list[Interval]:
+    """What is left of stretches outside others."""
+    for low, high in taken:
+        pieces = (piece for a, b in parts for piece in ((a, min(b, low)), (max(a, high), b)))
+        parts = [piece for piece in pieces if piece[0] < piece[1]]
+    return list(parts)
 
 
 def disagreements(

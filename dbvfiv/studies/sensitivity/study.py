@@ -16,9 +16,10 @@ from eigen.spectrum import Mode
 from ...case.parameters import PARAMETERS, Mu
 from ...drawing.style import STABLE, UNSTABLE, headline, new_figure
 from ...errors import CaseError, SolveError
-from ...model.dynamics import LinearisedState, linearise
+from ...model.dynamics import LinearisedState
 from ...model.equilibria import require_equilibrium
 from ...model.state import SteadyState
+from ...model.symmetry import equilibria_of, only_class_of
 from ...record.mesh import MeshData
 from ...record.record import GrowingRecord
 from ...record.states import read_states, state_row, state_table
@@ -27,7 +28,7 @@ from ..result import StudyResult
 from ..session import Session, Study, describe_surroundings
 from ..stability.derivatives import PERFORMANCE, Neighbourhood, Sensitivity, parameters_of, require_number, unit_of
 from ..stability.place import describe_fixed
-from ..stability.walk import ValveFamily, name_state_in_failures
+from ..stability.walk import StabilityWalk, name_state_in_failures
 from ..state import State, states_of
 
 #: Modes searched for beyond the one asked for, so that its rank is certain.
@@ -72,7 +73,7 @@ def run(session: Session, record: GrowingRecord) -> None:
     if not kept:
         record.append(STATE, state_row(model, state))
     mu = Mu.of(session.case)
-    mode, linear = _find_mode(session, state, mu)
+    mode, linear = _find_mode(session, record, state, mu)
     beside = Neighbourhood(model, state.q, state.pressure, mu, [mode], asked.step, linear)
     record.note(MODE, number=asked.mode, eigenvalue=complex(mode.eigenvalue), performance=beside.performance)
     record.begin("sensitivity", len(names))
@@ -90,20 +91,21 @@ def run(session: Session, record: GrowingRecord) -> None:
         record.item(found)
 
 
-def _find_mode(session: Session, state: SteadyState, mu: Mu) -> tuple[Mode, LinearisedState]:
+def _find_mode(session: Session, record: GrowingRecord, state: SteadyState, mu: Mu) -> tuple[Mode, LinearisedState]:
     """The mode asked for, with its left vector, and the linearised state."""
     model, number = session.model, session.case.sensitivity.mode
     require_equilibrium(model, state)
     if model.flow.has_fluid and state.pressure <= model.flow.back:
         raise CaseError(f"Coupled modes need an inlet pressure greater than {model.flow.back:g}.")
-    linear = linearise(model, state.q, state.pressure)
-    family = ValveFamily(linear, session.case.modes.max_frequency, session.case.modes.count)
+    walk = StabilityWalk(session.case, record, model)
+    walk.give(mu, state)
+    walk.require_valid(mu)
+    family = walk.family(mu)
     with name_state_in_failures(state.pressure):
-        options = replace(family.search(Mu.of(session.case)), left=True)
-        found = leading_modes(linear.pencil(mu), number + _MARGIN, options)
+        found = leading_modes(family.linear.pencil(mu), number + _MARGIN, replace(family.search(mu), left=True))
     if len(found) < number:
         raise SolveError(f"The state at {state.pressure:.6g} Pa has {len(found)} leading modes, and no mode {number}.")
-    return found.mode(number - 1), linear
+    return found.mode(number - 1), family.linear
 
 
 class SensitivityResult(StudyResult):
@@ -175,9 +177,10 @@ class SensitivityResult(StudyResult):
     def summary(self) -> dict[str, Any]:
         if not self.record.notes(MODE):
             return {"sensitivities": []} | self.ending()
+        mode = {"number": self.number, "symmetry": equilibria_of(self.case.part).name}
         return {
             "state": self.state.summary() | describe_surroundings(self.case),
-            "mode": {"number": self.number, "growth_rate": self.growth_rate, "frequency": self.frequency},
+            "mode": mode | {"growth_rate": self.growth_rate, "frequency": self.frequency},
             "sensitivities": [
                 {
                     "parameter": found.parameter,
@@ -200,7 +203,8 @@ class SensitivityResult(StudyResult):
     def lines(self) -> list[str]:
         if not self.record.notes(MODE):
             return ["The run ended before its mode was found."]
-        mode = f"mode {self.number}, {self.growth_rate:.4f} 1/s at {self.frequency:.4f} Hz"
+        mode = f"mode {self.number} of {only_class_of(self.case.part)}, "
+        mode += f"{self.growth_rate:.4f} 1/s at {self.frequency:.4f} Hz"
         return [
             f"At {describe_fixed(self.case)}: {mode}.",
             *_HEAD,

@@ -26,6 +26,7 @@ from eigen.pairs import eigenvalue_derivative
 from eigen.spectrum import Mode
 
 from ...case.parameters import DESIGN, PARAMETERS, SURROUNDINGS, Mu
+from ...case.quantity import GRAVITY
 from ...errors import CaseError, SolveError
 from ...flow.outside.shape import ShapeDerivative
 from ...model.dynamics import LinearisedState, linearise
@@ -168,6 +169,8 @@ class Neighbourhood:
     def slope(self, name: str) -> Sensitivity:
         """Derivatives by one parameter.
 
+        Behind a pump the pressure follows its curve; by the pressure itself they are those of a static lift.
+
         At an end of what a parameter may be, such as the strain level of 10 %, those towards its inside, to second
         order as central ones are. Strain levels are interpolated linearly between the tests: at one of those, 20 or
         40 %, the derivative is the mean of both sides.
@@ -184,12 +187,28 @@ class Neighbourhood:
         spans = spans_about(self.model.case, name, value, self.step * (abs(value) or 1.0))
         near, *far = (self._between(name, value, *ends) for ends in spans)
         if not far:
-            return near
+            return self._behind_pump(near)
         values = [mode.eigenvalue for mode in self.modes]
         sizes = np.array([*(np.abs(self.sums) @ np.abs(values) if values else ()), *self.performance.values()])
         if not near.is_like(*far, np.abs(sizes) / (abs(value) or 1.0)):
             raise SolveError(f"Nothing can be differentiated by {name} at {value:g}: next to it is another valve.")
-        return near.towards(*far)
+        return self._behind_pump(near.towards(*far))
+
+    def _behind_pump(self, found: Sensitivity) -> Sensitivity:
+        """Derivatives with the pressure that a pump gives at the flow that changes with a parameter."""
+        pump, flows = self.model.pump, found.performance["flow"]
+        if pump is None or found.parameter in _PRESSURE or not flows:
+            return found
+        by = self._by_pressure
+        rise = pump.density * GRAVITY * pump.slope(self.performance["flow"])
+        apart = rise * flows / (1.0 - rise * by.performance["flow"])
+        eigenvalues = tuple(own + apart * other for own, other in zip(found.eigenvalues, by.eigenvalues))
+        performance = {name: own + apart * by.performance[name] for name, own in found.performance.items()}
+        return replace(found, eigenvalues=eigenvalues, performance=performance)
+
+    @cached_property
+    def _by_pressure(self) -> Sensitivity:
+        return self.slope(_PRESSURE[0])
 
     def _between(self, name: str, value: float, low: float, high: float) -> Sensitivity:
         """Differences between two values of a parameter."""
@@ -306,6 +325,8 @@ def require_number(model: ValveModel, name: str) -> None:
     CaseError
     """
     known = parameters_of(model)
+    if name in ("density", PARAMETERS["density"].key) and model.pump is not None:
+        require_parameter(model.case, "density")
     if name not in known:
         try:
             key_of(model.case, name, "sensitivity.of")
@@ -319,8 +340,10 @@ def require_number(model: ValveModel, name: str) -> None:
 
 def _has(model: ValveModel, name: str) -> bool:
     """True where a parameter of the table acts on the valve and has one value there."""
-    if name in ("density", "storage"):
-        return model.flow.has_fluid and model.flow.unsteady and not (name == "storage" and model.case.is_compressed)
+    if name == "density":
+        return model.flow.has_fluid and model.pump is None
+    if name == "storage":
+        return model.flow.has_fluid and model.flow.unsteady and not model.case.is_compressed
     if name in ("angle", "strain", "sealing"):
         return design_value(model.case, name) is not None
     try:
@@ -400,15 +423,14 @@ def changed(model: ValveModel, pressure: float, mu: Mu, name: str, value: float)
     case = model.case
     if name in _PRESSURE:
         return model, value, mu
-    if name in SURROUNDINGS:
-        mu = mu.at(**{name: value})
-        return model if is_surrounding(case, name) else ValveModel(redesigned(case, {name: value})), pressure, mu
-    if name in DESIGN:
-        return ValveModel(redesigned(case, {name: value})), pressure, mu
+    if name in SURROUNDINGS and is_surrounding(case, name):
+        return model, pressure, mu.at(**{name: value})
     if name.startswith("layer "):
         return model.with_section(_section(model.shell.section, name, value)), pressure, mu
-    moved = {each: value for each in SURROUNDINGS if PARAMETERS[each].key == name and each in mu}
-    return ValveModel(redesigned(case, {name: value})), pressure, mu.at(**moved)
+    new = ValveModel(redesigned(case, {name: value}))
+    before, after = Mu.of(case), Mu.of(new.case)  # a key of one piece of the line moves the length of the whole
+    moved = {each: getattr(after, each) for each in SURROUNDINGS if each in mu}
+    return new, pressure, mu.at(**{each: own for each, own in moved.items() if own != getattr(before, each)})
 
 
 def _section(section, name, value):

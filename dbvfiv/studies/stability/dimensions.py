@@ -159,6 +159,13 @@ def leading_class(names: Sequence[str], rates: np.ndarray, frequencies: np.ndarr
     return found | {"symmetry": np.where(gap, None, np.array(names, object)[first]).tolist()}
 
 
+def certified_in_all(certified: np.ndarray, unstable: np.ndarray) -> np.ndarray:
+    """Places (...) whose outcome is certified from bool tables (classes, ...): in all classes, or in one that is
+    unstable.
+    """
+    return certified.all(axis=0) | (certified & unstable).any(axis=0)
+
+
 def compare_states(own: str, stable: bool | None, other: str, other_stable: bool | None) -> str:
     """Sentence on what two laws say about one state."""
     if stable == other_stable and stable is not None:

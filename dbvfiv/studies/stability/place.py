@@ -116,6 +116,22 @@ def require_head(case: Case) -> None:
         raise CaseError("Behind a pump a head is no input; give drive.pressure and no upstream.pump.", "upstream.pump")
 
 
+def require_kept_head(case: Case, *names: str) -> None:
+    """Refuse ranges that move the operating point of a pump, of which their studies keep the pressure.
+
+    Raises
+    ------
+    CaseError
+    """
+    for name in () if "pressure" in names else names:
+        if case.seeks_operating_point and not is_surrounding(case, name):
+            raise CaseError(
+                f"Over {name} a pump has another operating point at each value; set {PARAMETERS[name].key} for each, "
+                "or give drive.pressure, which is kept.",
+                key=PARAMETERS[name].key,
+            )
+
+
 def require_parameter(case: Case, name: str) -> None:
     """Refuse a parameter that nothing in a case depends on.
 

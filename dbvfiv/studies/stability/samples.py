@@ -139,13 +139,12 @@ class Sample:
 
     def number(self, name: str) -> float:
         """A quantity by its name, for tables over several parameters: growth_rate, frequency (of the leading mode),
-        second (growth rate of the next), unstable, counted, certified, sealed, how or outcome.
+        unstable, counted, certified, sealed, how or outcome.
         """
         if name == "outcome":
             return OUTCOMES.index(self.verdict.outcome)
-        if name in ("growth_rate", "frequency", "second"):
-            place = int(name == "second")
-            value = self.eigenvalues[place] if len(self.eigenvalues) > place else complex(np.nan, np.nan)
+        if name in ("growth_rate", "frequency"):
+            value = self.eigenvalues[0] if len(self.eigenvalues) else complex(np.nan, np.nan)
             return float(value.imag / (2 * np.pi) if name == "frequency" else value.real)
         return getattr(self, name) or 0
 

@@ -32,7 +32,7 @@ from ..result import StudyResult
 from ..session import Session, Study, describe_surroundings, print_rows
 from ..stability.dimensions import variants
 from ..stability.line import ParameterLine
-from ..stability.place import is_surrounding, require_parameter
+from ..stability.place import is_surrounding, require_kept_head, require_parameter
 from ..stability.samples import SAMPLE_TABLE, SAMPLES, Sample, SampleKey, keep_samples, read_samples
 from ..stability.verdict import Verdict, not_valid_at
 from ..stability.walk import StabilityWalk, name_state_in_failures
@@ -257,6 +257,7 @@ def tables_of(_mesh: MeshData) -> tuple[TableSpec, ...]:
 def check(case: Case) -> None:
     """Refuse a range of what the case does not have."""
     require_parameter(case, case.sweep.axis.parameter)
+    require_kept_head(case, case.sweep.axis.parameter)
     if case.sweep.axis.parameter == "density" and case.drive.kind != "flow":
         raise CaseError(
             "sweep.over ranges over density, but drive.kind is 'uniform' and there is no fluid; choose "

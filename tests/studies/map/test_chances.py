@@ -2,12 +2,17 @@
 
 from types import SimpleNamespace
 
+import numpy as np
 import pytest
 
 import dbvfiv
 from dbvfiv.errors import CaseError
+from dbvfiv.studies.map import chances
 from dbvfiv.studies.map.chances import find_chances
+from dbvfiv.studies.map.column import MapPlan
 from dbvfiv.studies.map.figures import stability_map
+from dbvfiv.studies.stability.verdict import Verdict
+from dbvfiv.studies.stability.walk import StabilityWalk
 from tests.observers import Stop
 from tests.small_valves import load_small
 
@@ -39,6 +44,22 @@ def test_a_column_without_a_probability_is_told_again_by_a_run_that_goes_on():
     record = SimpleNamespace(notes=lambda _: kept, warn=said.append)
     find_chances(load_small(KEYS, AXES, {"map.samples": 24}).case, record, 1)
     assert said == ["No probability at 3 kPa: No state."]
+
+
+def test_samples_whose_rubber_does_not_hold_say_nothing_of_flutter(monkeypatch):
+    """A cell in which all lost their stability has no probability, and not that of valves that never flutter."""
+    shared = SimpleNamespace(state=lambda row: None)
+    unsound = SimpleNamespace(verdicts=lambda walk, places, row: [Verdict.not_valid("CR is unstable.")] * len(places))
+    monkeypatch.setattr(chances, "find_neighbours", lambda *_: shared)
+    monkeypatch.setattr(chances, "Beside", lambda *_: unsound)
+    for name in ("equilibrium", "settle"):
+        monkeypatch.setattr(StabilityWalk, name, lambda *_: None)
+    case = load_small(KEYS, AXES, {"map.samples": 8}).case
+    found = chances.Chances(case).column(3e3)
+    assert found == {"flutters": [0] * 4, "undecided": [8] * 4}
+    record = SimpleNamespace(notes=lambda _: [{"value": 3e3, **found}])
+    value, low, high = chances.chance_grid(record, MapPlan(case))[:, :, 0]
+    assert np.isnan(value).all() and (low == 0).all() and (high == 1).all()
 
 
 @pytest.mark.parametrize(

@@ -52,6 +52,24 @@ def test_a_check_whose_state_is_not_found_again_ends_no_map(case):
     assert said and all(text.startswith("The cell at pressure = 1 kPa, density = ") for text in said)
 
 
+@pytest.mark.parametrize(
+    ("kept", "full", "agrees"),
+    [
+        ([2e-13 + 30j, 50j], [1e-12 + 50j, 30j], True),  # without damping, in the order of rounding
+        ([-1 + 30j, -2 + 50j], [-1 + 50j, -2 + 30j], False),
+        ([], [], True),
+        ([], [-1 + 30j], False),
+    ],
+)
+def test_checks_compare_modes_that_may_lead(case, kept, full, agrees):
+    plan, counts = MapPlan(case), Certificate(0, 0, True)
+    cells = [Sample.of(value, Cell(np.array(kept, complex), counts, DIRECT)) for value in plan.along.values]
+    columns = tuple(MapColumn(value, 0, {0: cells}, np.zeros((0, 5))) for value in plan.across.values)
+    walk = SimpleNamespace(cell=lambda place: Cell(np.array(full, complex), counts, DIRECT))
+    (check,) = check_cells(plan, columns, walk, 1)
+    assert check["agrees"] == agrees
+
+
 def test_cells_whose_mode_grows_too_slowly_to_be_counted_are_uncertain(case):
     plan = MapPlan(case.replace({"map.symmetry": "all"}))
     slow, calm = (Cell(np.array([complex(rate, 94.0)]), Certificate(0, 0, True, 0.1), DIRECT) for rate in (0.05, -1.0))
@@ -70,6 +88,18 @@ def test_cells_whose_mode_grows_too_slowly_to_be_counted_are_uncertain(case):
     assert {v["outcome"] for row in MapResult._verdicts(result, 0) for v in row} == {"undecided"}  # and not stable
     note = {"symmetry": "SA", "motion": "sway", "certified": np.ones((10, 6), bool)}
     assert MapResult._class_line(result, 1, note) == "class SA (sway): 0 cells unstable, 0 stable, 60 of 60 certified."
+
+
+def test_a_growing_mode_of_the_full_matrices_decides_whatever_the_count_says(case):
+    """Such cells are called unstable by the map, so that they are not told as uncertain, and by each class."""
+    plan = MapPlan(case.replace({"map.symmetry": "all"}))
+    proven = Sample(1.0, np.array([5 + 60j]), unstable=2, counted=0, how=DIRECT)
+    cells = dict.fromkeys(range(4), [proven] * len(plan.along.values))
+    columns = tuple(MapColumn(value, 0, cells, np.zeros((0, 5))) for value in plan.across.values)
+    assert _doubts(plan, columns, []) == []
+    note = {"symmetry": "SA", "motion": "sway", "certified": np.zeros((10, 6), bool)}
+    said = MapResult._class_line(SimpleNamespace(plan=plan, columns=columns), 1, note)
+    assert said == "class SA (sway): 60 cells unstable, 0 stable, 0 of 60 certified."
 
 
 def test_a_text_of_a_sample_that_was_cut_off_is_not_told_of_the_next_in_its_row(case):

@@ -36,6 +36,21 @@ def test_linked_tongue_is_one_curve(case):
     assert not curve.exact and "not known between" in curve.reason
 
 
+@pytest.mark.parametrize("failed", [True, False])
+def test_no_curve_runs_across_a_column_in_which_nothing_is_known(case, failed):
+    """The curves beside it end there and are not exact, and no more columns are put in, which would find nothing."""
+    plan, columns = MapPlan(case), []
+    for place, sample in ((0.49, Sample(1.0, how=REDUCED)), (0.5, Sample(1.0, refusal="No.")), (0.51, None)):
+        sample = sample or columns[0].samples[0][0]
+        onset = [(0, plan.value(plan.y, 0.5), 30.0, 1, 0.0)] if sample.how == REDUCED else []
+        cells, failure = ({}, "No state.") if failed and not onset else ({0: [sample]}, "")
+        value = plan.value(plan.x, place)
+        columns.append(MapColumn(value, 0, cells, np.array(onset, float).reshape(-1, 5), failure=failure))
+    curves = linked(plan, tuple(columns))
+    assert len(curves) == 2 and not any(curve.exact for curve in curves)
+    assert Web.of(plan, columns, 0).wanted() == []
+
+
 @pytest.mark.parametrize("solved", [True, False])
 def test_a_change_at_the_lower_edge_calls_for_columns(case, solved):
     """No curve ends there; beside a column whose cells are not valid nothing is known of it."""

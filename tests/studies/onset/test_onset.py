@@ -49,6 +49,10 @@ def test_onset_over_pressure_meets_onset_over_density(over_density, coarse_case)
     (other,) = run_onset(asked(case, "pressure=5500,6200,7000")).points
     assert other.value == pytest.approx(6000.0, rel=1e-6)
     assert other.frequency == pytest.approx(point.frequency, rel=1e-6)
+    behind = case.replace({"downstream.pressure": 4e6})  # 0.2 % of which is more than the valve's own
+    found = run_onset(asked(behind, "pressure=4005500,4007000"))
+    (same,) = found.points
+    assert same.confirmed and not found.failures and same.value - 4e6 == pytest.approx(6000.0, rel=1e-4)
 
 
 def test_unstable_intervals(over_density):

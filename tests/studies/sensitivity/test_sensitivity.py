@@ -6,10 +6,11 @@ import numpy as np
 import pytest
 
 import dbvfiv
-from dbvfiv.errors import CaseError
+from dbvfiv.errors import CaseError, NotValidError
 from dbvfiv.studies.case import thesis_case
+from dbvfiv.studies.stability.walk import StabilityWalk
 from tests.observers import Stop
-from tests.small_valves import settings
+from tests.small_valves import load_small, settings
 
 CHANGES = {"mesh.around": 8, "mesh.along": 14, "damping.alpha": 0, "fluid.density": 10, "drive.pressure": 6e3}
 NAMES = ["pressure", "beta", "layer 3 angle", "alpha", "damping.alpha"]
@@ -49,6 +50,11 @@ def test_a_flow_that_is_not_there_changes_by_no_per_cent():
     assert shares["flow"] is None and shares["opening"] > 0 and found.lines()[-1].count(" - ") >= 1
 
 
+def test_the_density_sets_a_flow_without_inertia():
+    found = load_small({"fluid.unsteady": False, "drive.pressure": 6e3}).sensitivity(["density"])
+    assert found.summary()["sensitivities"][0]["per_cent_per_cent"]["flow"] == pytest.approx(-0.5, rel=1e-6)
+
+
 def test_another_mode_and_a_state(valve, found):
     second = valve.sensitivity("density", mode=2)
     assert second.number == 2 and second.growth_rate < found.growth_rate
@@ -83,13 +89,17 @@ def test_command(command_line, found):
     outcome = command_line("sensitivity", *options, "-p", "6 kPa", "--density", 10, *asked, "--json")
     assert outcome.status == 0, outcome.err
     document = json.loads(outcome.out)
-    assert document["mode"]["growth_rate"] == found.growth_rate
+    assert document["mode"]["growth_rate"] == found.growth_rate and document["mode"]["symmetry"] == "SS"
+    assert "mode 1 of class SS alone (both lips open and close)" in found.lines()[0]
     rows = {row["parameter"]: row for row in document["sensitivities"]}
     assert set(rows) == set(NAMES) and rows["layer 3 angle"]["unit"] == "deg"
     assert rows["beta"]["growth_rate_per_percent"] == pytest.approx(0.003 / 100 * rows["beta"]["growth_rate"])
 
 
-def test_misuse(valve):
+def test_misuse(valve, monkeypatch):
     with pytest.raises(CaseError, match="layer 9 angle"):
         valve.sensitivity("layer 9 angle")
     assert np.isfinite(valve.sensitivity(["storage"]).sensitivities[0].derivative)
+    monkeypatch.setattr(StabilityWalk, "refusal", lambda self, place: "The constants of CR are unstable.")
+    with pytest.raises(NotValidError, match="unstable"):
+        valve.sensitivity("pressure")
