@@ -215,7 +215,6 @@ def _ratio(a, b):
 
 
 SAME = 1e-6  # relative distance below which two shifts are taken to have found one eigenvalue
-ZERO = 1e-13  # distance over the largest eigenvalue within which two are one, as those that are zero
 TIGHT = 1e-9  # residual above which the inner unknowns of the fluid are computed afresh
 
 
@@ -367,11 +366,16 @@ def refine(pencil, batch, aim, band, tolerance, found) -> np.ndarray:
     return dropped
 
 
+def rounding_of(eigenvalues: np.ndarray) -> float:
+    """Distance within which two eigenvalues are one, as those that are zero: some 500 rounding units of the largest."""
+    return 500 * np.finfo(float).eps * np.abs(eigenvalues).max(initial=0.0)
+
+
 def merge(found: Found, batch: Found) -> None:
     """Add what is new; of an eigenvalue found twice keep the pair of smaller residual."""
     partner = np.full(batch.eigenvalues.size, -1)
     taken = np.zeros(found.eigenvalues.size, bool)
-    rounding = ZERO * np.abs(np.append(found.eigenvalues, batch.eigenvalues)).max(initial=0.0)
+    rounding = rounding_of(np.append(found.eigenvalues, batch.eigenvalues))
     for i in np.argsort(batch.residual):
         distance = np.where(taken, np.inf, np.abs(found.eigenvalues - batch.eigenvalues[i]))
         if distance.size and distance.min() <= max(SAME * abs(batch.eigenvalues[i]), rounding):
@@ -468,9 +472,7 @@ def biorthogonalise(pencil: CoupledPencil, eigenvalues, q, u, w, W, cluster: flo
     for i in range(k):
         if done[i]:
             continue
-        near = np.abs(eigenvalues - eigenvalues[i]) <= max(
-            cluster * abs(eigenvalues[i]), ZERO * np.abs(eigenvalues).max()
-        )
+        near = np.abs(eigenvalues - eigenvalues[i]) <= max(cluster * abs(eigenvalues[i]), rounding_of(eigenvalues))
         group = np.flatnonzero(near & ~done)
         done[group] = True
         block = table[np.ix_(group, group)]

@@ -36,7 +36,7 @@ from ..record.files import reading
 from ..record.mesh import MeshData
 from ..shell.recovery import layer_fields
 from ..studies.case import Case
-from ..studies.modes.figures import drawn_amplitude
+from ..studies.modes.search import drawn_amplitude
 from ..studies.session import find_study, load_result
 from ..texts import json_value
 from .sheet import shown_as, stay_inside

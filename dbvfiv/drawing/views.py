@@ -22,8 +22,7 @@ from ..materials.laws import OrthotropicPly
 from ..model.sizes import ValveSizes
 from ..model.valve import ValveModel
 from ..record.mesh import MeshData, WholeValve
-from ..record.vtkhdf import motion
-from ..shell.mesh import nodal_thickness
+from ..record.vtkhdf import faces
 from .style import (
     COMPUTED,
     HALO,
@@ -36,27 +35,6 @@ from .style import (
     headline,
     new_figure,
 )
-
-
-def faces(mesh: MeshData, nodal: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray]:
-    """Inner and outer face of the part that is computed.
-
-    Parameters
-    ----------
-    mesh : MeshData
-    nodal : (nn, c) array, optional
-        Displacements, m, and rotations of the nodes; at rest without it.
-
-    Returns
-    -------
-    inner, outer : (nn, 3) arrays, m
-    """
-    half = 0.5 * nodal_thickness(mesh)[:, None]
-    if nodal is None:
-        return mesh.nodes - half * mesh.directors, mesh.nodes + half * mesh.directors
-    moved = motion(mesh, WholeValve.of(mesh, quarter=True), nodal)
-    middle = mesh.nodes + moved["displacement"]
-    return middle - half * moved["director"], middle + half * moved["director"]
 
 
 def closed_section(section: np.ndarray, part: Part = QUARTER) -> np.ndarray:

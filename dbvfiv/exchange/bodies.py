@@ -11,9 +11,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..case.part import QUARTER, Part
-from ..drawing.views import faces
 from ..errors import CaseError
 from ..record.mesh import MeshData
+from ..record.vtkhdf import faces
 
 
 def trim_section(points: np.ndarray) -> np.ndarray:

@@ -19,6 +19,7 @@ import h5py
 import numpy as np
 
 from ..errors import CaseError
+from ..shell.mesh import nodal_thickness
 from .mesh import MeshData, WholeValve
 
 _VTK_QUAD = 9
@@ -198,6 +199,27 @@ def motion(mesh: MeshData, valve: WholeValve, nodal: np.ndarray) -> dict[str, np
         "rotation": np.cross(directors, towards),
         "director": np.cos(angle) * directors + np.sinc(angle / np.pi) * towards,
     }
+
+
+def faces(mesh: MeshData, nodal: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray]:
+    """Inner and outer face of the part that is computed.
+
+    Parameters
+    ----------
+    mesh : MeshData
+    nodal : (nn, c) array, optional
+        Displacements, m, and rotations of the nodes; at rest without it.
+
+    Returns
+    -------
+    inner, outer : (nn, 3) arrays, m
+    """
+    half = 0.5 * nodal_thickness(mesh)[:, None]
+    if nodal is None:
+        return mesh.nodes - half * mesh.directors, mesh.nodes + half * mesh.directors
+    moved = motion(mesh, WholeValve.of(mesh, quarter=True), nodal)
+    middle = mesh.nodes + moved["displacement"]
+    return middle - half * moved["director"], middle + half * moved["director"]
 
 
 def layer_field_names(mesh: MeshData, quantity: str) -> list[str]:

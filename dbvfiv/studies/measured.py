@@ -14,10 +14,11 @@ import numpy as np
 from ..case.measured import AREA, DISCHARGE, SHAPE, TAPS, MeasuredTable, check_kind, read_measured
 from ..case.part import QUARTER, Part
 from ..drawing.style import kilopascals
-from ..drawing.views import closed_section, faces
+from ..drawing.views import closed_section
 from ..errors import CaseError
 from ..record.mesh import MeshData
 from ..record.record import GrowingRecord, Record
+from ..record.vtkhdf import faces
 from ..texts import json_value
 
 #: Kind of the note of a record that holds a table.

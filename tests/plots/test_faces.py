@@ -3,9 +3,11 @@
 import numpy as np
 import pytest
 
-from dbvfiv.drawing.views import ValveSkin, faces, offset_line
+from dbvfiv.drawing.views import ValveSkin, offset_line
+from dbvfiv.record.vtkhdf import faces
 from dbvfiv.shell.mesh import nodal_thickness
-from dbvfiv.studies.modes.figures import drawn_amplitude, wave_content
+from dbvfiv.studies.modes.figures import wave_content
+from dbvfiv.studies.modes.search import drawn_amplitude
 
 
 def test_the_faces_lie_a_wall_apart_and_a_closed_lip_shows_no_slot(coarse_run):

@@ -7,8 +7,9 @@ import pytest
 import dbvfiv
 from dbvfiv.drawing import style
 from dbvfiv.drawing.style import log_axis
-from dbvfiv.drawing.views import COLOURS, faces, unrolled
+from dbvfiv.drawing.views import COLOURS, unrolled
 from dbvfiv.errors import CaseError
+from dbvfiv.record.vtkhdf import faces
 from dbvfiv.studies.case import thesis_case
 from dbvfiv.studies.steady.figures import is_published
 

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 import dbvfiv
 from dbvfiv.case import CaseError
 from dbvfiv.case.measured import AREA, DISCHARGE, SHAPE, TAPS, read_measured
-from dbvfiv.drawing.views import faces
+from dbvfiv.record.vtkhdf import faces
 from dbvfiv.studies.case import Case, thesis_case
 from dbvfiv.studies.closure import study as closure
 from dbvfiv.studies.measured import cut, distances

@@ -10,9 +10,9 @@ import pytest
 from PIL import Image
 
 import dbvfiv
-from dbvfiv.drawing.views import faces
 from dbvfiv.errors import CaseError
-from dbvfiv.studies.modes.figures import drawn_amplitude
+from dbvfiv.record.vtkhdf import faces
+from dbvfiv.studies.modes.search import drawn_amplitude
 
 FLUTTER = {"density": 10, "alpha": 0}
 

@@ -26,7 +26,8 @@ from ...drawing.style import (
     pressure_colours,
     some_of,
 )
-from ...drawing.views import COLOURS, ValveSkin, draw_chosen, draw_skin, faces, layer_stress, unrolled
+from ...drawing.views import COLOURS, ValveSkin, draw_chosen, draw_skin, layer_stress, unrolled
+from ...record.vtkhdf import faces
 from ..comparing import MEASURED, Compared, draw_curve, draw_runs, draw_shapes, labels
 from ..result import StudyResult
 

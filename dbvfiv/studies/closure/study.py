@@ -11,7 +11,6 @@ from typing import Any
 import numpy as np
 
 from ...case.measured import AREA, SHAPE
-from ...drawing.views import faces
 from ...model.closed import ClosedValve, Passage
 from ...model.symmetry import equilibria_of
 from ...record.mesh import MeshData, WholeValve
@@ -32,7 +31,7 @@ from ...record.states import (
     show_place,
 )
 from ...record.table import TEXT, Column, Shown, TableSpec, document_of, printed_head, printed_row
-from ...record.vtkhdf import Step
+from ...record.vtkhdf import Step, faces
 from ...shell.recovery import LayerFields
 from ..comparing import Compared, Comparison
 from ..measured import PASSAGE, Measured, keep_measured

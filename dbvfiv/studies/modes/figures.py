@@ -28,13 +28,13 @@ from ...drawing.style import (
     phase_looks,
     style,
 )
-from ...drawing.views import COLOURS, ValveSkin, faces, frame, mark_pieces, shaded
+from ...drawing.views import COLOURS, ValveSkin, frame, mark_pieces, shaded
 from ...errors import CaseError
 from ...model.symmetry import symmetry_named
+from ...record.vtkhdf import faces
 from ..request import require_gif
 from ..result import StudyResult
-from ..state import State
-from .search import Certificate, ModeShape
+from .search import Certificate, ModeShape, drawn_amplitude
 
 _RATIOS = (0.02, 0.05, 0.1, 0.2, 0.4, 0.7)
 
@@ -169,9 +169,6 @@ def _rays(axes, left: float, top: float) -> None:
 
 
 _PANELS = 6
-#: Largest displacement at which a mode is drawn, over the length of the valve; share of the clear height that it may
-#: take, and share of the largest that it has in any case.
-_LARGEST, _OPEN, _SEEN = 0.035, 0.85, 0.1
 
 
 def mode_shapes(result: StudyResult, modes) -> Figure:
@@ -237,21 +234,6 @@ class ModeSurface:
         surface.set_verts(corners)
         surface.set_facecolors(colours)
         surface.set_edgecolors(colours)
-
-
-def drawn_amplitude(state: State, mode: ModeShape) -> float:
-    """Largest displacement, m, at which a mode shows well and the inner faces of the lips do not cross."""
-    mesh, symmetry = state.results.mesh, symmetry_named(mode.symmetry)
-    largest = _LARGEST * float(np.ptp(mesh.z))
-    if not symmetry.moves_lips_apart:
-        return largest
-    line = mesh.centre_line  # which a sideways sway leaves in place
-    line = line if symmetry.signs[0] > 0 and mesh.part.is_quarter else mesh.rows.ravel()
-    height = faces(mesh, state.nodal)[0][line, 1]
-    swing = np.abs(mode.shape[line, 1])
-    chosen = (swing > 1e-3) & (height > 0)
-    room = float(np.min(_OPEN * height[chosen] / swing[chosen])) if chosen.any() else largest
-    return min(largest, max(room, _SEEN * largest))
 
 
 _PHASES, _DRAWN = 10, 3

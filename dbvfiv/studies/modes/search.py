@@ -21,16 +21,18 @@ from ...errors import CaseError, SolveError
 from ...model.equilibria import require_equilibrium
 from ...model.leading import LeadingSearch
 from ...model.state import SteadyState
-from ...model.symmetry import EQUILIBRIA, SYMMETRIES, Symmetry
+from ...model.symmetry import EQUILIBRIA, SYMMETRIES, Symmetry, symmetry_named
 from ...model.valve import GRAZING, ValveModel
 from ...observer import Observer
 from ...record.table import Column
+from ...record.vtkhdf import faces
 from ...texts import shortly
 from ..stability.dimensions import VARIANT
 from ..stability.line import ParameterLine
 from ..stability.scan import Crossing, Scan
 from ..stability.verdict import FLUTTERS, STABLE, Verdict, lowered, oscillates
 from ..stability.walk import StabilityWalk, ValveFamily, name_state_in_failures
+from ..state import State
 
 if TYPE_CHECKING:
     from . import Keys
@@ -140,6 +142,26 @@ class ModeShape:
             "residual": self.residual,
             "symmetry": self.symmetry,
         }
+
+
+#: Largest displacement at which a mode is drawn, over the length of the valve; share of the clear height that it may
+#: take, and share of the largest that it has in any case.
+_LARGEST, _OPEN, _SEEN = 0.035, 0.85, 0.1
+
+
+def drawn_amplitude(state: State, mode: ModeShape) -> float:
+    """Largest displacement, m, at which a mode shows well and the inner faces of the lips do not cross."""
+    mesh, symmetry = state.results.mesh, symmetry_named(mode.symmetry)
+    largest = _LARGEST * float(np.ptp(mesh.z))
+    if not symmetry.moves_lips_apart:
+        return largest
+    line = mesh.centre_line  # which a sideways sway leaves in place
+    line = line if symmetry.signs[0] > 0 and mesh.part.is_quarter else mesh.rows.ravel()
+    height = faces(mesh, state.nodal)[0][line, 1]
+    swing = np.abs(mode.shape[line, 1])
+    chosen = (swing > 1e-3) & (height > 0)
+    room = float(np.min(_OPEN * height[chosen] / swing[chosen])) if chosen.any() else largest
+    return min(largest, max(room, _SEEN * largest))
 
 
 #: The independent count as a curve.

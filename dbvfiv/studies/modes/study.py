@@ -25,8 +25,7 @@ from ..stability.dimensions import Variant, compare_states, own_variant, variant
 from ..stability.verdict import Verdict
 from ..stability.walk import StabilityWalk
 from ..state import State, StateSteps, states_of
-from .figures import drawn_amplitude
-from .search import CURVE, MODE, Certificate, FoundModes, ModeShape, critical_damping_factor, run_modes
+from .search import CURVE, MODE, Certificate, FoundModes, ModeShape, critical_damping_factor, drawn_amplitude, run_modes
 
 STATE, MODES, COUNT = "state", "modes", "count"
 #: Kinds of notes: on a variant whose rows are all there, and why the constants of the rubber do not hold at the state.

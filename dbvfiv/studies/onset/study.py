@@ -335,7 +335,7 @@ def common_stretches(parts: Sequence[Sequence[Interval]]) -> list[Interval]:
 
 
 def stretches_without(parts: Sequence[Interval], taken: Sequence[Interval]) -> list[Interval]:
-    """What is left of stretches outside others."""
+    """Stretches without what others take of them."""
     for low, high in taken:
         pieces = (piece for a, b in parts for piece in ((a, min(b, low)), (max(a, high), b)))
         parts = [piece for piece in pieces if piece[0] < piece[1]]

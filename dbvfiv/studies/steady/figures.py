@@ -23,8 +23,9 @@ from ...drawing.style import (
     pressure_name,
     some_of,
 )
-from ...drawing.views import closed_section, deformed, draw_chosen, faces, layer_stress, mark_pieces
+from ...drawing.views import closed_section, deformed, draw_chosen, layer_stress, mark_pieces
 from ...flow.terms.pump import from_case as pump_of
+from ...record.vtkhdf import faces
 from ..case import Case
 from ..comparing import MEASURED, draw_curve, draw_runs, draw_shapes, labels
 from ..measured import static_pressure
