@@ -155,6 +155,7 @@ def change(data: dict[str, Any], key: str, text: str) -> None:
             table = table.get(part) if isinstance(table, dict) else None
     if isinstance(table, dict):
         table.pop(last, None)
+        Case.take_along(data, {(*path, last)})
 
 
 def bring(path: Path, home: Path, anew: bool = True) -> str:

@@ -91,10 +91,17 @@ class Section(BaseModel):
     @classmethod
     def make_way(cls, data: dict[str, Any], changed: Collection[tuple[str, ...]]) -> None:
         """Take out of plain data what a changed key stands in the place of, and what needs one that is taken away."""
+        cls.take_along(data, changed)
+
+    @classmethod
+    def take_along(cls, data: dict[str, Any], changed: Collection[tuple[str, ...]] | None = None) -> None:
+        """Take out of plain data what needs a changed key that is taken away; what needs any that is not there without
+        changed ones.
+        """
         for section, field in cls.model_fields.items():
             table = data.get(section)
             for name, other in getattr(field.annotation, "needs", {}).items() if isinstance(table, dict) else ():
-                taken = (section, other) in changed and (section, name) not in changed
+                taken = changed is None or ((section, other) in changed and (section, name) not in changed)
                 if taken and table.get(other) in (None, field.annotation.model_fields[other].default):
                     table.pop(name, None)
 

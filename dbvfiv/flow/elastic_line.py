@@ -320,6 +320,10 @@ class LineChannel(AroundChannel):
         own, velocity, pressure = jnp.split(inner, [self.channel.inner, self.channel.inner + self.line.size // 2])
         return own, jnp.append(velocity, self.channel.flange(own, parameters)[0]), pressure
 
+    def flange(self, inner, parameters):
+        """As that of the passage, whose unknowns are the first."""
+        return self.channel.flange(inner[: self.channel.inner], parameters)
+
     def far_velocity(self, inner, given=None) -> float:
         return float(inner[self.channel.inner])
 

@@ -246,6 +246,13 @@ class GasChannel(AroundChannel):
         found = self.enthalpy(self.compression(parameters["inlet"] - self.channel.back, parameters), parameters)
         return found, 0.0
 
+    def at_seal(self, area, parameters):
+        """As `Channel.at_seal`; the head of a pump is an enthalpy."""
+        c, slope = parameters["sound_speed"], parameters["heat_capacity_ratio"] - 1.0
+        gained = (super().at_seal(area, parameters)["inlet"] - parameters["inlet"]) / parameters["density"]
+        sigma = c / slope * jnp.log1p(slope / c**2 * (self.supply(parameters)[0] + gained))
+        return {**parameters, "inlet": self.channel.back + self.pressure(sigma, parameters)}
+
     def flange(self, inner, parameters):
         """Velocity of the flange, m/s, that mass flows with at the density around the jet, and half the square of that
         of the fluid; traceable.

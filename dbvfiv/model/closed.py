@@ -16,6 +16,7 @@ from ..shell.mesh import nodal_thickness
 from .load_curve import LoadCurve
 from .load_steps import LARGEST_JUMP, LoadStepOptions, LoadSteps
 from .newton import NewtonOptions
+from .strain_level import CLOSED
 from .supports import CONTACT, HELD_LIPS, face_contact, held_rows
 from .symmetry import EQUILIBRIA
 from .valve import ValveModel
@@ -25,14 +26,6 @@ from .valve import ValveModel
 MIN_STEP, MIN_STEP_TO_LIMIT = 1e-5, 1e-3
 #: Largest load step over the first from rest, where the lips meet.
 FIRST_SHARE = 20
-#: Keys of a case that is pressed from outside.
-CLOSED = {
-    "drive.kind": "uniform",
-    "drive.side": "outside",
-    "supports.contact": "faces",
-    "gravity.direction": "none",
-    "outside.fluid": "none",
-}
 
 
 @dataclass(frozen=True)

@@ -159,13 +159,14 @@ def describe_state(model: ValveModel, q: np.ndarray, pressure: float, **solution
     mass_flow = model.mass_flow(area, pressure)
     station_pressure = model.flow.steady_pressure(area, pressure)
     line = model.line
-    outlet, recovered, tail_speed, tail_loss = _behind(model, area, model.flow.far_velocity(inner), float(speeds[0]))
+    far = model.flow.far_velocity(inner) * open_
+    outlet, recovered, tail_speed, tail_loss = _behind(model, area, far, float(speeds[0]))
     flange = station_pressure[-1] - np.broadcast_to(model.flow.static, area.shape)[-1] + outlet + model.flow.level
     return SteadyState(
         pressure=float(pressure),
         head=head_of(pressure, density),
         flange_pressure=float(pressure if line is None else flange),
-        line_loss=0.0 if line is None else line.lost_head(float(area[-1]), model.flow.far_velocity(inner)) / GRAVITY,
+        line_loss=0.0 if line is None else line.lost_head(float(area[-1]), far) / GRAVITY,
         outlet_pressure=outlet,
         recovered_pressure=recovered,
         downstream_velocity=tail_speed,

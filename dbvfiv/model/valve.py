@@ -395,12 +395,10 @@ class ValveModel(PressedShell):
     # ----
 
     @cached_property
-    def _film(self) -> np.ndarray | float:
+    def _film(self) -> np.ndarray:
         """Areas (m,), m2, that rough faces in contact leave, of a bill that is moulded shut: those at rest, a trace of
-        faces that cross there; else 0.
+        faces that cross there.
         """
-        if self.shell.stress_free is None:
-            return 0.0
         return np.maximum(self.rows.areas(self.nodal(self.rest())), np.finfo(float).tiny)
 
     @cached_property

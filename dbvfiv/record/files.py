@@ -583,6 +583,12 @@ def _case(data: dict[str, Any], model: type[Case], given: dict[str, list[str]] |
     for section, names in GONE.items():
         for name in names:
             data.get(section, {}).pop(name, None)
+    # keys that said nothing beside others, which earlier versions took
+    model.take_along(data)
+    if data.get("mesh", {}).get("rows") == "uniform":
+        data["mesh"].pop("breaks", None)
+    if not data.get("fluid", {}).get("unsteady", True):
+        data.get("transient", {}).pop("coupling", None)
     try:
         return model.from_dict(data, given)
     except CaseError as error:  # not the user's slip but the file's

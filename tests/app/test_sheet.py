@@ -51,6 +51,9 @@ def test_keys_are_set_and_taken_away(tmp_path):
     case = check(data, tmp_path).case
     assert case.drive.pressure == pytest.approx(9806.65) and case.layers[0].thickness == 0.003
     change(data, "drive.pressure", " ")
+    data["outside"] = {"fluid": "same", "pipe_diameter": "400 mm"}
+    change(data, "outside.fluid", "")
+    assert data.pop("outside") == {}  # and what needs it
     assert "pressure" not in data["drive"]
 
 

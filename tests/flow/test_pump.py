@@ -10,6 +10,7 @@ from scipy.interpolate import PchipInterpolator
 from dbvfiv.case.quantity import GRAVITY
 from dbvfiv.flow import Channel
 from dbvfiv.flow.elastic_line import ElasticLine, LineChannel
+from dbvfiv.flow.gas import GasChannel
 from dbvfiv.flow.law import FlowMotion
 from dbvfiv.flow.stepping import MovingFluid
 from dbvfiv.flow.terms.line import Line
@@ -95,6 +96,17 @@ def test_fluid_at_rest_in_front_of_a_seal_has_the_head_of_no_flow(speed):
     assert abs(head / SUPPLY - 1) > 0.5 and np.abs(rest).max() < 1e-9 * head
     wanted = pytest.approx(Channel(z, FLOOR).steady_pressure(area, head), abs=1e-5 * head)
     assert pressure == wanted and fluid.still(area, SUPPLY)[0] == wanted
+
+
+def test_gas_at_rest_in_front_of_a_seal_has_the_enthalpy_of_the_head_of_no_flow():
+    z, _ = passage()
+    pump, given = Pump(FLOWS, 500.0 * HEADS, 1.2, 2e3), {"inlet": 2e3, "density": 1.2}
+    law = GasChannel(Channel(z, FLOOR, 1.0, terms=[Line(7.0, 0.2, 0.02), pump]), 343.0)
+    given = law.values(given)
+    rest = law.at_seal(np.full(len(z), 0.01), given)["inlet"]
+    gained = law.enthalpy(law.compression(rest, given), given) - law.supply(given)[0]
+    assert float(gained) == pytest.approx(GRAVITY * 500.0 * HEADS[0] - 2e3 / 1.2, rel=1e-9)
+    assert rest > 1.2 * GRAVITY * 500.0 * HEADS[0] * 1.04  # by pressures alone
 
 
 def plug(face: float, steep: float) -> tuple[CoupledPencil, float, float]:

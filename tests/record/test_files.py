@@ -125,6 +125,17 @@ def test_a_kept_case_knows_which_keys_were_given(tmp_path, monkeypatch):
     assert _read(tmp_path).case.straining_pressures() == (50e3, 28e3)  # of an earlier version: every key
 
 
+def test_keys_that_said_nothing_are_left_out_of_cases_of_earlier_versions(tmp_path):
+    _kept(tmp_path, Case())
+    with h5py.File(tmp_path / "h.h5", "a") as file:
+        data = json.loads(file["case/json"][()])
+        data["outside"]["pipe_diameter"], data["transient"]["coupling"] = 0.33, "staggered"
+        data["mesh"] |= {"rows": "uniform", "breaks": [0.1]}
+        data["fluid"]["unsteady"] = False
+        file["case/json"][()] = json.dumps(data)
+    assert _read(tmp_path).case == Case().replace({"mesh.rows": "uniform", "fluid.unsteady": False})
+
+
 LATIN = "# \u00b5\nfrequency,tan delta\n1,0.1\n200,0.2\n".encode("latin-1")
 
 

@@ -11,7 +11,6 @@ from dbvfiv.case.materials import Materials
 from dbvfiv.case.write import case_toml
 from dbvfiv.errors import SolveError
 from dbvfiv.model import strain_level
-from dbvfiv.model.closed import CLOSED
 from dbvfiv.model.material_stability import tension_of
 from dbvfiv.model.strain_level import settle_levels
 from dbvfiv.observer import Observer
@@ -160,11 +159,10 @@ def test_a_closed_valve_has_no_weight_where_its_levels_are_settled():
     peaks = []
     for around in ({}, {"gravity.direction": "-z", "outside.fluid": "same", "outside.lips": "open"}):
         case = thesis_case({"mesh.around": 6, "mesh.along": 10} | around)
-        load = strain_level._Load(14e3, Observer(), strain_level.CLOSED, lower=4)
+        load = strain_level._Load(14e3, Observer(), strain_level.SOFTLY_CLOSED, lower=4)
         peaks.append([layer.peak for layer in load.strain(case, {"CR": 0.1, "SBR": 0.1, "EPDM": 0.1})])
         assert load.state.pressure == 14e3
     assert peaks[0] == peaks[1]
-    assert strain_level.CLOSED == CLOSED | {"supports.contact_stiffness": 1e8}
 
 
 @pytest.mark.parametrize(

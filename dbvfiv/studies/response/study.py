@@ -156,7 +156,8 @@ class Transfer:
         channel = still_channel(flow)
 
         def lifted(area, rate, inner):
-            stream = channel.stream(area, rate, flow.speeds_of(area, rate, inner, given), inner)
+            passing = flow.flange(inner, given)[0]
+            stream = channel.stream(area, rate, flow.speeds_of(area, rate, inner, given), inner, passing)
             return given["density"] * jnp.array([tail.head(stream, given), tail.momentum(stream, given)])
 
         rows = jax.jacrev(lifted, argnums=(0, 1, 2))(area, jnp.zeros_like(area), inner)
