@@ -86,9 +86,6 @@ class EquilibriumSolver:
         self.options = options
         self.factor = model.factor()
         self.tangent: Any = None
-        self.tangents = 0
-        self.residuals = 0
-        self.last: np.ndarray | None = None
         self._pressure = 0.0
         self._error = ""
         n = model.size
@@ -135,7 +132,7 @@ class EquilibriumSolver:
         except PETSc.Error as error:
             reason = self._error or f"PETSc stopped with error {error.ierr}"
             return NewtonResult(start, False, self._snes.getIterationNumber(), np.inf, self._rounding, reason)
-        q = self.last = _real(self._vector).copy()
+        q = _real(self._vector).copy()
         code = self._snes.getConvergedReason()
         norm = float(np.linalg.norm(_real(self._residual))) / self._scale
         reason = "converged" if code > 0 else self._error or _REASONS.get(code, f"SNES stopped with reason {code}")
@@ -149,11 +146,9 @@ class EquilibriumSolver:
     # ----
 
     def _evaluate(self, snes, x, f):
-        self.residuals += 1
         f.setArray(self.model.residual(_real(x), self._pressure))
 
     def _linearise(self, snes, x, jacobian, preconditioner):
-        self.tangents += 1
         q = _real(x)
         self.tangent = self.model.tangent(q, self._pressure)
         if not self._rounding:
