@@ -10,6 +10,7 @@ falls jumps back at the lower limit point.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from itertools import takewhile
 from typing import Any, NamedTuple, TypeVar
 from weakref import WeakKeyDictionary, proxy
 
@@ -42,7 +43,8 @@ _AHEAD, _BETWEEN = 7, 25
 #: Largest angles between tangents, rad, tried one after the other: where faces part, displacements of micrometres turn
 #: the curve, and one that turns right back has been missed.
 _ANGLES = 0.7, 1.4, 0.35
-#: Change of the pressure between two limit points over the pressure below which they are put down to the mesh.
+#: Change of the pressure between two limit points below which they are put down to the mesh, over the pressure above
+#: that downstream.
 _NOISE = 1e-3
 
 
@@ -197,10 +199,11 @@ class LoadCurve:
         return self._branch.states
 
     def limits(self, highest: float = np.inf) -> list[LimitPoint]:
-        """Limit points along the curve, as far as it is known and up to a pressure, Pa."""
+        """Limit points along the curve, as far as it is known and up to where it passes a pressure, Pa."""
         if self._branch is None:
             return []
-        return [limit for limit in _without_noise(self._limits(slice(None))) if limit.pressure <= highest]
+        below = takewhile(lambda limit: limit.pressure <= highest, self._limits(self._up_to(highest)))
+        return self._without_noise(list(below))
 
     def limit_states(self) -> list[LimitState]:
         """Limit points along the curve, solved for; pairs that `limits` puts down to the mesh are left out."""
@@ -209,7 +212,22 @@ class LoadCurve:
             at = tracer.root(points[i], points[i + 1], lambda point: point.tangent[-1], 1e-12)
             at = min(points[i : i + 2], key=lambda point: abs(point.tangent[-1])) if at is None else at
             found.append(LimitState(float(at.z[-1]), at.z[:-1], at.tangent[:-1]))
-        return _without_noise(found)
+        return self._without_noise(found)
+
+    def _without_noise(self, limits: list[_Limit]) -> list[_Limit]:
+        """Limit points without pairs between which the pressure hardly changes."""
+        kept: list[_Limit] = []
+        for limit in limits:
+            drive = abs(limit.pressure - self.model.flow.back)
+            if kept and abs(kept[-1].pressure - limit.pressure) <= _NOISE * drive:
+                kept.pop()
+            else:
+                kept.append(limit)
+        return kept
+
+    def _up_to(self, highest: float) -> slice:
+        """Points that are known up to the first that passes a pressure, Pa."""
+        return slice(int(np.argmax(beyond)) + 1) if (beyond := self.pressures >= highest).any() else slice(None)
 
     def _slopes(self, part: slice) -> np.ndarray:
         return np.array([point.tangent[-1] for point in self._branch.points[part]])
@@ -223,9 +241,9 @@ class LoadCurve:
         turns = self._turns(slope)
         return [LimitPoint(_turn(pressure[i : i + 2], slope[i : i + 2]), bool(slope[i] > 0)) for i in turns]
 
-    def passages(self, pressure: float) -> list[np.ndarray]:
-        """Unknowns (n,) of all known equilibria at a pressure, Pa, in the order of the curve."""
-        away = self.pressures - pressure
+    def passages(self, pressure: float, highest: float = np.inf) -> list[np.ndarray]:
+        """Unknowns (n,) of all equilibria at a pressure, Pa, in the order of the curve, where `limits` are told too."""
+        away = self.pressures[self._up_to(highest)] - pressure
         points = (self.root(lambda z: z[-1] - pressure, int(i) + 1) for i in np.flatnonzero(away[:-1] * away[1:] < 0))
         return [self._settle(z[:-1], pressure).q for z in points if z is not None]
 
@@ -271,11 +289,6 @@ class LoadCurve:
         if not found.converged:
             raise SolveError(f"The equilibrium at {pressure:.6g} Pa was lost: {found.reason}.")
         return found
-
-    @property
-    def solver(self) -> EquilibriumSolver:
-        """The solver of the last equilibrium."""
-        return self._solver
 
     def _bracket(self, target: float) -> np.ndarray | None:
         """Unknowns (n,) of the first passage of a pressure, from the points around it; None before any."""
@@ -386,14 +399,3 @@ def _turn(pressure: np.ndarray, slope: np.ndarray) -> float:
     length = (pressure[1] - pressure[0]) / mean if mean else 0.0
     outer = max(pressure) if slope[0] > 0 else min(pressure)
     return float(pressure[0] + 0.5 * slope[0] ** 2 / change * length) if length > 0 else float(outer)
-
-
-def _without_noise(limits: list[_Limit]) -> list[_Limit]:
-    """Limit points without pairs between which the pressure hardly changes."""
-    kept: list[_Limit] = []
-    for limit in limits:
-        if kept and abs(kept[-1].pressure - limit.pressure) <= _NOISE * abs(limit.pressure):
-            kept.pop()
-        else:
-            kept.append(limit)
-    return kept

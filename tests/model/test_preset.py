@@ -187,6 +187,8 @@ class Snap(LoadCurve):
 
     def __post_init__(self):
         points = [self.point(u) for u in self.model]
+        self.model = SimpleNamespace(flow=SimpleNamespace(back=0.0))
+        self._settle = lambda guess, pressure: SimpleNamespace(q=guess)
         self._branch = SimpleNamespace(points=points, values=lambda name: np.array([point.z[-1] for point in points]))
 
     @staticmethod
@@ -207,6 +209,13 @@ def test_a_load_rises_over_a_limit_point_only_to_what_lies_behind_it():
     for u, pressure, within in ((0.9, 1.971, 1e-9), (0.99, 2.97 - 0.99**3, 1e-9), (1.2, 2.0, 0.02)):
         found, q = curve.first(lambda q, u=u: q[0] - u)
         assert q[0] == pytest.approx(u) and found == pytest.approx(pressure, rel=within)
+
+
+def test_what_is_told_of_a_curve_does_not_depend_on_how_far_it_is_known():
+    """Limit points above what is asked were told in a process that had asked for more before."""
+    curve = Snap((0.0, 0.6, 0.95, 1.0001, 1.3), NewtonOptions(), None)
+    assert curve.limits(1.5) == [] and [limit.highest for limit in curve.limits(2.5)] == [True]
+    assert [len(curve.passages(1.8, highest)) for highest in (1.9, 2.5)] == [1, 2]
 
 
 @pytest.mark.slow

@@ -81,17 +81,17 @@ def run(session: Session, record: GrowingRecord) -> None:
         with suppress(SolveError):  # none is given then
             record.note(CRACKING, **find_cracking(model, states, steady.cracking_area)._asdict())
     if states and LoadPath(model, SteadyOptions.of(case)).follows_curve:
-        _note_curve(model, states, record)
+        _note_curve(model, states, max(steady.pressures), record)
 
 
-def _note_curve(model: ValveModel, states: Sequence[SteadyState], record: GrowingRecord) -> None:
-    """Keep limit points of the curve of equilibria, what else it holds at the pressures of the states, and how much of
-    the lip has parted.
+def _note_curve(model: ValveModel, states: Sequence[SteadyState], highest: float, record: GrowingRecord) -> None:
+    """Keep limit points of the curve of equilibria up to a pressure, Pa, what else it holds there at the pressures of
+    the states, and how much of the lip has parted.
     """
     path, case = LoadPath(model, SteadyOptions.of(model.case), observer=record), model.case
     with suppress(SolveError):
         path.go_to(max(state.pressure for state in states))
-    limits = path.curve.limits()
+    limits = path.curve.limits(highest)
     for limit in limits:
         record.note(LIMIT, **limit._asdict())
     span = [limit.pressure for limit in limits]
@@ -101,7 +101,7 @@ def _note_curve(model: ValveModel, states: Sequence[SteadyState], record: Growin
             record.note(PARTED, pressure=state.pressure, width=width, pressed=pressed)
         if len(span) < 2 or not min(span) <= state.pressure <= max(span):
             continue
-        for q in path.curve.passages(state.pressure):
+        for q in path.curve.passages(state.pressure, highest):
             other = redescribe(model, replace(state, q=q))
             if abs(other.lip_displacement - state.lip_displacement) > _SAME * abs(state.max_displacement):
                 found = {name: getattr(other, name) for name in ("lip_opening", "mass_flow", "max_displacement")}
