@@ -29,6 +29,8 @@ from ...model.load_steps import LoadStepOptions, LoadSteps
 
 #: The eigenvalue at a located buckling state over that at the stable end of its bracket.
 TOLERANCE = 1e-7
+#: Bracket of the pressure, over it, in which a buckling state is located whatever its eigenvalue.
+NARROW = 1e-8
 #: Eigenvalues nearest to zero among which the lowest are looked for, at least.
 _FEWEST = 4
 #: Shift next to which lower eigenvalues are looked for, over the largest one known in magnitude.
@@ -244,15 +246,16 @@ class BucklingWatch:
         self._stable = None
 
     def _locate(self, stable: _Known, unstable: _Known) -> Buckling:
-        """State between two equilibria where the lowest eigenvalue vanishes, by a bracketed secant rule.
+        """State between two equilibria where the lowest eigenvalue vanishes, by a bracketed secant rule. Where that
+        twice does not halve the bracket it is halved: faces that part let the eigenvalue fall on next to no way.
 
         States between them are corrected from a straight line through both. Where paths cross, the tangent is singular
         and Newton's method may end on the other path; such a state is not used. When no nearer state is found, the zero
         is that of the line through the eigenvalues on both sides, with the state of the nearer one.
         """
-        low, high, refused = stable, unstable, 0
+        low, high, refused, slow = stable, unstable, 0, 0
         while True:
-            place = min(max(low.lowest / (low.lowest - high.lowest), 0.02), 0.98)
+            place = 0.5 if slow == 2 else min(max(low.lowest / (low.lowest - high.lowest), 0.02), 0.98)
             aim = low.between(high, place if refused == 0 else 0.5 * (place + refused % 2))
             state = self._on_path(low, high, aim)
             if state is None:
@@ -262,9 +265,11 @@ class BucklingWatch:
                     return Buckling("bifurcation", low.between(high, place), nearer.q, nearer.shape, nearer.lowest)
                 continue
             refused = 0
-            if abs(state.lowest) <= TOLERANCE * stable.lowest or abs(high.pressure - low.pressure) <= 1e-11 * abs(aim):
+            width = abs(high.pressure - low.pressure)
+            if abs(state.lowest) <= TOLERANCE * stable.lowest or width <= NARROW * abs(aim):
                 return Buckling("bifurcation", state.pressure, state.q, state.shape, state.lowest)
             low, high = (state, high) if state.lowest > 0 else (low, state)
+            slow = slow + 1 if abs(high.pressure - low.pressure) > 0.51 * width and slow < 2 else 0
 
     def _on_path(self, low: _Known, high: _Known, pressure: float) -> _Known | None:
         """The equilibrium at a pressure between two others of a path; None if another path was found."""

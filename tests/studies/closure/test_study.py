@@ -15,7 +15,7 @@ from dbvfiv.model.closed import ClosedValve, Passage, load_steps
 from dbvfiv.model.load_curve import LoadCurve
 from dbvfiv.model.load_steps import LoadSteps
 from dbvfiv.studies.case import Case, thesis_case
-from dbvfiv.studies.closure.buckling import follow_past_limits, spectrum_of
+from dbvfiv.studies.closure.buckling import BucklingWatch, _Known, follow_past_limits, spectrum_of
 from dbvfiv.studies.closure.walk import ClosureWalk
 from dbvfiv.studies.session import Session
 from tests.observers import Stop
@@ -171,6 +171,19 @@ def test_the_eigenvalue_of_a_limit_point_is_the_one_that_vanishes():
     curve.extend = lambda target: None
     (limit,) = follow_past_limits(curve, 4e3).limits
     assert limit.eigenvalue == pytest.approx(1e-9, rel=1e-3)
+
+
+@pytest.mark.parametrize("at", [1.123, 1.5, 1.9])
+def test_few_spectra_locate_buckling_where_the_eigenvalue_drops_as_faces_part(at):
+    """By 4e4 over 1e-10 of the way; the secant rule alone took 206 to 381."""
+    watch, seen = BucklingWatch(None, None, None), []
+
+    def known(pressure):
+        seen.append(pressure)
+        return _Known(pressure, None, np.interp(pressure, (1.0, at, at + 1e-10, 2.0), (5e4, 4e4, -1.0, -2.0)), None)
+
+    watch._on_path = lambda low, high, pressure: known(pressure)
+    assert watch._locate(known(1.0), known(2.0)).pressure == pytest.approx(at, rel=1e-8) and len(seen) < 90
 
 
 @pytest.mark.parametrize("back", [0.0, 100.0, -1.0])
