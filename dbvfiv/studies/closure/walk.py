@@ -335,11 +335,14 @@ class ClosureWalk:
         self._seen = self._watch(pressure, q, point=True)
 
     def _watch(self, pressure: float, q: np.ndarray, point: bool = False) -> StiffnessSpectrum:
-        """Look for buckling at the next equilibrium in every class; keep it as a point of the path if it is one."""
+        """Look for buckling at the next equilibrium, in every class up to a limit point; keep it as a point of the path
+        if it is one.
+        """
         spectrum = self.own.see(pressure, q)
         if point:
             self._keep_point(pressure, q, float(spectrum.values.real[0]))
-        others = {name: watch.see(pressure, q).lowest for name, watch in list(self.watches.items())[1:]}
+        watches = [] if self.beyond_limit else list(self.watches.items())[1:]
+        others = {name: watch.see(pressure, q).lowest for name, watch in watches}
         if others:
             self.record.note(LOWEST, pressure=float(pressure), lowest=others)
         self._keep_buckling()

@@ -79,6 +79,16 @@ def test_what_buckles_in_another_class_is_said_again(whole):
     assert len(said) == 1 and said[0].startswith("The wall buckles at 7000 Pa in class SA: ")
 
 
+@pytest.mark.parametrize(("beyond", "noted"), [(False, [{"SA": -1.0}]), (True, [])])
+def test_other_classes_are_looked_at_up_to_a_limit_point(beyond, noted):
+    """The collapsed wall that sways at 20 kPa made that its first limit, met at 27.6 kPa as the pressure rises."""
+    walk, notes = object.__new__(ClosureWalk), []
+    walk.own, sways = (SimpleNamespace(see=lambda *_, a=a: SimpleNamespace(lowest=a), before=None) for a in (1.0, -1.0))
+    walk.watches, walk.beyond_limit, walk._keep_buckling = {"SS": walk.own, "SA": sways}, beyond, lambda: None
+    walk.record = SimpleNamespace(note=lambda _, pressure, lowest: notes.append(lowest))
+    assert walk._watch(2e4, np.zeros(1)).lowest == 1.0 and notes == noted
+
+
 def test_a_state_that_arclength_has_led_to_goes_on_as_it_is_taken_up_again():
     """With the same slope, or with none in the path and in the ledger."""
     for slope in (None, np.array([2.0])):
