@@ -304,7 +304,7 @@ def closes(found: Gathered) -> Answer:
     shut = [s.pressure for s in states if s.closed]
     held = result.case.closure.supports == HELD_LIPS
     text = _HELD if held else f"Shut at {listed(units.pressure(p, 3) for p in shut)}" if shut else "Open"
-    collapse = _collapse(result, rated)
+    collapse = _collapse(result, found.case.closure.rated_pressure or max(result.case.closure.pressures))
     text += f"{'' if shut else ' up to ' + units.pressure(states[-1].pressure, 3)}; {collapse}" if collapse else ""
     answer = UNKNOWN if held else YES if shut and states[-1].closed else NO
     if not collapse and max(s.pressure for s in states) < rated * (1 - 1e-9):
@@ -335,7 +335,7 @@ def _collapse(result, rated: float) -> str:
     first, units = buckles_first(result), result.case.units
     if first is None or first.pressure >= rated:
         return ""
-    below = "rated back pressure" if result.case.closure.rated_pressure is not None else "largest one examined"
+    below = "rated back pressure" if result.case.closure.rated_pressure is not None else "largest one asked for"
     return f"{_gives_way(first.kind)} at {units.pressure(first.pressure, 3)}, below the {below}"
 
 

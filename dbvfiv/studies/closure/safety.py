@@ -184,7 +184,10 @@ def rated_sentence(result: StudyResult) -> str | None:
             f"{begin} not reached, as the wall buckles at {at / 1e3:.6g} kPa, {at / told['pressure']:.2g} times that."
         )
     if not told["examined"]:  # another class that buckles ends no path
-        return f"{begin} not examined; {result.walk_failure or 'it is not among closure.pressures.'}"
+        why = result.walk_failure or "it is not among closure.pressures."
+        if any(np.isclose(state.pressure, told["pressure"]) for state in result.states):
+            why = "its state lies beyond a limit point; ask for it before higher ones."
+        return f"{begin} not examined; {why}"
     seal = "sealing not examined, as the supports hold the lips shut"
     if told["sealed"] is not None:
         seal = "sealed" if told["sealed"] else "shut" if told["shut"] else "open"
@@ -319,9 +322,10 @@ def _buckling(result: StudyResult) -> list[str]:
     softest = result.softest
     if softest is None:
         return []
-    followed = [p for p in result.walk if np.isfinite(p.lowest_eigenvalue)]
     unstable = softest.pressure if softest.lowest_eigenvalue <= 0 else None
-    pressures, lowest = ([getattr(p, name) for p in followed] for name in ("pressure", "lowest_eigenvalue"))
+    pressures, lowest = (
+        [getattr(p, name) for p in rising_points(result)] for name in ("pressure", "lowest_eigenvalue")
+    )
     return [_unbuckled(OWN, unstable, pressures, lowest)]
 
 

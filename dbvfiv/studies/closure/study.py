@@ -369,8 +369,7 @@ class ClosureResult(StudyResult):
     @property
     def softest(self) -> SimpleNamespace | None:
         """Point of the path, before arclength takes over, with the lowest stiffness eigenvalue."""
-        followed = [point for point in self.walk if np.isfinite(point.lowest_eigenvalue)]
-        return min(followed, key=lambda point: point.lowest_eigenvalue, default=None)
+        return min(rising_points(self), key=lambda point: point.lowest_eigenvalue, default=None)
 
     # -- for people
     # ----

@@ -10,7 +10,7 @@ import pytest
 import dbvfiv
 from dbvfiv.model.closed import ClosedValve
 from dbvfiv.record.mesh import MeshData
-from dbvfiv.report.answers import _collapse, _margin, trade
+from dbvfiv.report.answers import _collapse, _margin, closes, trade
 from dbvfiv.report.gather import Gathered
 from dbvfiv.studies.case import thesis_case
 from dbvfiv.studies.closure.safety import ClassBuckling, _buckling, find_safety, rated_sentence, rated_verdict
@@ -80,12 +80,37 @@ def test_buckling_in_another_class_is_a_limit():
     assert ("leak rate there", "3.6 L/h at most, as fluid.viscosity is none") in rows
 
 
+def test_a_collapse_below_the_largest_back_pressure_that_was_asked_for_is_told():
+    """Page one told of a wall that collapses at 16 kPa only that it is shut at 14, of 28 that were asked for."""
+    found = result([7e3, 14e3], [0.1, 0.1], buckling=[16e3], lost=[28e3], failure="The wall has a limit point.")
+    told = closes(Gathered(found.case, "valve", (2e3,), None, {"closure": found}))
+    assert told.text.endswith("and 14 kPa; the wall collapses at 16 kPa, below the largest one asked for.")
+
+
+def test_a_rated_state_beyond_a_limit_point_is_not_said_to_be_unasked():
+    found = result([3e4, 2e4], [0.1, 0.1], buckling=[27.6e3], rated_pressure=2e4)
+    found.states[1].beyond_limit = True
+    assert rated_sentence(found).endswith(
+        "not examined; its state lies beyond a limit point; ask for it before higher ones."
+    )
+
+
 def test_a_class_that_is_unstable_without_buckling_is_not_said_to_hold():
     assert sway((10.0, -2.0)).sentence.startswith("Unstable in class SA (the lips sway together in y) at 2 kPa")
     assert sway((10.0, 2.0)).sentence.startswith("No buckling in class SA")
-    walk = [SimpleNamespace(pressure=p, lowest_eigenvalue=v) for p, v in ((1e3, -1.0), (2e3, -2.5))]
-    (said,) = _buckling(SimpleNamespace(buckling=(), walk=walk, softest=walk[1]))
-    assert said.startswith("Unstable within the symmetry of the model at 2 kPa")
+    assert looked_at((1e3, -1.0), (2e3, -2.5)).startswith("Unstable within the symmetry of the model at 2 kPa")
+    # beyond arclength nothing is said, as of the safety factor
+    assert "up to 2 kPa; the stiffness is least at 2 kPa" in looked_at(
+        (1e3, 9.0), (2e3, 8.0), (2.5e3, np.nan), (3e3, 2.0)
+    )
+
+
+def looked_at(*points):
+    """Sentence on buckling of a path with pressures and lowest eigenvalues, NaN where arclength was followed."""
+    walk = [SimpleNamespace(pressure=p, lowest_eigenvalue=v, arclength=np.isnan(v)) for p, v in points]
+    softest = ClosureResult.softest.fget(SimpleNamespace(walk=walk))
+    (said,) = _buckling(SimpleNamespace(buckling=(), walk=walk, softest=softest))
+    return said
 
 
 def test_a_seal_that_never_was_is_no_seal_that_was_lost():
