@@ -104,9 +104,9 @@ class LoadSteps:
         SolveError
             If the load steps became smaller than allowed; `self.pressure` and `self.q` then hold the last equilibrium.
         """
-        smallest = self.options.min_step * max(abs(target), abs(self.pressure))
+        smallest = self.options.min_step * max(abs(target - self.origin), abs(self.pressure - self.origin))
         step = np.copysign(min(abs(target - self.pressure), self.step, self.options.max_step), target - self.pressure)
-        iterations, steps, straight = 0, 0, self.options.straight
+        iterations, steps, straight, refused = 0, 0, self.options.straight, False
         while True:
             remaining = target - self.pressure
             last = abs(step) >= abs(remaining) * (1 - 1e-12)
@@ -118,20 +118,22 @@ class LoadSteps:
                 self._take(result, aim, slope)
                 if self.accepted is not None:
                     self.accepted(aim, self.q)
-                self.step = max(2 * abs(step), self.options.first_step)
+                # after a refusal no longer one: it would end where, or beyond where, that did
+                grown, refused = abs(step) if refused else 2 * abs(step), False
+                self.step = max(grown, self.options.first_step)
                 if last:
                     return LoadStepResult(iterations, steps, result)
-                step = np.copysign(min(2 * abs(step), abs(target - self.pressure), self.options.max_step), step)
+                step = np.copysign(min(grown, abs(target - self.pressure), self.options.max_step), step)
                 self.observer.progress(f"equilibrium at {aim:.6g} Pa, {result.iterations} iterations")
                 continue
-            step = (aim - self.pressure) / 2
+            step, refused = (aim - self.pressure) / 2, straight is None
             self.observer.progress(
                 f"no equilibrium at {aim:.6g} Pa ({result.reason}), step halved to {digits(abs(step))} Pa"
             )
             if straight is not None and abs(step) < max(smallest, WIDE**2 * abs(target - self.origin)):
                 # the path ends, as at a limit point: what lies beyond is where Newton's method strays to
                 straight, step = None, target - self.pressure
-            elif abs(step) < smallest:
+            elif abs(step) <= smallest:
                 raise SolveError(
                     f"No equilibrium was found between {self.pressure:.6g} Pa, the last one, and {aim:.6g} "
                     f"Pa on the way to {target:.6g} Pa: "
@@ -139,8 +141,7 @@ class LoadSteps:
                 )
 
     def settle(self) -> NewtonResult:
-        """Solve again at the present pressure, after something else of the model has changed. Where that takes no
-        iteration no slope is found, as the solver has a tangent of another state.
+        """Solve again at the present pressure, after something else of the model has changed.
 
         Raises
         ------
@@ -149,7 +150,7 @@ class LoadSteps:
         for solver in (self.solver, self.fallback):
             result = solver.solve(self.q, self.pressure)
             if result.converged:
-                self._take(result, self.pressure, _slope(solver, result, self.pressure) if result.iterations else None)
+                self._take(result, self.pressure, _slope(solver, result, self.pressure))
                 return result
         raise SolveError(f"The equilibrium at {self.pressure:.6g} Pa was lost: {result.reason}.")
 
@@ -157,9 +158,9 @@ class LoadSteps:
         """Result at a pressure, and dq/dP there if it is known."""
         start = self.q if self.slope is None else self.q + (aim - self.pressure) * self.slope
         wide = abs(aim - self.pressure) > WIDE * max(abs(aim - self.origin), abs(self.pressure - self.origin))
-        first, slope = self._judged(self.solver, self.solver.solve(start, aim, straight if wide else None), start, aim)
+        first = self.solver.solve(start, aim, straight if wide else None)
         if first.converged or (wide and straight is not None):
-            return first, slope
+            return self._judged(self.solver, first, start, aim)
         result, slope = self._judged(self.fallback, self.fallback.solve(self.q, aim), start, aim)
         return replace(result, iterations=result.iterations + first.iterations), slope
 
@@ -192,8 +193,10 @@ class LoadSteps:
 
 
 def _slope(solver: EquilibriumSolver, result: NewtonResult, pressure: float) -> np.ndarray | None:
-    """dq/dP at what a solver has just found; None where it found nothing, or has no tangent yet."""
-    return solver.sensitivity(result.q, pressure) if result.converged and solver.tangent is not None else None
+    """dq/dP at what a solver has just found; None where it found nothing, or without an iteration, for its tangent is
+    that of another state.
+    """
+    return solver.sensitivity(result.q, pressure) if result.converged and result.iterations else None
 
 
 class Loading:

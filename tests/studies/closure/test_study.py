@@ -13,7 +13,8 @@ from scipy.sparse import diags
 from dbvfiv.errors import SolveError
 from dbvfiv.model.closed import ClosedValve, Passage, load_steps
 from dbvfiv.model.load_curve import LoadCurve
-from dbvfiv.model.load_steps import LoadSteps
+from dbvfiv.model.load_steps import LoadStepOptions, LoadSteps
+from dbvfiv.model.newton import NewtonResult
 from dbvfiv.studies.case import Case, thesis_case
 from dbvfiv.studies.closure.buckling import BucklingWatch, _Known, follow_past_limits, spectrum_of
 from dbvfiv.studies.closure.walk import ClosureWalk
@@ -266,6 +267,27 @@ def test_work_and_energies_balance_the_better_the_smaller_the_steps(case):
     assert errors[1] < errors[0] < 1e-2 and errors[2] < 1e-5, errors
 
 
+class Ends(LoadSteps):
+    """Load steps along a path that ends at a pressure, `model`."""
+
+    def __post_init__(self):
+        self.origin, self.step, self.slope, self.refused = self.pressure, self.options.first_step, None, 0
+
+    def _attempt(self, aim, straight):
+        self.refused += aim > self.model
+        return NewtonResult(np.zeros(1), aim <= self.model, 1, 0.0, 0.0, "past the end"), None
+
+
+@pytest.mark.parametrize("back", [0.0, 1e5, -2e4])
+def test_load_steps_come_to_the_end_of_a_path_whatever_the_pressure_it_starts_from(back):
+    """Behind 10 m of water they ended half a pascal short of it; elsewhere 12 of them were refused on the way."""
+    steps = Ends(back + 276.03, LoadStepOptions(min_step=1e-4, first_step=0.5, max_step=10.0), back)
+    with pytest.raises(SolveError):
+        steps.reach(back + 280.0)
+    assert steps.pressure == pytest.approx(back + 276.03, abs=0.06)
+    assert steps.refused <= 10
+
+
 def test_no_load_step_crosses_a_limit_point():
     """At 52 046.7 Pa the wall snaps by 5 mm, a third of its thickness; just below it a step of 31 Pa ended behind it,
     no farther from its prediction than steps may, and the valve was sealed at 58 kPa with no buckling.
@@ -279,3 +301,5 @@ def test_no_load_step_crosses_a_limit_point():
         for pressure in (rated / 7, rated / 2, rated):
             steps.reach(pressure)
     assert steps.pressure == pytest.approx(52046.7, abs=1.0)
+    last = steps.slope.copy()  # and not that of the attempt that failed
+    assert steps.reach(steps.pressure).iterations == 0 and np.array_equal(steps.slope, last)
