@@ -17,7 +17,6 @@ from weakref import WeakKeyDictionary, proxy
 import numpy as np
 
 from continuation.branch import Branch
-from continuation.event_location import FoldMonitor
 from continuation.options import ContinuationOptions, NotConverged, Reason
 from continuation.options import NewtonOptions as ContinuationNewton
 from continuation.problem import Problem
@@ -113,11 +112,14 @@ class _Linearisation:
 
 
 class LimitState(NamedTuple):
-    """A limit point solved for: pressure, Pa, unknowns (n,) and the shape (n,) by which they change there."""
+    """A limit point solved for: pressure, Pa, unknowns (n,), the shape (n,) by which they change there, and the number
+    of the point of the curve before it.
+    """
 
     pressure: float
     q: np.ndarray
     shape: np.ndarray
+    before: int
 
 
 class LimitPoint(NamedTuple):
@@ -142,7 +144,7 @@ class LoadCurve:
     origin : (pressure, unknowns), optional
         Equilibrium that the curve starts from; that at rest without it.
     stops_at_limit : bool
-        The curve ends where its pressure first turns back.
+        The curve ends where its pressure has turned back to beyond its start.
     """
 
     model: Any
@@ -211,7 +213,7 @@ class LoadCurve:
         for i in self._turns(self._slopes(slice(None))):
             at = tracer.root(points[i], points[i + 1], lambda point: point.tangent[-1], 1e-12)
             at = min(points[i : i + 2], key=lambda point: abs(point.tangent[-1])) if at is None else at
-            found.append(LimitState(float(at.z[-1]), at.z[:-1], at.tangent[:-1]))
+            found.append(LimitState(float(at.z[-1]), at.z[:-1], at.tangent[:-1], int(i)))
         return self._without_noise(found)
 
     def _without_noise(self, limits: list[_Limit]) -> list[_Limit]:
@@ -228,6 +230,12 @@ class LoadCurve:
     def _up_to(self, highest: float) -> slice:
         """Points that are known up to the first that passes a pressure, Pa."""
         return slice(int(np.argmax(beyond)) + 1) if (beyond := self.pressures >= highest).any() else slice(None)
+
+    def towards(self, end: int) -> list[int]:
+        """Numbers of the points up to one at which the curve goes on from its start, each farther than all before."""
+        on = np.sign(self.pressures[1] - self.pressures[0])
+        far, slopes = on * self.pressures[: end + 1], on * self._slopes(slice(end + 1))
+        return [i for i in range(end + 1) if i == 0 or (slopes[i] > 0 and far[i] > far[:i].max())]
 
     def _slopes(self, part: slice) -> np.ndarray:
         return np.array([point.tangent[-1] for point in self._branch.points[part]])
@@ -321,14 +329,13 @@ class LoadCurve:
             limits={LOAD: ahead or (-np.inf, np.inf)},
             parameter_scales={LOAD: self._unit},
             locate=False,
-            stop_at=frozenset({"fold"} if self.stops_at_limit else ()),
             newton=ContinuationNewton(
                 max(self.newton.tolerance, _POINTS, self._system.rounding), _AHEAD if ahead else _BETWEEN
             ),
             max_angle=self._angle,
         )
         problem = Problem(self._system, {LOAD: self._start}, (LOAD,), parameter_scales=options.units([LOAD]))
-        return Tracer(problem, options, [FoldMonitor()] if self.stops_at_limit else [], _Told(self.observer))
+        return Tracer(problem, options, observers=_Told(self.observer))
 
     def extend(self, target: float) -> None:
         """Follow the curve on to a pressure, towards which it leaves its start, anew with other steps where it
@@ -345,7 +352,8 @@ class LoadCurve:
                 self._angle, self._branch = angle, None
             if self._branch is None:
                 self._unit = max(1e-3 * abs(target - start), 1e-3 * abs(start - back), self.model.load_unit)
-            tracer = self._tracer((back - self._unit, target) if way > 0 else (target, np.inf))
+            ends = (start - self._unit, start + self._unit) if self.stops_at_limit else (back - self._unit, np.inf)
+            tracer = self._tracer((ends[0], target) if way > 0 else (target, ends[1]))
             try:
                 if self._branch is None:
                     z = np.append(self._rest(), start)
@@ -361,7 +369,8 @@ class LoadCurve:
             if self._branch.reason.kind is Reason.INTERRUPTED:
                 self._branch = None
                 raise KeyboardInterrupt
-            ended = self._branch.reason.kind in (Reason.STOPPED, Reason.POINTS)
+            kind = self._branch.reason.kind
+            ended = kind is Reason.POINTS or (self.stops_at_limit and kind is Reason.LIMIT)
             if ended or way * (self.pressures[-1] - target) >= -1e-12 * abs(target):
                 return
 

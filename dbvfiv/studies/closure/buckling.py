@@ -322,7 +322,8 @@ class LimitPath(NamedTuple):
 
 
 def follow_past_limits(curve: LoadCurve, target: float) -> LimitPath:
-    """Follow a curve of equilibria until the pressure is `target`, Pa, or falls to zero, or to where the curve stops.
+    """Follow a curve of equilibria until the pressure is `target`, Pa, or falls to zero; one that stops at limit points
+    to the last point before the first.
 
     Raises
     ------
@@ -330,11 +331,13 @@ def follow_past_limits(curve: LoadCurve, target: float) -> LimitPath:
         If no curve leaves its start.
     """
     curve.extend(target)
-    limits = []
-    for pressure, q, shape in curve.limit_states():
+    found, limits = curve.limit_states(), []
+    points = list(zip(map(float, curve.pressures), curve.states))
+    if curve.stops_at_limit and found:
+        found, points = found[:1], [points[i] for i in curve.towards(found[0].before)]
+    for pressure, q, shape, _ in found:
         vanishing = _least_in_magnitude(curve.model, q, pressure)
         limits.append(Buckling("limit point", pressure, q, shape / shape[np.argmax(np.abs(shape))], vanishing))
-    points = list(zip(map(float, curve.pressures), curve.states))
     return LimitPath(points, limits, abs(points[-1][0] - target) <= 1e-9 * target, curve.reason)
 
 

@@ -368,7 +368,7 @@ class ClosureWalk:
                 self._keep_before_limit(start, q)
             raise SolveError(f"{error} Arclength did not get under way either: {reason}") from reason
         rising = path.limits and not goes_on
-        for pressure, place in path.points[1:-1] if rising else path.points[1:]:
+        for pressure, place in path.points[1:]:
             if rising:
                 self._watch(pressure, place, point=True)
                 start, q = pressure, place

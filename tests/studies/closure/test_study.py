@@ -15,7 +15,8 @@ from dbvfiv.model.closed import ClosedValve, Passage, load_steps
 from dbvfiv.model.load_curve import LoadCurve
 from dbvfiv.model.load_steps import LoadStepOptions, LoadSteps
 from dbvfiv.model.newton import NewtonResult
-from dbvfiv.studies.case import Case, thesis_case
+from dbvfiv.observer import Observer
+from dbvfiv.studies.case import Case, load_case, thesis_case
 from dbvfiv.studies.closure.buckling import BucklingWatch, _Known, follow_past_limits, spectrum_of
 from dbvfiv.studies.closure.walk import ClosureWalk
 from dbvfiv.studies.session import Session
@@ -167,8 +168,9 @@ def test_the_eigenvalue_of_a_limit_point_is_the_one_that_vanishes():
     shell = SimpleNamespace(dofs=SimpleNamespace(matrix=lambda part: part))
     tangent = SimpleNamespace(stiffness=stiffness)
     model = SimpleNamespace(shell=shell, tangent=lambda q, p: tangent, mass=lambda q: diags(np.ones(8)).tocsr())
-    at = 3e3, np.zeros(8), np.eye(8)[2]
+    at = 3e3, np.zeros(8), np.eye(8)[2], 0
     curve = SimpleNamespace(model=model, limit_states=lambda: [at], pressures=[0.0, 4e3], states=[at[1]] * 2, reason="")
+    curve.stops_at_limit = False
     curve.extend = lambda target: None
     (limit,) = follow_past_limits(curve, 4e3).limits
     assert limit.eigenvalue == pytest.approx(1e-9, rel=1e-3)
@@ -265,6 +267,19 @@ def test_work_and_energies_balance_the_better_the_smaller_the_steps(case):
     case = case.replace({"mesh.around": 6, "mesh.along": 10})
     errors = [reach(case, 7e3, closure__max_step=step).energy_balance for step in (2e3, 250.0, 30.0)]
     assert errors[1] < errors[0] < 1e-2 and errors[2] < 1e-5, errors
+
+
+def test_a_pair_of_limit_points_of_the_mesh_ends_no_path_without_arclength():
+    """At 50 872 Pa such a pair ended it with no buckling, next to where the wall snaps."""
+    keys = {"mesh.around": 6, "mesh.along": 8, "materials.strain_level": 0.2, "closure.max_step": "10 kPa"}
+    model = ClosedValve(load_case("cases/dbv12.toml").replace(keys))
+    steps = LoadSteps(model, load_steps(model))
+    steps.reach(50793.75)
+    at = steps.pressure, steps.q
+    path = follow_past_limits(LoadCurve(model, steps.options.newton, Observer(), at, stops_at_limit=True), 6e4)
+    assert [limit.pressure for limit in path.limits] == pytest.approx([50880.3], abs=0.5) and not path.reached
+    pressures = [pressure for pressure, _ in path.points]
+    assert pressures == sorted(pressures) and 50870.0 < pressures[-1] < path.limits[0].pressure
 
 
 class Ends(LoadSteps):
