@@ -376,8 +376,7 @@ class Session:
             for note in record.notes("settled")[-1:]:  # of the first attempt where it goes on
                 for sentence in note.get("warnings", ()):
                     record.warn(sentence)
-            for sentence in model_warnings(self.described):
-                record.warn(sentence)
+            record.first = model_warnings(self.described)
             try:
                 study.run(self, record, **_with_files(study, record, choices))
                 complete = True

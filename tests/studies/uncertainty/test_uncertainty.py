@@ -296,7 +296,7 @@ def plies(angle):
         ({}, "angle", "normal", (54.0, 2.0)),
         (plies(90.0), "angle", "uniform", (86.54, 90.0)),
         (plies(1.0), "angle", "uniform", (0.0, 4.46)),
-        (plies(120.0), "angle", None, None),
+        (plies(120.0), "angle", "normal", (60.0, 2.0)),
         ({"valve.scale": 1 / 12}, "thickness", "lognormal", (1.0, 1.2)),
         ({"valve.scale": 1 / 2}, "thickness", "normal", (1.0, 0.0)),
     ],
