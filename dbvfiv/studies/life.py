@@ -33,8 +33,6 @@ from ..shell.reference import thickness_over_radius
 from ..shell.shell import Shell
 from .state import StateSteps
 
-#: Instants of a period at which a cycle is looked at; a peak between two of them is missed by 0.1 %.
-INSTANTS = 64
 #: Range of strain below which nothing moves.
 STILL = 1e-7
 #: Share of the swings of the lip, by the fourth power, that full states have to hold, and that below which it is told.
@@ -119,10 +117,9 @@ def motion_of(
 def _limit_cycle(result: Any, value: float | None) -> Motion:
     point = result.nearest(value)
     orbit, at = point.orbit, PARAMETERS[result.parameter].text(point.value)
-    states = orbit.motion.at(2 * np.pi * np.arange(INSTANTS) / INSTANTS)[:, : orbit.model.size]
     remarks = ("The cycle is unstable: the valve leaves it.",) if point.stable is False else ()
     words = f"the limit cycle at {at}, {point.frequency:.4g} Hz"
-    return Motion(orbit.model.shell, states, 1.0 / point.frequency / 3600.0, words, remarks)
+    return Motion(orbit.model.shell, orbit.states, 1.0 / point.frequency / 3600.0, words, remarks)
 
 
 def _run(result: Any, since: float | None, per_day: float | None) -> Motion:
