@@ -321,7 +321,7 @@ class Runner:
         self.stepper = Stepper(self.motion, self.options.scheme, self.drive, self.options.step)
         self.control = step_control(self.stepper, self.options.control)
         self.history = Keeper(record, model)
-        self._reader = Reader(self.motion, record.tables[HISTORY].columns)
+        self._reader = Reader(self.motion, record.tables[HISTORY].columns, self.drive)
         self.failures: list[str] = []
         self.interrupted = self.stopped = False
         self._row: dict[str, Any] = {}  # the last one of the history that this run has made

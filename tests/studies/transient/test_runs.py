@@ -62,8 +62,11 @@ def test_kick_rings_at_the_eigenvalue(valve):
 def test_a_kick_before_anything_flows_pushes_the_valve_at_rest(valve):
     """The ramp begins below the pressure downstream."""
     changes = {"transient.start": "kick", "transient.ramp": 5e-3, "transient.duration": 5e-3}
-    run = Runner(valve(changes | {"downstream.pressure": 400.0, "drive.pressure": 6e3})).start()
+    model = valve(changes | {"downstream.pressure": 400.0, "drive.pressure": 6e3})
+    run = Runner(model).start()
     assert run.progress.eigenvalue.imag > 0 and run.history["lip_displacement"][0] == pytest.approx(1e-4, rel=1e-6)
+    with pytest.raises(CaseError, match="is 0 Pa, below the 400 Pa at which nothing flows"):
+        dbvfiv.load(model.case, {"fluid.unsteady": False}).transient()
 
 
 @pytest.mark.parametrize(
@@ -186,6 +189,7 @@ def test_a_valve_whose_drive_turns_around_closes_and_without_one_stands_at_its_g
     changes = {"transient.drive_table": str(table), "downstream.pressure": back, "transient.start": "steady"}
     changes |= {"fluid.density": 10.0, "damping.alpha": 400.0, "transient.duration": 0.4}
     run = Runner(valve(changes | {"transient.numerical_damping": 0.1})).start()
+    assert run.history["inlet_pressure"] == pytest.approx([run.drive(time) for time in run.history["time"]], abs=1e-6)
     assert run.history["smallest_area"][0] > 20 * lip_gap(run.model)
     assert (run.verdict.name == "closed" and run.verdict.decided) if back else run.verdict.name != "closed"
 
