@@ -83,7 +83,8 @@ def motion_of(
     value : float, optional
         Of the parameter of a branch of cycles; the last one without it.
     since : float, s, optional
-        Start of the part of a run that counts; its last whole cycles without it, or all of it where it has none.
+        Start of the part of a run that counts; without it its last whole cycles, or all that is judged where it has
+        none.
     per_day : float, optional
         How often in a day a run takes place, or the way to the last state and back.
 
@@ -134,7 +135,9 @@ def _run(result: Any, since: float | None, per_day: float | None) -> Motion:
         lip, flow = verdict["lip_displacement"], verdict["mass_flow"]
         cycle = lip if lip["verdict"] == "limit cycle" else flow
         begin = max(begin, end - max(1, min(int(cycle["cycles_observed"]), LAST)) / cycle["frequency"])
-    elif per_day is None and verdict["verdict"] not in ("irregular", "chatters"):
+    elif per_day is None and verdict["verdict"] in ("irregular", "chatters"):
+        begin = max(begin, result.judged_from)  # a way up to the drive that lasts is taken once
+    elif per_day is None:
         raise CaseError(
             f"The run ends {verdict['verdict']} and not in a motion that lasts; give how often a day it takes place, "
             "--per-day N, or the time from which its motion goes on, --since T."

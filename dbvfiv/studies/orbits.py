@@ -145,8 +145,7 @@ class Orbit:
     @property
     def lip_harmonics(self) -> np.ndarray:
         """(H + 1,) amplitudes of the harmonics of the lip's displacement, m; the mean first."""
-        number = self.model.shell.dofs.index[self.model.mesh.centre_line[0], 1]
-        parts = np.abs(self.motion.harmonics.complex(self.motion.coefficients[:, number]))
+        parts = np.abs(np.fft.rfft(self.lip))[: self.motion.harmonics.count + 1] / INSTANTS
         return parts * np.append(1.0, np.full(len(parts) - 1, 2.0))
 
     @cached_property

@@ -163,6 +163,9 @@ def test_what_is_read_off(found):
     assert np.isclose(point.amplitude, 0.5 * np.ptp(orbit.lip), rtol=1e-3)
     assert np.isclose(orbit.lip_rate.max(), np.gradient(orbit.lip, orbit.time).max(), rtol=2e-2)
     assert np.isclose(orbit.lip_harmonics[0], point.lip_mean, rtol=1e-6)
+    held = replace(orbit)
+    vars(held)["lip"] = np.zeros_like(orbit.lip)  # as where its node is held
+    assert not held.lip_harmonics.any()
     assert orbit.clearance > 0 and point.least_speed > 0
     summary = found.summary()
     assert summary["parameter"] == "density" and summary["special_points"] == []
