@@ -97,7 +97,7 @@ def candidates_of(result: StudyResult, error: float) -> list[Candidate]:
         ]
     elif result.kind == "transient":
         seen = result.history["time"] >= result.judged_from
-        verdict = judge_record(*(result.history[name][seen] for name in ("time", "lip_displacement")))
+        verdict = judge_record(*(result.history[name][seen] for name in ("time", "lip_displacement")), gaps=False)
         found = [
             Candidate(
                 "run" if number == 0 else f"run, line {number + 1}",
