@@ -137,6 +137,13 @@ class Distribution:
             return float(self.at(np.ones(1))[0]) - self.median
         return float(np.std(self.numbers)) / (1.0 if self.form == "samples" else np.sqrt(3.0))
 
+    @property
+    def spread(self) -> float:
+        """Standard deviation to first order in the scores, that of a lognormal one the same to both sides."""
+        import numpy as np
+
+        return self.median * float(np.log(self.numbers[1])) if self.form == "lognormal" else self.scale
+
     def share_outside(self, low: float, high: float) -> float:
         """Probability of values below one bound or above another."""
         import numpy as np

@@ -62,6 +62,8 @@ class Input:
         Why it is as uncertain as that.
     surrounding : bool
         Whether steady states and structure stay as they are.
+    own : float, optional
+        Number of the case; None where it has no one.
     """
 
     name: str
@@ -69,6 +71,7 @@ class Input:
     quantity: Quantity
     source: str
     surrounding: bool
+    own: float | None = None
 
     @property
     def title(self) -> str:
@@ -331,7 +334,7 @@ def _input(case: Case, name: str, text: str, source: str) -> Input:
             + "; choose a narrower one, or a lognormal one.",
             key=key,
         )
-    return Input(name, distribution, quantity, source, name in PARAMETERS and is_surrounding(case, name))
+    return Input(name, distribution, quantity, source, name in PARAMETERS and is_surrounding(case, name), own)
 
 
 def _shipped(case: Case) -> Iterator[tuple[str, str, str]]:

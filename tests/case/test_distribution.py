@@ -30,6 +30,8 @@ def test_values_are_those_of_their_probability(text, own, expected):
     low, high = expected.ppf(0.03), expected.ppf(0.9)
     assert found.share_outside(low, high) == pytest.approx(0.13, rel=1e-9)
     assert found.median == pytest.approx(expected.median(), rel=1e-12)
+    slope = np.diff(found.at(np.array([-1e-6, 1e-6])))[0] / 2e-6
+    assert found.spread == pytest.approx(expected.std() if found.form == "uniform" else slope, rel=1e-6)
 
 
 def test_units_are_read():
