@@ -22,7 +22,7 @@ from ...model.symmetry import equilibria_of, only_class_of
 from ...record.record import GrowingRecord, Record
 from ...texts import digits
 from ..case import Case
-from ..inputs import Plan, correlation_of
+from ..inputs import Plan, correlation_of, inputs_of
 from ..result import StudyResult
 from ..session import Session, Study
 from ..stability.place import check_scan, describe_fixed, require_head
@@ -63,7 +63,9 @@ def rows_to_keep(known: Record, _case: Case) -> dict[str, int]:
 
 
 def check(case: Case) -> None:
-    """Refuse what the case does not have, a range without the last record, a pump, and a case without records."""
+    """Refuse what the case does not have, a range without the last record, a pump, a case without records, and inputs
+    that places or the range take the place of.
+    """
     places = Places(case)
     check_scan(case, places.parameter, *(name for one in places.of_records for name in one))
     require_head(case)
@@ -79,6 +81,7 @@ def check(case: Case) -> None:
             f"{row.amount(places.now)}, about which onsets are sought; give a range that holds it.",
             key="identify.over",
         )
+    inputs_of(case, places.plan.moved, places.plan.by)
 
 
 def run(
@@ -103,8 +106,8 @@ def run(
     SolveError
         If the valve of the case has no steady state where a record was taken.
     """
-    case, plan, places = session.case, Plan(session.case), Places(session.case)
-    asked = case.identify
+    case, places = session.case, Places(session.case)
+    plan, asked = places.plan, case.identify
     plan.scores_of(np.zeros((1, len(plan.inputs))))  # correlations are checked before anything is solved
     if places.now is None:
         raise CaseError(
@@ -173,7 +176,7 @@ class IdentifyResult(StudyResult):
 
     @cached_property
     def plan(self) -> Plan:
-        return Plan(self.case)
+        return self.places.plan
 
     @cached_property
     def places(self) -> Places:
@@ -361,9 +364,10 @@ class IdentifyResult(StudyResult):
         return texts, [pair for pair in pairs if pair[2]]
 
     def posterior_case(self) -> Case:
-        """The case with what was learned as its uncertainty."""
-        texts, pairs = self.uncertainty()
-        return self.case.replace({"uncertainty.inputs": texts, "uncertainty.correlation": pairs})
+        """The case with what was learned as its uncertainty, without a range over one of its inputs."""
+        (texts, pairs), axis = self.uncertainty(), self.case.uncertainty.axis
+        keys = {"uncertainty.over": None} if axis is not None and axis.parameter in texts else {}
+        return self.case.replace(keys | {"uncertainty.inputs": texts, "uncertainty.correlation": pairs})
 
     @property
     def found(self) -> dict[str, Any]:
