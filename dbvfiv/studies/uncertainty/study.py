@@ -219,6 +219,11 @@ def _are(found: dict[str, np.ndarray], outcome: str) -> np.ndarray:
     return found["outcome"] == OUTCOMES.index(outcome)
 
 
+def _unknown(found: dict[str, np.ndarray], outcome: str) -> np.ndarray:
+    """True for samples of which nothing tells whether they are of an outcome."""
+    return np.isnan(found["flow"]) if outcome == NOT_SEALED else _are(found, UNDECIDED)
+
+
 class _Sampling:
     """Samples found so far, and those still wanted; what an earlier attempt kept is not computed again."""
 
@@ -367,7 +372,7 @@ class UncertaintyResult(StudyResult):
     def probability(self, value: float, outcome: str = FLUTTERS) -> Probability:
         """Probability of an outcome at a value of the range."""
         found, method = self.at(value), self.case.uncertainty.method
-        hits, undecided = _are(found, outcome), _are(found, UNDECIDED)
+        hits, undecided = _are(found, outcome), _unknown(found, outcome)
         if method == "plain":
             return counted(int(hits.sum()), int(undecided.sum()), len(hits))
         if method == "subset":

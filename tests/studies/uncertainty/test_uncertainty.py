@@ -116,6 +116,18 @@ def test_a_measurement_of_an_input_narrows_the_margin_by_a_share_of_its_median(m
         assert now == pytest.approx(2 * 1.96 * spread / 2000, rel=0.02)
 
 
+def test_a_sealed_bill_is_one_whatever_its_verdict():
+    """Twenty of 256 bills without a verdict: all let flow pass, or two without a steady state."""
+    result = object.__new__(UncertaintyResult)
+    outcome = np.where(np.arange(256) < 20, OUTCOMES.index("undecided"), OUTCOMES.index("stable"))
+    for flow, high in ((np.ones(256), 1.0), (np.where(np.arange(256) < 2, np.nan, 0.0), 0.028)):
+        rows = {"outcome": outcome, "flow": flow}
+        header = SimpleNamespace(case=load_case(None, []))
+        vars(result).update(record=SimpleNamespace(header=header), at=lambda _, rows=rows: rows)
+        found = result.probability(0.0, "not sealed")
+        assert found.value == np.nanmean(flow) and found.high == pytest.approx(high, abs=1e-3)
+
+
 def test_flow_models_are_compared_by_the_same_samples():
     """Blocks that workers kept in any order before a run was interrupted."""
     one, two = object.__new__(UncertaintyResult), object.__new__(UncertaintyResult)
