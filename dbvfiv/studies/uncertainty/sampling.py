@@ -189,12 +189,20 @@ ACCEPTED, FIRST_STEP = 0.44, 0.6
 
 
 def weighted(weights: np.ndarray, hits: np.ndarray, undecided: np.ndarray) -> Probability:
-    """Probability of an outcome from samples of another density, with the weights that make up for it: the mean of the
-    weights of hits, by Student's distribution.
+    """Probability of an outcome from samples of another density, with the weights that make up for it."""
+    (value, low, _), (_, _, high), (decided, *_) = (_part(weights, a) for a in (hits, hits | undecided, ~undecided))
+    return Probability(float(np.clip(value / decided, low, high)) if decided else np.nan, low, high)
+
+
+def _part(weights: np.ndarray, which: np.ndarray) -> tuple[float, float, float]:
+    """Probability of some samples with its interval: the mean of their weights, by Student's distribution, or one less
+    that of the others where these are fewer, by whose weights the mean scatters less.
     """
-    value, low, _ = _mean(weights * hits)
-    _, _, high = _mean(weights * (hits | undecided), largest=float(weights.max(initial=0.0)))
-    return Probability(value, max(low, 0.0), min(high, 1.0))
+    if 2 * (weights @ which) > weights.sum():
+        value, low, high = _part(weights, ~which)
+        return 1 - value, 1 - high, 1 - low
+    value, low, high = _mean(weights * which, largest=float(weights.max(initial=0.0)))
+    return value, max(low, 0.0), min(high, 1.0)
 
 
 def _mean(terms: np.ndarray, least: float = 0.0, largest: float = 1.0) -> tuple[float, float, float]:

@@ -125,6 +125,22 @@ def test_no_hit_of_another_density_says_less_than_none_of_the_inputs():
     assert sizes[1] == pytest.approx(0.228, rel=0.02)
 
 
+@pytest.mark.parametrize("doubtful", [False, True])
+def test_a_usual_outcome_of_weighted_samples_is_as_certain_as_the_rare_one(doubtful):
+    """All but the 1.35e-3 of the inputs beyond three standard deviations, about which nine tenths of the samples are;
+    and with a fifth of the others undecided, of which as many are.
+    """
+    density, values = Shifted(np.array([[3.0, 0.0], [0.0, 0.0]]), np.array([1 - DEFENSIVE, DEFENSIVE])), []
+    for seed in range(10):
+        scores = density.draw(160, np.random.default_rng(seed))
+        weights, rare = np.exp(density.log_weight(scores)), scores[:, 0] > 3
+        undecided = doubtful & ~rare & (scores[:, 1] > 0.84)
+        usual, other = weighted(weights, ~rare & ~undecided, undecided), weighted(weights, rare, undecided)
+        assert 0 <= usual.low <= usual.value <= usual.high <= 1 and usual.value == pytest.approx(1 - other.value)
+        values.append(other.value)
+    assert np.mean(values) == pytest.approx(norm.sf(3) * (1.25 if doubtful else 1), rel=0.1)
+
+
 def test_shares_of_a_linear_function_are_its_squares():
     scores = quasi_random(1024, 4, 3)
     found = shares(scores, scores @ [3.0, 2.0, 1.0, 0.0])
