@@ -95,6 +95,16 @@ def test_subset_sampling_without_a_hit_tells_what_its_levels_hold(least, most, p
     assert (found.value, found.low) == (0.0, 0.0) and least < found.high < most
 
 
+@pytest.mark.parametrize(("share", "bound"), [(0.1, 4.0), (0.5, 2.5)])
+def test_undecided_samples_of_all_levels_of_subset_sampling_widen_the_interval(share, bound):
+    """A share of the inputs, all of which may be of the event; the value is that of the others."""
+    performance = lambda z, _: np.where(z[:, 1] > norm.isf(share), np.nan, z[:, 0] - bound)  # noqa: E731
+    found = [subset(performance, 2, 1500, seed) for seed in range(20)]
+    assert np.mean([one.value for one in found]) == pytest.approx(norm.sf(bound), rel=0.2)
+    for one in found:
+        assert one.low <= (1 - share) * norm.sf(bound) and one.high >= 0.9 * share
+
+
 def test_two_regions_are_both_found():
     bound, values = 3.3, []
     for seed in range(20):
