@@ -64,6 +64,8 @@ class Input:
         Whether steady states and structure stay as they are.
     own : float, optional
         Number of the case; None where it has no one.
+    limits : tuple of float
+        Least and largest number that there can be.
     """
 
     name: str
@@ -72,6 +74,7 @@ class Input:
     source: str
     surrounding: bool
     own: float | None = None
+    limits: tuple[float, float] = (-np.inf, np.inf)
 
     @property
     def title(self) -> str:
@@ -337,7 +340,8 @@ def _input(case: Case, name: str, text: str, source: str) -> Input:
             + "; choose a narrower one, or a lognormal one.",
             key=key,
         )
-    return Input(name, distribution, quantity, source, name in PARAMETERS and is_surrounding(case, name), own)
+    surrounding = name in PARAMETERS and is_surrounding(case, name)
+    return Input(name, distribution, quantity, source, surrounding, own, limits)
 
 
 def _shipped(case: Case) -> Iterator[tuple[str, str, str]]:

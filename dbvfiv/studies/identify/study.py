@@ -13,7 +13,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from scipy.special import ndtri
 
-from ...case.distribution import Distribution
+from ...case.distribution import ALLOWED, Distribution
 from ...case.parameters import PARAMETERS
 from ...case.write import write_case
 from ...drawing.style import ACCENT, COMPUTED, REST, headline, new_figure, parameter_label
@@ -353,7 +353,7 @@ class IdentifyResult(StudyResult):
         ranks = np.argsort(np.argsort(turned, axis=0), axis=0)
         normal = ndtri((ranks + 0.5) / len(turned))
         for i, one in enumerate(self.plan.inputs):
-            texts[one.name] = distribution_text(one.distribution, turned[:, i])
+            texts[one.name] = distribution_text(one.distribution, turned[:, i], one.limits)
         matrix, names = np.corrcoef(normal.T).reshape(len(texts), -1), list(texts)
         matrix[np.abs(matrix) < KEPT] = 0.0
         np.fill_diagonal(matrix, 1.0)
@@ -486,17 +486,18 @@ def _modes_said(match: dict[str, Any]) -> str:
     return f"a mixture: {' or '.join(shares)}"
 
 
-def distribution_text(prior: Distribution, scores: np.ndarray) -> str:
-    """Text of the distribution whose scores under the prior are samples (n,)."""
+def distribution_text(prior: Distribution, scores: np.ndarray, limits: tuple[float, float] = (-np.inf, np.inf)) -> str:
+    """Text of the distribution whose scores under the prior are samples (n,), of a number between limits."""
     from scipy.stats import kstest
 
     mean, spread = float(scores.mean()), float(scores.std())
     a, b = prior.numbers[0], prior.numbers[-1]
     if prior.form in ("normal", "lognormal") and kstest((scores - mean) / spread, "norm").statistic < FORM:
-        if prior.form == "normal":
-            return f"normal({a + b * mean:.8g}, {b * spread:.6g})"
-        if b**spread > 1.0 + 1e-6:
-            return f"lognormal({a * b**mean:.8g}, {b**spread:.8g})"
+        is_normal = prior.form == "normal"
+        numbers = (a + b * mean, b * spread) if is_normal else (a * b**mean, b**spread)
+        wide = is_normal or numbers[1] > 1.0 + 1e-6
+        if wide and Distribution(prior.form, numbers).share_outside(*limits) <= 0.5 * ALLOWED:  # of rounded numbers too
+            return f"{prior.form}({numbers[0]:.8g}, {numbers[1]:.{6 if is_normal else 8}g})"
     steps = prior.at(np.quantile(scores, (np.arange(STEPS) + 0.5) / STEPS))
     values = [f"{value:.8g}" for value in steps]
     if values[0] == values[-1]:  # one of the samples of the prior: a distribution has some width
