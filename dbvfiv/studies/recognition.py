@@ -141,7 +141,7 @@ class Recognition:
     def _lines(self):
         for one in self.signals:
             for line in one.verdict.lines:
-                if not line["called"] or line["called"] == "sideband":
+                if line["called"] in ("", "sideband", "resonance"):
                     yield one.signal.name, line
 
     def sentence(self, line: dict[str, Any]) -> str:
@@ -151,7 +151,7 @@ class Recognition:
         if not found:
             near, _, distance = self.matches(line)[0]
             if not np.isfinite(distance):
-                return "It dies out, and nothing that was computed does."
+                return "It is damped, and nothing that was computed is."
             return f"None of them: the nearest, {near.name}, is {distance:.2g} standard errors away."
         first = found[0][0]
         if kept and not first.sustained:
