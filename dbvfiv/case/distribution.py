@@ -160,20 +160,6 @@ class Distribution:
             below, above = own.cdf(low), own.sf(high)
         return float(below + above)
 
-    def score(self, values: np.ndarray) -> np.ndarray:
-        """Standard normal values of the same probability, the inverse of `at`; of samples the middle of each step."""
-        import numpy as np
-        from scipy.special import ndtri
-
-        a, b = self.numbers[0], self.numbers[-1]
-        if self.form == "normal":
-            return (values - a) / b
-        if self.form == "lognormal":
-            return np.log(values / a) / np.log(b)
-        if self.form == "uniform":
-            return ndtri((values - a) / (b - a))
-        return ndtri((np.searchsorted(self.numbers, values) + 0.5) / len(self.numbers))
-
     def words(self, quantity: Quantity) -> str:
         """The distribution as a case would hold it."""
         if self.form == "samples":

@@ -232,9 +232,11 @@ def test_a_posterior_lies_where_its_number_can_be(text, limits):
     assert found.median == pytest.approx(prior.at(np.array([-2.0]))[0], rel=0.02)
 
 
-@pytest.mark.parametrize(("text", "value"), [("samples(1, 2, 4, 8)", 4.0), ("samples(-1, 0, 1)", 0.0)])
-def test_a_posterior_of_one_value_is_written_as_a_narrow_distribution(text, value):
+@pytest.mark.parametrize(
+    ("text", "value", "share"), [("samples(1, 2, 4, 8)", 4.0, 2.5 / 4), ("samples(-1, 0, 1)", 0.0, 0.5)]
+)
+def test_a_posterior_of_one_value_is_written_as_a_narrow_distribution(text, value, share):
     prior = Distribution.parse(text, Quantity(""))
-    scores = prior.score(np.array([value])) + 0.01 * np.random.default_rng(6).standard_normal(400)
+    scores = norm.ppf(share) + 0.01 * np.random.default_rng(6).standard_normal(400)
     found = Distribution.parse(distribution_text(prior, scores), Quantity(""))
     assert found.at(np.array([-2.0, 0.0, 2.0])) == pytest.approx([value] * 3, rel=1e-5, abs=1e-5) and found.scale > 0
