@@ -94,7 +94,7 @@ def test_a_record_is_the_cycle_of_its_frequency(found, file, tmp_path, command_l
     assert line["matches"][0]["name"] == "cycle at 230 kg/m³" and line["matches"][0]["share"] > 0.5
     assert "cycle at 230" in line["says"]
     (ring,) = beside(command_line, tmp_path, (time, np.exp(-2 * time) * np.cos(turn) + noise), file)
-    assert ring["says"] == "It dies out, and nothing that was computed does."
+    assert ring["says"] == "It is damped, and nothing that was computed is."
 
 
 def test_a_record_is_the_run_that_it_is(tmp_path, command_line):
