@@ -190,7 +190,8 @@ class ContinuationOptions:
     location_tolerance : float
         Relative size of the last correction of a located point.
     stop_at : str or set of str
-        Kinds of special points that end the branch, e.g. ``"hopf"``, or names of events.
+        Kinds of special points that end the branch, e.g. ``"fold"``, or names of events; ``"hopf"`` needs
+        ``eigenvalues``. Kinds that a run does not look for are refused.
     newton : NewtonOptions
     """
 

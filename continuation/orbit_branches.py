@@ -361,11 +361,9 @@ def resume(
         tracer = branch_tracer(system, branch.mu(-1), branch.names[0], options, events, spectrum, observers)
         return tracer.resume(branch)
     if branch.kind in STARTS:
-        borders, omega = (branch.restart["p"], branch.restart["q"]), 0.0
-        if branch.extra_names:
-            omega = branch.values("omega")[0]
+        borders = branch.restart["p"], branch.restart["q"]
         return curve_tracer(
-            system, branch.kind, branch.mu(-1), branch.names, borders, options, observers, spectrum, lyapunov, omega
+            system, branch.kind, branch.mu(-1), branch.names, borders, options, observers, spectrum, lyapunov
         ).resume(branch)
     require(len(branch) > 1, "A branch of orbits goes on from two points at least.")
     follower = _Follower(system, branch.names[0], options, discretisation, branch.mu(-1))

@@ -62,10 +62,11 @@ class Problem:
         self.extra_scale = extra_scale
         self.weights = np.concatenate([weights / state_scale**2, parameter, np.full(self.e, extra_scale**-2.0)])
 
-    def rescale(self, state_scale: float) -> None:
-        """Measure the state in another unit."""
+    def rescale(self, state_scale: float, extra_scale: float) -> None:
+        """Measure the state and the extra numbers in other units."""
         self.weights[: self.n] *= (self.state_scale / state_scale) ** 2
-        self.state_scale = state_scale
+        self.weights[self.n + self.k :] *= (self.extra_scale / extra_scale) ** 2
+        self.state_scale, self.extra_scale = state_scale, extra_scale
 
     def u(self, z):
         return z[: self.n]

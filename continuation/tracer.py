@@ -26,7 +26,8 @@ GROWTH, SHRINK = 1.5, 0.5
 SUBDIVISIONS = 6
 #: Largest distance of the curve from a chord, in chord lengths: an arc whose ends turn by 1.6 rad reaches 0.4.
 FARTHEST = 0.5
-#: Unit of a state over the range that it has gone through; most of it at the start, over the size of the state.
+#: Unit of a state, or of a frequency, over the range that it has gone through; most of that of a state at the start,
+#: over its size.
 SHARE, MOST = 0.5, 10.0
 #: Unit of a state that may be the rounding of one at rest.
 STILL = 1e-8
@@ -264,7 +265,7 @@ class Tracer:
         point = self.corrected_point(correction, direction)
         self._origin = self.problem.u(point.z)
         if self.problem.grows:
-            self.problem.rescale(self._first_unit(point))
+            self.problem.rescale(self._first_unit(point), self.problem.extra_scale)
         self.frame = self.problem.frame(point.local.basis)
         point.local = Local(self.problem, point.z, self.frame)
         point.tangent = point.local.tangent(point.tangent)
@@ -281,12 +282,14 @@ class Tracer:
         return unit if STILL < unit < 1.0 / STILL else 1.0
 
     def _grow(self, after, step: float) -> float:
-        """Let the unit of the state follow its range; the step in the new metric."""
+        """Let the units of the state and of a frequency follow their ranges; the step in the new metric."""
         problem = self.problem
-        unit = SHARE * _rms(problem.u(after.z) - self._origin)
-        if not problem.grows or unit <= problem.state_scale:
+        own, frequency = problem.state_scale, problem.extra_scale
+        unit = max(own, SHARE * _rms(problem.u(after.z) - self._origin)) if problem.grows else own
+        faster = max(frequency, SHARE * float(np.abs(problem.extra(after.z)).max(initial=0.0)))
+        if (unit, faster) == (own, frequency):
             return step
-        problem.rescale(unit)
+        problem.rescale(unit, faster)
         length = problem.norm(after.tangent)
         after.tangent = after.tangent / length
         return float(np.clip(step * length, self.options.min_step, self.options.max_step))
@@ -294,7 +297,8 @@ class Tracer:
     def resume(self, branch: Branch) -> Branch:
         """Copy of a branch with the points that follow its last one."""
         options, last = self.options, branch.points[-1]
-        self.problem.rescale(float(branch.restart.get("state_scale", self.problem.state_scale)))
+        own, kept = self.problem, branch.restart
+        own.rescale(*(float(kept.get(name, getattr(own, name))) for name in ("state_scale", "extra_scale")))
         grows, self.problem.grows = self.problem.grows, False
         start = self.start(last.z, last.tangent, branch.restart.get("frame"))
         self.problem.grows, self._origin = grows, self.problem.u(branch.points[0].z)
@@ -362,7 +366,8 @@ class Tracer:
 
     def _remember(self, branch, step):
         branch.next_step = float(step)
-        branch.restart = {"frame": self.frame, "state_scale": self.problem.state_scale}
+        branch.restart = {name: getattr(self.problem, name) for name in ("state_scale", "extra_scale")}
+        branch.restart["frame"] = self.frame
         condition = self.problem.condition
         if condition is not None:
             branch.restart.update(p=condition.p, q=condition.q)

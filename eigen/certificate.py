@@ -252,6 +252,12 @@ class CertifiedSpectrum:
         return False if self.spectrum.count_right_of(self.count.line + rounding) else self.certificate.stable
 
     @property
+    def lacks_growth(self) -> bool:
+        """True where the basis of the count lacks motions in which the structure gains energy, as finer ones do."""
+        unsure = self.count.certain and not self.certificate.certain
+        return unsure and self.response_error is not None and self.response_error < OPTIONS.trusted
+
+    @property
     def statement(self) -> str:
         """The verdict in a sentence."""
         said = self.certificate.statement
@@ -259,7 +265,7 @@ class CertifiedSpectrum:
             return self.certificate.beside(self.spectrum.count_right_of(self.count.line) - self.unstable_count)
         if not self.count.certain:
             return f"{said} {' '.join(self.count.notes)}"
-        if not self.certificate.certain and self.response_error < OPTIONS.trusted:
+        if self.lacks_growth:
             return f"{said} The structure gains energy in motions that the reduced basis behind that count lacks."
         if not self.certificate.certain:
             return f"{said} The reduced basis behind that count is too coarse (error {self.response_error:.2g})."
@@ -312,7 +318,7 @@ def certified_spectrum(
             return found
     found, basis = _judged(*asked, spectrum, basis)
     for finer in range(1, OPTIONS.finer + 1):
-        if found.agrees or basis is None:
+        if found.agrees or basis is None or found.lacks_growth:
             break
         basis = _finer(pencil, basis, found, finer, workspace)
         if basis.size > dense:

@@ -108,6 +108,9 @@ class Swaying:
     def in_class(self, motion):
         return Swaying(motion)
 
+    def about_rubbers(self, place):
+        return ["CR strains."]
+
 
 @pytest.mark.parametrize(("asked", "outcome"), [("SS", "stable"), ("all", "flutters"), ("SA", "flutters")])
 def test_classes_that_the_case_asks_for_are_confirmed_too(monkeypatch, asked, outcome):
@@ -127,6 +130,7 @@ def test_classes_that_the_case_asks_for_are_confirmed_too(monkeypatch, asked, ou
     assert [*answer.classes] == classes and len(answer.eigenvalues) == len(classes)
     assert answer.eigenvalues[0] == (-1 + 80j if asked == "SS" else 2 + 50j)
     assert answer.verdict.critical_damping_factor == (0.4 if asked == "SS" else 1.7)
+    assert answer.warnings == ("CR strains.",)
 
 
 def test_an_unstable_mode_far_above_the_list_is_told():

@@ -137,6 +137,13 @@ class Distribution:
             return float(self.at(np.ones(1))[0]) - self.median
         return float(np.std(self.numbers)) / (1.0 if self.form == "samples" else np.sqrt(3.0))
 
+    @property
+    def spread(self) -> float:
+        """Standard deviation to first order in the scores, that of a lognormal one the same to both sides."""
+        import numpy as np
+
+        return self.median * float(np.log(self.numbers[1])) if self.form == "lognormal" else self.scale
+
     def share_outside(self, low: float, high: float) -> float:
         """Probability of values below one bound or above another."""
         import numpy as np
@@ -152,20 +159,6 @@ class Distribution:
             own = norm(a, b) if self.form == "normal" else uniform(a, b - a)
             below, above = own.cdf(low), own.sf(high)
         return float(below + above)
-
-    def score(self, values: np.ndarray) -> np.ndarray:
-        """Standard normal values of the same probability, the inverse of `at`; of samples the middle of each step."""
-        import numpy as np
-        from scipy.special import ndtri
-
-        a, b = self.numbers[0], self.numbers[-1]
-        if self.form == "normal":
-            return (values - a) / b
-        if self.form == "lognormal":
-            return np.log(values / a) / np.log(b)
-        if self.form == "uniform":
-            return ndtri((values - a) / (b - a))
-        return ndtri((np.searchsorted(self.numbers, values) + 0.5) / len(self.numbers))
 
     def words(self, quantity: Quantity) -> str:
         """The distribution as a case would hold it."""

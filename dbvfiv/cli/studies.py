@@ -93,8 +93,8 @@ def perform(kind: str, case, request, name: str, output: Path | None, plots: Pat
         raise CaseError(
             f"{str(output)!r} names a sheet, which `dbvfiv steady` writes alone; -o of {kind} takes a .h5 file."
         )
-    changes = {key: value for key, value in request.changes.items() if value is not None}
-    case = case.replace({"project.units": changes.pop("project.units", case.project.units)})
+    changes = dict(request.changes)
+    case = case.replace({"project.units": changes.pop("project.units", None) or case.project.units})
     choices = {key: value for key, value in request.choices.items() if value is not None}
     session = Session(case, name).prepared(kind, changes)
     if request.sheet is not None:  # a result is checked by its session

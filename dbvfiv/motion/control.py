@@ -122,11 +122,11 @@ class AdaptiveSteps:
                 return result
             ratio = (self.options.error / max(result.error, 1e-30)) ** (1.0 / 3.0)
             if ratio < 0.7 and 0.5 * h >= smallest:
-                self.h = h * max(0.3, 0.9 * ratio)
+                self.h = max(smallest, h * max(0.3, 0.9 * ratio))
                 self.stepper.take_back()
                 continue
             if h == self.h and not 0.8 < ratio < 1.6:
-                self.h = min(self.options.step, self.h * min(2.0, 0.9 * ratio))
+                self.h = min(self.options.step, max(smallest, self.h * min(2.0, 0.9 * ratio)))
             return result
 
     def pack(self) -> list[float]:

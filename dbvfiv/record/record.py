@@ -19,7 +19,7 @@ from __future__ import annotations
 import json
 import os
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import replace
 from importlib import import_module
@@ -309,6 +309,8 @@ class GrowingRecord(Record, Observer, AbstractContextManager):
         known: Record | None = None,
     ):
         self.header, self.mesh, self.watcher = header, mesh, watcher or Observer()
+        #: Warnings of a study once it begins: one that refuses what it is asked says nothing else.
+        self.first: Sequence[str] = ()
         self.path = None if output is None else as_path(output, "A result file")
         self.tables = {table.name: table for table in tables}
         self._rows = {
@@ -390,6 +392,9 @@ class GrowingRecord(Record, Observer, AbstractContextManager):
 
     def begin(self, study: str, total: int | None) -> None:
         self.watcher.begin(study, total)
+        told, self.first = self.first, ()
+        for sentence in told:
+            self.warn(sentence)
 
     def progress(self, text: str) -> None:
         self.watcher.progress(text)

@@ -270,12 +270,14 @@ def _chance(found: Gathered) -> str | None:
         return _not_there(found, "chance", "uncertainty") if "chance" in found.missing else None
     known = [point for point in result.points if point["probability"] is not None]
     if not known:
-        return "probability of chatter: no sample was decided"
+        return "probability of chatter: not known, no sample was decided"
     snaps = lambda point: point["outcomes"][DIVERGES]["probability"] or 0.0  # noqa: E731
     most = max(known, key=lambda point: point["probability"] + snaps(point))
     chance, low, high = (digits(100 * x, 2) for x in (most["probability"], *most["interval"]))
-    at = found.case.units.parameter(result.parameter).text(most["value"])
+    text = found.case.units.parameter(result.parameter).text
+    at, lost = text(most["value"]), [text(point["value"]) for point in result.points if point["probability"] is None]
     also = f", of divergence {digits(100 * snaps(most), 2)} %" if snaps(most) else ""
+    also += f", not known at {listed(lost)}" if lost else ""
     return f"probability of chatter at {at}: {chance} % ({low} to {high} %){also}, {only_class_of(found.case.part)}"
 
 

@@ -225,9 +225,11 @@ def following(found: Gathered) -> Iterator[Run]:
         if not (other == "quasi-steady" and case.is_compressed):
             keys = classes | {"modes.symmetry": "SS", "fluid.continuity": other}
             yield Run("law", "modes", f"vibration with {other} flow", keys, 8)
-    if case.has_line and not case.upstream.pieces:
+    moves = case.has_line and bool(why_it_moves(case, "pipe_length"))
+    # behind a pump a length that moves the state has an operating point of its own
+    if case.has_line and not case.upstream.pieces and not (moves and case.has_pump):
         low, high, count = _LENGTHS
-        length, moves, quick = case.upstream.length, bool(why_it_moves(case, "pipe_length")), {}
+        length, quick = case.upstream.length, {}
         if moves and case.valve.is_preset:  # at every length a curve of equilibria from rest on
             quick, count = second_mesh(case) | {"sweep.count": 1, "sweep.least_confidence": 1e-3}, 3
         span = f"pipe_length={low * length:.6g}:{high * length:.6g}:{count}:log"

@@ -62,12 +62,12 @@ def layer_fields(shell: Shell, q: np.ndarray) -> LayerFields:
     )
 
 
-def point_stresses(section: Section, strain: np.ndarray) -> np.ndarray:
-    """Second Piola-Kirchhoff stresses (..., np, 5), Pa, of strains at the points of all layers."""
-    stress = np.empty_like(strain)
-    for kind in np.unique(section.kinds):
-        chosen = np.flatnonzero(section.kinds == kind)
-        stress[..., chosen, :] = stress_at(int(kind), section.parameters[chosen], strain[..., chosen, :])
+def point_stresses(section: Section, strain: np.ndarray, every: int = 1) -> np.ndarray:
+    """Second Piola-Kirchhoff stresses (..., np, 5), Pa, of strains at all points of the wall, or at every so many."""
+    stress, kinds, parameters = np.empty_like(strain), section.kinds[::every], section.parameters[::every]
+    for kind in np.unique(kinds):
+        chosen = np.flatnonzero(kinds == kind)
+        stress[..., chosen, :] = stress_at(int(kind), parameters[chosen], strain[..., chosen, :])
     return stress
 
 

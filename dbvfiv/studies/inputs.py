@@ -62,6 +62,10 @@ class Input:
         Why it is as uncertain as that.
     surrounding : bool
         Whether steady states and structure stay as they are.
+    own : float, optional
+        Number of the case; None where it has no one.
+    limits : tuple of float
+        Least and largest number that there can be.
     """
 
     name: str
@@ -69,6 +73,8 @@ class Input:
     quantity: Quantity
     source: str
     surrounding: bool
+    own: float | None = None
+    limits: tuple[float, float] = (-np.inf, np.inf)
 
     @property
     def title(self) -> str:
@@ -90,8 +96,9 @@ class Input:
         return f"{self.name} = {self.distribution.words(self.quantity)}: {self.source}"
 
 
-def inputs_of(case: Case, over: Sequence[str] = ()) -> list[Input]:
-    """Uncertain inputs of a case, without those over which their effect is asked, which none may be that it names.
+def inputs_of(case: Case, over: Sequence[str] = (), by: str = "uncertainty.over") -> list[Input]:
+    """Uncertain inputs of a case, without those over which their effect is asked, which none may be that it names; `by`
+    says what moves these.
 
     Raises
     ------
@@ -100,8 +107,7 @@ def inputs_of(case: Case, over: Sequence[str] = ()) -> list[Input]:
         `ALLOWED` lies where the number cannot be.
     """
     asked = case.uncertainty
-    axis, by = asked.axis, "the map" if over else "uncertainty.over"
-    varied = over or ([axis.parameter] if axis is not None else [])
+    varied = over or ([asked.axis.parameter] if asked.axis is not None else [])
     if asked.inputs:
         found = [_input(case, name, text, "given") for name, text in asked.inputs.items()]
     else:
@@ -213,21 +219,24 @@ def counted(hits: int, undecided: int, count: int) -> Probability:
 
 @dataclass(frozen=True)
 class Plan:
-    """Inputs and places of a case whose probability is asked.
+    """Inputs of a case, and places where their effect is asked.
 
     Attributes
     ----------
     case : Case
     moved : tuple of str
-        Parameters over which the probability is asked; that of `uncertainty.over` where none is named.
+        Parameters over which the inputs are asked; that of `uncertainty.over` where none is named.
+    by : str
+        What moves these.
     """
 
     case: Case
     moved: tuple[str, ...] = ()
+    by: str = "uncertainty.over"
 
     @cached_property
     def inputs(self) -> list[Input]:
-        return inputs_of(self.case, self.moved)
+        return inputs_of(self.case, self.moved, self.by)
 
     @cached_property
     def _turn(self) -> np.ndarray:
@@ -331,7 +340,8 @@ def _input(case: Case, name: str, text: str, source: str) -> Input:
             + "; choose a narrower one, or a lognormal one.",
             key=key,
         )
-    return Input(name, distribution, quantity, source, name in PARAMETERS and is_surrounding(case, name))
+    surrounding = name in PARAMETERS and is_surrounding(case, name)
+    return Input(name, distribution, quantity, source, surrounding, own, limits)
 
 
 def _shipped(case: Case) -> Iterator[tuple[str, str, str]]:

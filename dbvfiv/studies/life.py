@@ -33,8 +33,6 @@ from ..shell.reference import thickness_over_radius
 from ..shell.shell import Shell
 from .state import StateSteps
 
-#: Instants of a period at which a cycle is looked at; a peak between two of them is missed by 0.1 %.
-INSTANTS = 64
 #: Range of strain below which nothing moves.
 STILL = 1e-7
 #: Share of the swings of the lip, by the fourth power, that full states have to hold, and that below which it is told.
@@ -85,7 +83,8 @@ def motion_of(
     value : float, optional
         Of the parameter of a branch of cycles; the last one without it.
     since : float, s, optional
-        Start of the part of a run that counts; its last whole cycles without it, or all of it where it has none.
+        Start of the part of a run that counts; without it its last whole cycles, or all that is judged where it has
+        none.
     per_day : float, optional
         How often in a day a run takes place, or the way to the last state and back.
 
@@ -119,10 +118,9 @@ def motion_of(
 def _limit_cycle(result: Any, value: float | None) -> Motion:
     point = result.nearest(value)
     orbit, at = point.orbit, PARAMETERS[result.parameter].text(point.value)
-    states = orbit.motion.at(2 * np.pi * np.arange(INSTANTS) / INSTANTS)[:, : orbit.model.size]
     remarks = ("The cycle is unstable: the valve leaves it.",) if point.stable is False else ()
     words = f"the limit cycle at {at}, {point.frequency:.4g} Hz"
-    return Motion(orbit.model.shell, states, 1.0 / point.frequency / 3600.0, words, remarks)
+    return Motion(orbit.model.shell, orbit.states, 1.0 / point.frequency / 3600.0, words, remarks)
 
 
 def _run(result: Any, since: float | None, per_day: float | None) -> Motion:
@@ -137,7 +135,9 @@ def _run(result: Any, since: float | None, per_day: float | None) -> Motion:
         lip, flow = verdict["lip_displacement"], verdict["mass_flow"]
         cycle = lip if lip["verdict"] == "limit cycle" else flow
         begin = max(begin, end - max(1, min(int(cycle["cycles_observed"]), LAST)) / cycle["frequency"])
-    elif per_day is None and verdict["verdict"] not in ("irregular", "chatters"):
+    elif per_day is None and verdict["verdict"] in ("irregular", "chatters"):
+        begin = max(begin, result.judged_from)  # a way up to the drive that lasts is taken once
+    elif per_day is None:
         raise CaseError(
             f"The run ends {verdict['verdict']} and not in a motion that lasts; give how often a day it takes place, "
             "--per-day N, or the time from which its motion goes on, --since T."

@@ -18,11 +18,12 @@ from ..drawing.style import ACCENT, COMPUTED, headline, new_figure
 from ..errors import CaseError
 from ..texts import json_value
 from ..verdict import Series, judge_record, spectrum
+from ..verdict.lines import WIDE
 from ..verdict.reading import JudgedSignal
 from .result import StudyResult
 
-#: Standard errors in half a 95 % interval; share of the weights from which one candidate is named alone.
-_WIDE, _ALONE = 1.96, 0.9
+#: Share of the weights from which one candidate is named alone.
+_ALONE = 0.9
 #: Relative error of a computed damping ratio over that of a frequency: loss factors of one compound differ by half.
 _DAMPING = 5.0
 
@@ -61,7 +62,7 @@ class Candidate:
                 return np.inf
             own = line["damping_ratio_interval"]
             errors.append((line["damping_ratio"] - self.damping_ratio, self.damping_ratio_interval, own))
-        return float(np.sqrt(sum((_WIDE * off) ** 2 / (a**2 + (b or 0.0) ** 2) for off, a, b in errors)))
+        return float(np.sqrt(sum((WIDE * off) ** 2 / (a**2 + (b or 0.0) ** 2) for off, a, b in errors)))
 
     def summary(self) -> dict[str, Any]:
         """Plain numbers for JSON."""
@@ -97,7 +98,7 @@ def candidates_of(result: StudyResult, error: float) -> list[Candidate]:
         ]
     elif result.kind == "transient":
         seen = result.history["time"] >= result.judged_from
-        verdict = judge_record(*(result.history[name][seen] for name in ("time", "lip_displacement")))
+        verdict = judge_record(*(result.history[name][seen] for name in ("time", "lip_displacement")), gaps=False)
         found = [
             Candidate(
                 "run" if number == 0 else f"run, line {number + 1}",
@@ -141,17 +142,17 @@ class Recognition:
     def _lines(self):
         for one in self.signals:
             for line in one.verdict.lines:
-                if not line["called"] or line["called"] == "sideband":
+                if line["called"] in ("", "sideband", "resonance"):
                     yield one.signal.name, line
 
     def sentence(self, line: dict[str, Any]) -> str:
         """The likeliest candidates of a line in a sentence."""
-        found = [one for one in self.matches(line) if one[2] <= _WIDE * np.sqrt(2 if line.get("rate", 0) < 0 else 1)]
+        found = [one for one in self.matches(line) if one[2] <= WIDE * np.sqrt(2 if line.get("rate", 0) < 0 else 1)]
         kept = line.get("rate", 0.0) >= 0
         if not found:
             near, _, distance = self.matches(line)[0]
             if not np.isfinite(distance):
-                return "It dies out, and nothing that was computed does."
+                return "It is damped, and nothing that was computed is."
             return f"None of them: the nearest, {near.name}, is {distance:.2g} standard errors away."
         first = found[0][0]
         if kept and not first.sustained:

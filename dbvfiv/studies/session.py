@@ -123,7 +123,8 @@ def named_changes(given: Mapping[str, Any], kind: str = "") -> dict[str, Any]:
         For a name that is nothing to choose.
     """
     own = Case.model_fields[kind].annotation.model_fields if kind else ()
-    known = {name: f"{kind}.{name}" for name in own} | KEYWORDS
+    band = {"max_frequency": "modes.max_frequency"} if kind else {}  # up to which all of them search
+    known = band | {name: f"{kind}.{name}" for name in own} | KEYWORDS
     if unknown := [name for name in given if name not in known]:
         raise CaseError(f"{unknown[0]!r} is given, which is nothing to choose here; known are {', '.join(known)}.")
     return {known[name]: value for name, value in given.items() if value is not None}
@@ -252,8 +253,8 @@ class Session:
             records are identified, they were taken at that value.
         """
         given = {key: value for key, value in changes.items() if value is not None}
-        for key in (f"{kind}.{name}" for name in ("over", "x", "y") if kind != "identify"):
-            text = str(given.get(key) or getattr(getattr(self.case, kind), key.rpartition(".")[2], ""))
+        for name in ("over", "x", "y") if kind != "identify" else ():
+            text = str(given.get(key := f"{kind}.{name}") or getattr(getattr(self.case, kind), name, ""))
             row = PARAMETERS.get(text.partition("=")[0].strip())
             if row is not None and row.key in given:
                 raise CaseError(
@@ -375,8 +376,7 @@ class Session:
             for note in record.notes("settled")[-1:]:  # of the first attempt where it goes on
                 for sentence in note.get("warnings", ()):
                     record.warn(sentence)
-            for sentence in model_warnings(self.described):
-                record.warn(sentence)
+            record.first = model_warnings(self.described)
             try:
                 study.run(self, record, **_with_files(study, record, choices))
                 complete = True

@@ -172,8 +172,8 @@ class Workers:
             lost: list[Any] = []
             finished = False
             try:
-                # what was in flight when a worker died goes alone: a task that kills all workers takes no other along
-                suspects = [task for task in left if tries[task]]
+                # the last try of a task is its own: one that kills all workers takes no other along
+                suspects = [task for task in left if tries[task] == TRIES - 1]
                 for task, result in self._round(suspects[:1] or left, ask):
                     if result is Lost:
                         lost.append(task)

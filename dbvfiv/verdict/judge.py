@@ -268,6 +268,7 @@ def judge(
     *,
     residual: float | None = None,
     closed_below: float | None = None,
+    gaps: bool = True,
 ) -> Verdict:
     """Verdict on a signal.
 
@@ -283,6 +284,8 @@ def judge(
     closed_below : float, optional
         Level below which the signal counts as closed; one that goes from above twice that level to below it again and
         again, without a period, chatters.
+    gaps : bool
+        Take steps far longer than most for gaps; those of a run in time are none.
 
     Returns
     -------
@@ -300,15 +303,15 @@ def judge(
     >>> verdict.name, round(verdict.frequency, 6), round(verdict.amplitude, 6)
     ('limit cycle', 1.0, 1.0)
     """
-    time, values, facts = longest_samples(time, values)
+    time, values, facts = longest_samples(time, values, gaps)
     if len(values) < _FEWEST:
-        words = f"There are fewer than {_FEWEST} samples{' between two gaps' if facts['notes'] else ''}."
+        words = f"There are fewer than {_FEWEST} samples{' between two gaps' if gaps and facts['notes'] else ''}."
         return Verdict("undecided", False, words, mean=float(values[-1]), amplitude=0.0, rms=0.0, **facts)
     found = _judge(Series.of(time, values), options, residual, closed_below)
     return replace(found, **facts)
 
 
-def longest_samples(time, values) -> tuple[np.ndarray, np.ndarray, dict[str, Any]]:
+def longest_samples(time, values, gaps: bool) -> tuple[np.ndarray, np.ndarray, dict[str, Any]]:
     """Times and values (k,) of the longest part of a record without a gap, and what a verdict on it says of the whole.
 
     Raises
@@ -317,7 +320,7 @@ def longest_samples(time, values) -> tuple[np.ndarray, np.ndarray, dict[str, Any
         If the samples are no series.
     """
     time, values = check_samples(time, values)
-    part, notes = longest_part(time)
+    part, notes = longest_part(time, gaps)
     facts = {"smallest": float(values.min()), "largest": float(values.max()), "notes": notes}
     return time[part], values[part], facts | {"judged": (float(time[part][0]), float(time[part][-1]))}
 

@@ -225,14 +225,20 @@ _FEWEST, _LINES = 64, ("decayed", "growing", "limit cycle", "modulated", "severa
 
 
 def judge_record(
-    time, values, options: JudgeOptions = JudgeOptions(), *, detrend: bool = True, closed_below: float | None = None
+    time,
+    values,
+    options: JudgeOptions = JudgeOptions(),
+    *,
+    detrend: bool = True,
+    closed_below: float | None = None,
+    gaps: bool = True,
 ) -> Verdict:
     """Verdict on a measured record: what oscillates under its noise, on a level that may drift; of what has no line the
     level, as `judge` has it.
 
     Parameters
     ----------
-    time, values, options, closed_below
+    time, values, options, closed_below, gaps
         As for `judge`.
     detrend : bool
         Take a polynomial level off.
@@ -242,8 +248,8 @@ def judge_record(
     ValueError
         If the samples are no series.
     """
-    judged = partial(judge, time, values, options, closed_below=closed_below)
-    time, values, facts = longest_samples(time, values)
+    judged = partial(judge, time, values, options, closed_below=closed_below, gaps=gaps)
+    time, values, facts = longest_samples(time, values, gaps)
     if len(time) < _FEWEST or not np.ptp(values):
         return judged()
     shut = judged() if closed_below is not None else None

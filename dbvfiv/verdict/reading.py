@@ -227,7 +227,7 @@ def _judged(file: Path, signal: Signal, options: JudgeOptions, closed_below: flo
         given = signal.time, signal.values, options
         if signal.measured:
             return judge_record(*given, closed_below=closed_below, detrend=reading.detrend)
-        return judge(*given, closed_below=closed_below)
+        return judge(*given, closed_below=closed_below, gaps=False)
     except ValueError as error:
         text = str(error).rstrip(".")
         raise CaseError(

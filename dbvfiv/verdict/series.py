@@ -32,13 +32,15 @@ def gaps_in(time: np.ndarray) -> np.ndarray:
     return np.flatnonzero(steps > (_EVEN * typical if even else _UNEVEN * np.percentile(steps, 95)))
 
 
-def longest_part(time: np.ndarray) -> tuple[slice, tuple[str, ...]]:
+def longest_part(time: np.ndarray, gaps: bool = True) -> tuple[slice, tuple[str, ...]]:
     """Longest part of a record between gaps, the later of equal ones.
 
     Parameters
     ----------
     time : (k,) array
         Increasing.
+    gaps : bool
+        Whether there may be gaps.
 
     Returns
     -------
@@ -47,15 +49,15 @@ def longest_part(time: np.ndarray) -> tuple[slice, tuple[str, ...]]:
     notes : tuple of str
         Sentences on gaps and uneven steps.
     """
-    gaps = gaps_in(time)
-    edges = np.concatenate([[0], gaps + 1, [len(time)]])
+    after = gaps_in(time) if gaps else np.zeros(0, int)
+    edges = np.concatenate([[0], after + 1, [len(time)]])
     sizes = np.diff(edges)
     at = len(sizes) - 1 - int(np.argmax(sizes[::-1]))
     part = slice(int(edges[at]), int(edges[at + 1]))
     notes = []
-    if len(gaps):
-        longest = int(gaps[np.argmax(time[gaps + 1] - time[gaps])])
-        word = "a gap" if len(gaps) == 1 else f"{len(gaps)} gaps, the longest"
+    if len(after):
+        longest = int(after[np.argmax(time[after + 1] - time[after])])
+        word = "a gap" if len(after) == 1 else f"{len(after)} gaps, the longest"
         notes.append(
             f"The record has {word} from {time[longest]:.6g} to {time[longest + 1]:.6g} s; "
             f"what is judged is its longest part without one, {time[part][0]:.6g} to {time[part][-1]:.6g} s."

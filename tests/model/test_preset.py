@@ -111,6 +111,7 @@ def test_faces_press_evenly_at_rest_in_the_shape_that_is_drawn(model):
 
 
 def test_faces_that_cross_at_rest_leave_nothing_open(model):
+    model.rest()
     crossed = copy(model)
     crossed.__dict__.pop("_film", None)
     crossed.rows = SimpleNamespace(areas=lambda nodal: model.rows.areas(nodal) - 1e-4)

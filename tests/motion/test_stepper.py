@@ -224,6 +224,11 @@ def test_steps_are_not_halved_for_ever():
     with pytest.raises(StepFailure):
         control.advance(SimpleNamespace(time=0.0), 1.0)
     assert control.level == 6
+    stepper, state = Misses((2.0, 2.0), 1.0), SimpleNamespace(time=0.0)
+    control = AdaptiveSteps(stepper, ControlOptions(1e-3, True, 1e-9, smallest=0.1))
+    for _ in range(6):
+        state = control.advance(state, 1.0).state
+    assert min(stepper.taken) == control.h == pytest.approx(1e-4)
 
 
 def test_adaptive_steps_follow_the_error(valve, open_state):

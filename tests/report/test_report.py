@@ -241,6 +241,14 @@ def test_a_probability_of_chatter_names_the_class_that_was_looked_at(keys, told)
     assert said.startswith(f"probability of chatter at 6 kPa: 0 % (0 to 1.4 %), {told}")
     point["outcomes"]["diverges"]["probability"] = 0.3
     assert f": 0 % (0 to 1.4 %), of divergence 30 %, {told}" in " ".join(on_chatter(found).uncertainty)
+    nothing = {
+        "value": 12e3,
+        "probability": None,
+        "interval": [0.0, 1.0],
+        "outcomes": {"diverges": {"probability": None}},
+    }
+    found.results["chance"].points.append(nothing)
+    assert f"of divergence 30 %, not known at 12 kPa, {told}" in " ".join(on_chatter(found).uncertainty)
 
 
 def test_onsets_are_told_with_their_kind_and_with_what_speaks_against_them():

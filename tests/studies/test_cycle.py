@@ -13,6 +13,7 @@ from continuation.periodic import PeriodicMotion
 from dbvfiv.case.parameters import Mu
 from dbvfiv.errors import CaseError, SolveError
 from dbvfiv.flow.channel import Channel
+from dbvfiv.shell.recovery import face_strains
 from dbvfiv.studies.case import thesis_case
 from dbvfiv.studies.life import Life, motion_of
 from dbvfiv.studies.orbits import Orbit
@@ -93,7 +94,7 @@ def test_a_record_is_the_cycle_of_its_frequency(found, file, tmp_path, command_l
     assert line["matches"][0]["name"] == "cycle at 230 kg/m³" and line["matches"][0]["share"] > 0.5
     assert "cycle at 230" in line["says"]
     (ring,) = beside(command_line, tmp_path, (time, np.exp(-2 * time) * np.cos(turn) + noise), file)
-    assert ring["says"] == "It dies out, and nothing that was computed does."
+    assert ring["says"] == "It is damped, and nothing that was computed is."
 
 
 def test_a_record_is_the_run_that_it_is(tmp_path, command_line):
@@ -162,6 +163,9 @@ def test_what_is_read_off(found):
     assert np.isclose(point.amplitude, 0.5 * np.ptp(orbit.lip), rtol=1e-3)
     assert np.isclose(orbit.lip_rate.max(), np.gradient(orbit.lip, orbit.time).max(), rtol=2e-2)
     assert np.isclose(orbit.lip_harmonics[0], point.lip_mean, rtol=1e-6)
+    held = replace(orbit)
+    vars(held)["lip"] = np.zeros_like(orbit.lip)  # as where its node is held
+    assert not held.lip_harmonics.any()
     assert orbit.clearance > 0 and point.least_speed > 0
     summary = found.summary()
     assert summary["parameter"] == "density" and summary["special_points"] == []
@@ -173,9 +177,12 @@ def test_what_is_read_off(found):
 
 
 def test_ranges_for_fatigue(found):
-    """Of each layer; those of a smaller cycle are smaller."""
+    """Of each layer, at its faces; those of a smaller cycle are smaller."""
     small, large = (found.points[k].ranges for k in (0, -1))
-    layers = large.largest()
+    layers, orbit = large.largest(), found.points[-1].orbit
+    shell, states = orbit.model.shell, orbit.motion.at(orbit.phases)[:, : orbit.model.size]
+    bent = np.ptp([face_strains(shell, q) for q in states], axis=0).max(axis=(0, 2, 3))
+    assert np.allclose([row["strain_range"] for row in layers], bent, rtol=2e-3)
     assert [row["layer"] for row in layers] == list(large.names) and len(layers) == 5
     for small_row, row in zip(small.largest(), layers):
         assert 0 < small_row["strain_range"] < row["strain_range"] < 0.5

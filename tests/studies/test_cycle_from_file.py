@@ -204,7 +204,8 @@ def test_from_a_run_in_time(file, tmp_path):
 @pytest.mark.parametrize("number, value", [(None, 250.0), (0, 230.0), (1, 240.0), (-2, 240.0)])
 def test_the_cycle_of_a_number_is_that_of_its_row(number, value):
     """In the order of the table; the last one by default."""
-    keys = {"cycle.over": "density=226:233:2"} | ({} if number is None else {"cycle.start_cycle": number})
+    keys = {"cycle.over": "density=226:233:2", "cycle.start": "file", "cycle.start_file": __file__}
+    keys |= {} if number is None else {"cycle.start_cycle": number}
     points = [SimpleNamespace(number=row, value=value) for row, value in ((2, 250.0), (0, 230.0), (1, 240.0))]
     result = SimpleNamespace(points=points, parameter="density")
     assert _cycle_of(thesis_case(keys), result).value == value

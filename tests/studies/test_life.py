@@ -212,6 +212,9 @@ def test_a_cycle_of_the_flow_alone_gives_the_time():
     )
     with pytest.raises(CaseError, match="0 full states from 0.092 s on"):
         _run(result, None, None)
+    result.verdict, result.judged_from = {"verdict": "chatters"}, 0.06  # behind a ramp
+    with pytest.raises(CaseError, match="0 full states from 0.06 s on"):
+        _run(result, None, None)
 
 
 def test_results_without_a_motion_are_refused(opened, misused, tmp_path):

@@ -8,6 +8,7 @@ import h5py
 import numpy as np
 import pytest
 from PIL import Image
+from scipy.signal import lfilter
 
 import dbvfiv
 from dbvfiv.errors import CaseError
@@ -239,5 +240,12 @@ def test_a_measured_record_is_laid_beside_modes(modes, stored, tmp_path, command
     assert says["far"]["says"].startswith("None of them")
     assert (tmp_path / "beside.png").stat().st_size > 10_000
     assert f"It is mode {flutter.number}." in command_line("compare", *files).out
+    pole, white = np.exp(damped.eigenvalue * 2e-3), np.random.default_rng(5).standard_normal(30_000)
+    moved = lfilter([1.0], [1.0, -2 * pole.real, abs(pole) ** 2], white)
+    table = np.column_stack([np.arange(30_000) * 2e-3, moved / moved.std()])
+    np.savetxt(tmp_path / "noise.csv", table, delimiter=",", header="time [s],noise", comments="")
+    under = json.loads(command_line("compare", tmp_path / "noise.csv", *files[1:], "--json").out)["measured"]
+    assert [one["called"] for one in under] == ["resonance"]
+    assert under[0]["matches"][0]["name"] == f"mode {damped.number}" and under[0]["matches"][0]["share"] > 0.9
     alone = command_line("compare", tmp_path / "record.csv")
     assert alone.status == 2 and "compared with one result" in alone.err

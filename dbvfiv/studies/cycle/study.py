@@ -26,7 +26,7 @@ from ...record.mesh import MeshData, WholeValve
 from ...record.record import GrowingRecord, Record
 from ...record.table import Column, Shown, TableSpec, printed_head, printed_row
 from ...record.vtkhdf import Step, motion
-from ...shell.recovery import layer_fields
+from ...shell.recovery import face_strains, layer_fields, point_stresses
 from ..case import Case
 from ..orbits import MODES, Follower, Orbit
 from ..result import StudyResult
@@ -172,24 +172,20 @@ def read_points(record: Record, mu: dict, name: str, leg: int = 0) -> list[Cycle
     return found
 
 
-#: Instants of a period at which layers are looked at.
-INSTANTS = 16
-
-
 @dataclass(frozen=True, eq=False)
 class LayerRanges:
-    """Ranges over a period, of element values as `dbvfiv.shell.recovery.LayerFields` has them.
+    """Ranges over a period, means over each element.
 
     Attributes
     ----------
     names : tuple of str
         Layers, inside to outside.
     strain : (ne, nl) array
-        Largest range of the five strains in the layer's axes.
+        Largest range of the five strains in the layer's axes, at its inner or outer face.
     stress : (ne, nl) array, Pa
         Largest range of the five stresses there.
     von_mises : (ne, nl) array, Pa
-        Largest von Mises stress of the period.
+        Largest von Mises stress of the period, as `dbvfiv.shell.recovery.LayerFields` has it.
     place : (ne, 3) array, m
         Middles of the elements, at rest.
     """
@@ -221,14 +217,14 @@ class LayerRanges:
 
 def layer_ranges(orbit: Orbit) -> LayerRanges:
     """Ranges of strain and stress of a cycle."""
-    shell, size = orbit.model.shell, orbit.model.size
-    phases = 2 * np.pi * np.arange(INSTANTS) / INSTANTS
-    fields = [layer_fields(shell, q) for q in orbit.motion.at(phases)[:, :size]]
-    strain, stress = (np.stack([getattr(field, name) for field in fields]) for name in ("strain", "stress"))
+    shell = orbit.model.shell
+    fields = [layer_fields(shell, q) for q in orbit.states]
+    strain = np.stack([face_strains(shell, q) for q in orbit.states]).swapaxes(2, 3)  # faces before layers
+    stress = point_stresses(shell.section, strain, shell.section.points_per_layer)
     return LayerRanges(
         fields[0].names,
-        np.ptp(strain, axis=0).max(axis=-1),
-        np.ptp(stress, axis=0).max(axis=-1),
+        np.ptp(strain, axis=0).max(axis=(1, 3)),
+        np.ptp(stress, axis=0).max(axis=(1, 3)),
         np.max([field.von_mises for field in fields], axis=0),
         shell.mesh.nodes[shell.mesh.quads].mean(axis=1),
     )

@@ -9,13 +9,14 @@ change places, and it is never above the least one, by at most ln(modes) / rho b
 the modes, as loss factors do not, those up to one frequency count in all designs, on every mesh: `modes.max_frequency`,
 or the end of the band of the first valve whose modes are asked.
 
-Where the case has uncertain inputs x with standard deviations s, 95 % of valves have at least the margin less
+Where the case has uncertain inputs x with standard deviations s, whose medians lie a off the numbers of the case, 95 %
+of valves have at least the margin less
 
-    1.645 |L' g|,    g = s d margin / dx,    L L' their correlation,
+    1.645 |L' (s g)| - a g,    g = d margin / dx,    L L' their correlation,
 
-to first order. Its own change with the design is left out of gradients: the search takes it as it was at the last
-optimum and repeats itself (sequential optimisation and reliability assessment, Du and Chen, J. Mech. Des. 126, 2004,
-225).
+to first order. A variable that is an input lies as far off in all designs, and the pressure is that asked. Changes of
+this with the design are left out of gradients: the search takes it as it was at the last optimum and repeats itself
+(sequential optimisation and reliability assessment, Du and Chen, J. Mech. Des. 126, 2004, 225).
 """
 
 from __future__ import annotations
@@ -161,8 +162,8 @@ def statements_of(case: Case) -> tuple[Statement, ...]:
 @dataclass(frozen=True)
 class AtHead:
     """Performance of a valve at a pressure: values by quantity, and their derivatives (n,) by the variables; how much
-    of the margin 5 % of valves with uncertain inputs lack; the frequency, Hz, up to which modes count in it, where one
-    ends them.
+    of the margin 5 % of valves with uncertain inputs lack, below 0 where their medians add more; the frequency, Hz, up
+    to which modes count in it, where one ends them.
     """
 
     values: dict[str, float]
@@ -305,8 +306,11 @@ class DesignProblem:
             if margin:
                 slopes["margin"].append(turn * of_margin(slope))
         if margin and self.inputs:
-            steps = [one.distribution.scale * of_margin(beside.slope(one.name)) for one in self.inputs]
+            by = np.array([of_margin(beside.slope(one.name)) for one in self.inputs])
+            steps = by * [one.distribution.spread for one in self.inputs]
             reserve = QUANTILE * float(np.linalg.norm(correlation_of(self.case, self.inputs).T @ steps))
+            apart = [0.0 if one.name == "pressure" else one.distribution.median - one.own for one in self.inputs]
+            reserve -= float(by @ apart)
         told = {name: np.array(slope) for name, slope in slopes.items()}
         return AtHead(found, told, reserve, self.band if margin else None)
 

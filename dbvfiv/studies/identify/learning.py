@@ -16,6 +16,7 @@ import numpy as np
 from scipy.special import logsumexp, ndtr
 
 from ...case.distribution import Distribution
+from ...verdict.lines import WIDE
 from ..inputs import Plan, quasi_random
 from .valves import MODES, Measured, Places, follow, least_damping, onsets, stretch
 
@@ -196,8 +197,6 @@ def expected_variance(targets: np.ndarray, predicted: np.ndarray, error: np.ndar
     return 1.0 - known / np.maximum(a.var(axis=0), 1e-300)
 
 
-#: Standard errors in half a 95 % interval.
-WIDE = 1.96
 #: Valves beyond the number of inputs without which nothing is emulated.
 MORE = 3
 #: Probability that a measured oscillation is none of the modes computed; it is then as likely anywhere in two decades

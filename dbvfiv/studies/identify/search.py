@@ -12,7 +12,7 @@ from ...errors import SolveError
 from ...record.record import GrowingRecord, Record
 from ...record.table import Column, TableSpec
 from ..case import Case
-from ..inputs import Plan, quasi_random
+from ..inputs import quasi_random
 from ..workers import Work, Workers, share_samples
 from .learning import MORE, SMALL, Learning, coordinates, sample_posterior
 from .valves import MODES, Begins, Modes, Places, Valves
@@ -55,8 +55,8 @@ SAMPLES, OWN = 1000, 4
 
 def prepare_valves(case: dict, known: list) -> Valves:
     """Context of a worker, from the case as plain data and what is known of it at each place."""
-    full = Case.from_dict(case)
-    return Valves(Plan(full), Places(full), known)
+    places = Places(Case.from_dict(case))
+    return Valves(places.plan, places, known)
 
 
 class Search:

@@ -13,7 +13,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from scipy.special import ndtri
 
-from ...case.distribution import Distribution
+from ...case.distribution import ALLOWED, Distribution
 from ...case.parameters import PARAMETERS
 from ...case.write import write_case
 from ...drawing.style import ACCENT, COMPUTED, REST, headline, new_figure, parameter_label
@@ -22,7 +22,7 @@ from ...model.symmetry import equilibria_of, only_class_of
 from ...record.record import GrowingRecord, Record
 from ...texts import digits
 from ..case import Case
-from ..inputs import Plan, correlation_of
+from ..inputs import Plan, correlation_of, inputs_of
 from ..result import StudyResult
 from ..session import Session, Study
 from ..stability.place import check_scan, describe_fixed, require_head
@@ -63,7 +63,9 @@ def rows_to_keep(known: Record, _case: Case) -> dict[str, int]:
 
 
 def check(case: Case) -> None:
-    """Refuse what the case does not have, a range without the last record, a pump, and a case without records."""
+    """Refuse what the case does not have, a range without the last record, a pump, a case without records, and inputs
+    that places or the range take the place of.
+    """
     places = Places(case)
     check_scan(case, places.parameter, *(name for one in places.of_records for name in one))
     require_head(case)
@@ -79,6 +81,7 @@ def check(case: Case) -> None:
             f"{row.amount(places.now)}, about which onsets are sought; give a range that holds it.",
             key="identify.over",
         )
+    inputs_of(case, places.plan.moved, places.plan.by)
 
 
 def run(
@@ -103,8 +106,8 @@ def run(
     SolveError
         If the valve of the case has no steady state where a record was taken.
     """
-    case, plan, places = session.case, Plan(session.case), Places(session.case)
-    asked = case.identify
+    case, places = session.case, Places(session.case)
+    plan, asked = places.plan, case.identify
     plan.scores_of(np.zeros((1, len(plan.inputs))))  # correlations are checked before anything is solved
     if places.now is None:
         raise CaseError(
@@ -173,7 +176,7 @@ class IdentifyResult(StudyResult):
 
     @cached_property
     def plan(self) -> Plan:
-        return Plan(self.case)
+        return self.places.plan
 
     @cached_property
     def places(self) -> Places:
@@ -350,7 +353,7 @@ class IdentifyResult(StudyResult):
         ranks = np.argsort(np.argsort(turned, axis=0), axis=0)
         normal = ndtri((ranks + 0.5) / len(turned))
         for i, one in enumerate(self.plan.inputs):
-            texts[one.name] = distribution_text(one.distribution, turned[:, i])
+            texts[one.name] = distribution_text(one.distribution, turned[:, i], one.limits)
         matrix, names = np.corrcoef(normal.T).reshape(len(texts), -1), list(texts)
         matrix[np.abs(matrix) < KEPT] = 0.0
         np.fill_diagonal(matrix, 1.0)
@@ -361,9 +364,10 @@ class IdentifyResult(StudyResult):
         return texts, [pair for pair in pairs if pair[2]]
 
     def posterior_case(self) -> Case:
-        """The case with what was learned as its uncertainty."""
-        texts, pairs = self.uncertainty()
-        return self.case.replace({"uncertainty.inputs": texts, "uncertainty.correlation": pairs})
+        """The case with what was learned as its uncertainty, without a range over one of its inputs."""
+        (texts, pairs), axis = self.uncertainty(), self.case.uncertainty.axis
+        keys = {"uncertainty.over": None} if axis is not None and axis.parameter in texts else {}
+        return self.case.replace(keys | {"uncertainty.inputs": texts, "uncertainty.correlation": pairs})
 
     @property
     def found(self) -> dict[str, Any]:
@@ -482,17 +486,18 @@ def _modes_said(match: dict[str, Any]) -> str:
     return f"a mixture: {' or '.join(shares)}"
 
 
-def distribution_text(prior: Distribution, scores: np.ndarray) -> str:
-    """Text of the distribution whose scores under the prior are samples (n,)."""
+def distribution_text(prior: Distribution, scores: np.ndarray, limits: tuple[float, float] = (-np.inf, np.inf)) -> str:
+    """Text of the distribution whose scores under the prior are samples (n,), of a number between limits."""
     from scipy.stats import kstest
 
     mean, spread = float(scores.mean()), float(scores.std())
     a, b = prior.numbers[0], prior.numbers[-1]
     if prior.form in ("normal", "lognormal") and kstest((scores - mean) / spread, "norm").statistic < FORM:
-        if prior.form == "normal":
-            return f"normal({a + b * mean:.8g}, {b * spread:.6g})"
-        if b**spread > 1.0 + 1e-6:
-            return f"lognormal({a * b**mean:.8g}, {b**spread:.8g})"
+        is_normal = prior.form == "normal"
+        numbers = (a + b * mean, b * spread) if is_normal else (a * b**mean, b**spread)
+        wide = is_normal or numbers[1] > 1.0 + 1e-6
+        if wide and Distribution(prior.form, numbers).share_outside(*limits) <= 0.5 * ALLOWED:  # of rounded numbers too
+            return f"{prior.form}({numbers[0]:.8g}, {numbers[1]:.{6 if is_normal else 8}g})"
     steps = prior.at(np.quantile(scores, (np.arange(STEPS) + 0.5) / STEPS))
     values = [f"{value:.8g}" for value in steps]
     if values[0] == values[-1]:  # one of the samples of the prior: a distribution has some width

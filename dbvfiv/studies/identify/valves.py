@@ -135,6 +135,12 @@ class Places:
         return self.case.identify.parameter
 
     @cached_property
+    def plan(self) -> Plan:
+        """Inputs of the valve, none of which a place names or the range moves."""
+        named = (name for one in self.of_records for name in one)
+        return Plan(self.case, (self.parameter, *named), "the place of a record or the range of identify")
+
+    @cached_property
     def now(self) -> float | None:
         """Value of that parameter at the last record."""
         return self.value_at(-1)

@@ -31,12 +31,16 @@ BANDS = (0.05, 0.5, 0.95)
 _CHANCE = "probability"
 
 
+def _inputs(plan: MapPlan) -> Plan:
+    return Plan(plan.case, (plan.x.parameter, plan.y.parameter), "the map")
+
+
 class Chances:
     """Samples of valves over the cells of columns."""
 
     def __init__(self, case: Case):
         self.plan = MapPlan(case)
-        self.inputs = Plan(case, (self.plan.x.parameter, self.plan.y.parameter))
+        self.inputs = _inputs(self.plan)
 
     def check(self) -> None:
         """Refuse a map whose columns are not those of one steady state, or inputs that cannot be used.
@@ -152,7 +156,7 @@ def chance_grid(record: Record, plan: MapPlan) -> np.ndarray:
 def summary_of(record: Record, plan: MapPlan) -> dict[str, Any]:
     """Probability of flutter over the cells (y, x) for JSON, None where there is none, with what is uncertain."""
     value, low, high = (np.where(np.isnan(table), None, table).tolist() for table in chance_grid(record, plan))
-    inputs = Plan(plan.case, (plan.x.parameter, plan.y.parameter)).inputs
+    inputs = _inputs(plan).inputs
     named = {"samples": plan.case.map.samples, "inputs": [one.summary() for one in inputs]}
     return {"probability": {"value": value, "low": low, "high": high} | named}
 

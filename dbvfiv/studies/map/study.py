@@ -530,7 +530,9 @@ class MapResult(StudyResult):
 
         def verdict(across: float, i: int) -> Verdict:
             column = found.get(across)
-            return Verdict.joined({name: column.verdict(part, i) for name, part in parts.items()}) if column else gap
+            if column is None or column.failure:
+                return Verdict.undecided(column.failure) if column else gap
+            return Verdict.joined({name: column.verdict(part, i) for name, part in parts.items()})
 
         table = [
             [verdict(across, i).summary() for across in self.plan.across.values]

@@ -200,7 +200,7 @@ class OnsetResult(StudyResult):
         verdicts = [[Verdict.read(scan["verdict"][i]) for i in at] for scan, at in zip(scans.values(), rows)]
         if self._classes:
             found["verdict"] = [Verdict.joined(dict(zip(scans, own))).summary() for own in zip(*verdicts)]
-        grows = np.array([[each.stable is False for each in own] for own in verdicts])
+        grows = np.array([[each.stable is False for each in own] for own in verdicts], bool)
         return {"values": values} | found | {"certified": certified_in_all(certified, grows).tolist()}
 
     def _intervals(self, join: Callable, name: str) -> list[Interval]:

@@ -237,7 +237,11 @@ class Neighbourhood:
         for mode in self.modes:
             x = mode.eigenvalue, mode.q, mode.u
             (f, g), (f_below, g_below) = above.apply(*x), below.apply(*x)
-            each.append(eigenvalue_derivative(self._pencil, mode, ((f - f_below) / apart, (g - g_below) / apart)))
+            change = (f - f_below) / apart, (g - g_below) / apart
+            try:
+                each.append(eigenvalue_derivative(self._pencil, mode, change))
+            except ValueError as error:
+                raise SolveError(str(error)) from error
         found = self.sums @ np.array(each)
         if self.model.outside is not None and places[0] is not places[1]:
             found = found + self._resisting_change(ends, places) / apart

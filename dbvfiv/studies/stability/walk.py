@@ -275,14 +275,15 @@ class StabilityWalk:
             del self._recalled[0]
 
     def about_rubbers(self, place: Mu | None = None) -> list[str]:
-        """Sentences on the rubbers in the steady state of a place, or in all that were found of the case's own design,
-        by an earlier run too. Where rubbers have loss factors, verdicts say that constants do not hold.
+        """Sentences on the rubbers in the steady state of a place, or in all that are known, by an earlier run too: of
+        many designs, of the last ones. Where rubbers have loss factors, verdicts say that constants do not hold.
         """
         self._recollect()
-        base = Mu.of(self.case)
-        own, asks = self.built(place or base), beyond_levels if base.loss_factor else state_warnings
-        states = [self.state(place)] if place else [own.described[pressure] for pressure in sorted(own.described)]
-        return [*asks(own.model, states)]
+        asks = beyond_levels if Mu.of(self.case).loss_factor else state_warnings
+        if place is not None:
+            return [*asks(self.built(place).model, [self.state(place)])]
+        known = [(own.model, [own.described[each] for each in sorted(own.described)]) for own in self._built.values()]
+        return [said for model, states in known if states for said in asks(model, states)]
 
     def recall(self, place: Mu) -> None:
         """Say that a state was found at a place by an earlier run.

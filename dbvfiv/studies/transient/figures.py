@@ -212,7 +212,7 @@ def spectra(result: StudyResult) -> Figure:
     figure = new_figure(7.2, 5.2)
     flow = result.case.drive.kind == "flow"
     panels = figure.subplots(2 if flow else 1, 1, sharex=True, squeeze=False)[:, 0]
-    half = len(h["time"]) // 2
+    half = int(np.argmin(np.abs(h["time"] - 0.5 * (h["time"][0] + h["time"][-1]))))
     signals = ([("mass_flow", 1.0, "Mass flow, kg/s")] if flow else []) + [
         ("lip_opening", 1e3, "Clear lip opening, mm")
     ]

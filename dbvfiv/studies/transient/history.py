@@ -14,7 +14,7 @@ from ...errors import CaseError
 from ...flow.stepping import FluidState, MovingFluid, packed_size
 from ...model.state import LipCentre
 from ...model.valve import ValveModel
-from ...motion.control import RunOptions
+from ...motion.control import Drive, RunOptions
 from ...motion.equations import ValveMotion
 from ...motion.stepper import MotionState, StepResult
 from ...record.mesh import MeshData
@@ -54,7 +54,7 @@ class Instant:
     @property
     def inlet(self) -> float:
         """Pressure at the far end, Pa: that of the drive, or of a pump at its flow."""
-        return supplied_pressure(self.motion, self.state, self.load.inlet)
+        return supplied_pressure(self.motion, self.state, self.reader.drive(self.state.time))
 
     @property
     def balance(self) -> float:
@@ -393,8 +393,8 @@ class Progress:
 class Reader:
     """Makes rows of the history of one run."""
 
-    def __init__(self, motion: ValveMotion, columns: Iterable[Column]):
-        self.motion, self.columns = motion, tuple(columns)
+    def __init__(self, motion: ValveMotion, columns: Iterable[Column], drive: Drive):
+        self.motion, self.columns, self.drive = motion, tuple(columns), drive
         model = motion.model
         self.lip = LipCentre(model.mesh, model.shell)
         self._centre = model.shell.dofs.index[model.mesh.centre_line, 1]

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from functools import partial
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -120,18 +121,19 @@ def assess(history: Columns, model: ValveModel, residual: float = np.nan, since:
     """
     time = history["time"]
     chosen = time >= since
+    judged = partial(judge, time[chosen], gaps=False)
     known = residual if np.isfinite(residual) else None
     signals = ("mass_flow", "lip_displacement", "lip_opening")
-    found = [judge(time[chosen], history[name][chosen], residual=known) for name in signals]
+    found = [judged(history[name][chosen], residual=known) for name in signals]
     chatter: dict[str, Any] = {}
-    if judge(time[chosen], openness(history, model)[chosen], closed_below=1.0).name == "closed":
+    if judged(openness(history, model)[chosen], closed_below=1.0).name == "closed":
         reason = "Its lips are shut, and nothing flows."
         found = [replace(v, name="closed", decided=True, reason=reason) for v in found]
     elif model.contact is not None:
         parted = parting(history, model)[chosen]
         shuttings = Shuttings.of(time[chosen], parted, 1.0)
         if shuttings.chatters:
-            opens = judge(time[chosen], parted, closed_below=1.0)
+            opens = judged(parted, closed_below=1.0)
             signals = (history[name][chosen] for name in ("lip_opening", "lip_velocity", "mass_flow"))
             chatter = shuttings.evidence(time[chosen], *signals)
             told = {name: getattr(opens, name) for name in ("decided", "reason", "period", "cycles")}
@@ -319,7 +321,7 @@ class Runner:
         self.stepper = Stepper(self.motion, self.options.scheme, self.drive, self.options.step)
         self.control = step_control(self.stepper, self.options.control)
         self.history = Keeper(record, model)
-        self._reader = Reader(self.motion, record.tables[HISTORY].columns)
+        self._reader = Reader(self.motion, record.tables[HISTORY].columns, self.drive)
         self.failures: list[str] = []
         self.interrupted = self.stopped = False
         self._row: dict[str, Any] = {}  # the last one of the history that this run has made

@@ -17,6 +17,7 @@ from ...record.mesh import MeshData, WholeValve
 from ...record.record import GrowingRecord, Record
 from ...record.vtkhdf import Step
 from ...texts import digits
+from ..case import Case
 from ..comparing import labels
 from ..result import StudyResult
 from ..session import Session, Study
@@ -25,6 +26,21 @@ from ..state import StateSteps
 from . import figures
 from .history import HISTORY, RESTART, STATE_COLUMNS, STATES, rows_to_keep, tables_of
 from .run import NUMBERS, REFUSAL, Runner, assess, judged_from
+
+
+def check(case: Case) -> None:
+    """Refuse a drive below the pressure at rest where the flow has no inertia: the steady law has outward flow alone.
+
+    Raises
+    ------
+    CaseError
+    """
+    if not case.fluid.unsteady and (least := min(Drive.of(case).pressures)) < case.rest_pressure:
+        raise CaseError(
+            f"fluid.unsteady is false, which knows outward flow alone, and the least drive is {least:g} Pa, below the "
+            f"{case.rest_pressure:g} Pa at which nothing flows.",
+            key="fluid.unsteady",
+        )
 
 
 def run(session: Session, record: GrowingRecord) -> None:
@@ -342,4 +358,4 @@ def compare(results: Sequence[TransientResult]) -> Together:
     return Together(results, labels(results, figures.QUIET))
 
 
-STUDY = Study("transient", tables_of, run, TransientResult, rows_to_keep=rows_to_keep, extends=True, compare=compare)
+STUDY = Study("transient", tables_of, run, TransientResult, check, rows_to_keep, extends=True, compare=compare)

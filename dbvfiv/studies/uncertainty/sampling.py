@@ -189,12 +189,20 @@ ACCEPTED, FIRST_STEP = 0.44, 0.6
 
 
 def weighted(weights: np.ndarray, hits: np.ndarray, undecided: np.ndarray) -> Probability:
-    """Probability of an outcome from samples of another density, with the weights that make up for it: the mean of the
-    weights of hits, by Student's distribution.
+    """Probability of an outcome from samples of another density, with the weights that make up for it."""
+    (value, low, _), (_, _, high), (decided, *_) = (_part(weights, a) for a in (hits, hits | undecided, ~undecided))
+    return Probability(float(np.clip(value / decided, low, high)) if decided else np.nan, low, high)
+
+
+def _part(weights: np.ndarray, which: np.ndarray) -> tuple[float, float, float]:
+    """Probability of some samples with its interval: the mean of their weights, by Student's distribution, or one less
+    that of the others where these are fewer, by whose weights the mean scatters less.
     """
-    value, low, _ = _mean(weights * hits)
-    _, _, high = _mean(weights * (hits | undecided), largest=float(weights.max(initial=0.0)))
-    return Probability(value, max(low, 0.0), min(high, 1.0))
+    if 2 * (weights @ which) > weights.sum():
+        value, low, high = _part(weights, ~which)
+        return 1 - value, 1 - high, 1 - low
+    value, low, high = _mean(weights * which, largest=float(weights.max(initial=0.0)))
+    return value, max(low, 0.0), min(high, 1.0)
 
 
 def _mean(terms: np.ndarray, least: float = 0.0, largest: float = 1.0) -> tuple[float, float, float]:
@@ -322,28 +330,31 @@ def subset(
     """
     count = max(32, round(samples / (RUNS * (1 + (USUAL - 1) * (1 - SHARE)))))
     runs = [_subset_run(evaluate, dimension, count, np.random.default_rng([seed, run])) for run in range(RUNS)]
-    decided, doubtful, squares, most = np.array(runs).T
+    hits, doubtful, squares, most, decided = np.array(runs).T
     if not doubtful.any():
         return Probability(0.0, 0.0, float(most.mean()))
     least = float(np.sqrt(squares.mean()))
-    (value, low, _), (_, _, high) = _mean(decided, least), _mean(doubtful, least)
-    return Probability(value, max(low, 0.0), min(high, 1.0))
+    (value, low, _), (_, _, high) = _mean(hits, least), _mean(doubtful, least)
+    high = min(high, 1.0)
+    return Probability(min(value / decided.mean(), high) if decided.any() else np.nan, max(low, 0.0), high)
 
 
 def _subset_run(evaluate, dimension: int, count: int, random: np.random.Generator) -> tuple[float, ...]:
-    """Probability from one run, undecided samples of its last level not counted and counted as hits; the square of its
-    coefficient of variation were all samples of a level independent; and what the last level may hold at most where
-    none of all runs hits.
+    """Probability from one run, undecided samples of its levels not counted and counted as hits; the square of its
+    coefficient of variation were all samples of a level independent; what the last level may hold at most where none of
+    all runs hits; and the share of the inputs that is decided.
     """
     square, scores, log_level, step = 0.0, random.standard_normal((count, dimension)), 0.0, FIRST_STEP
     values = evaluate(scores, np.zeros(count))
-    undecided = int(np.isnan(values).sum())
+    undecided, doubt = int(np.isnan(values).sum()), 0.0
+    decided = 1 - undecided / count
     for _ in range(LEVELS):
         values = np.nan_to_num(values, nan=-np.inf)
         bound = np.sort(values)[-max(2, round(SHARE * count)) - 1]
         seeds = np.flatnonzero(values > bound)
         if bound >= 0 or not len(seeds):
             break
+        doubt += np.exp(log_level) * undecided / count
         log_level, square = log_level + np.log(len(seeds) / count), square + 1 / len(seeds) - 1 / count
         chain, undecided = [(scores[seeds], values[seeds])], 0
         for k in range(-(-count // len(seeds)) - 1):
@@ -358,7 +369,7 @@ def _subset_run(evaluate, dimension: int, count: int, random: np.random.Generato
     hits, level = float(np.mean(values > 0)), float(np.exp(log_level))
     square += (1 / hits - 1) / count if hits else 0.0
     most = level * (1 - (0.5 * (1 - CONFIDENCE)) ** (1 / (RUNS * count)))
-    return level * hits, level * min(hits + undecided / count, 1.0), square, most
+    return level * hits, min(level * (hits + undecided / count) + doubt, 1.0), square, most, decided
 
 
 def _variation(terms: np.ndarray) -> float:

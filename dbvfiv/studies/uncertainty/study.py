@@ -207,9 +207,8 @@ def _start(case: dict, states: list[Start | None], neighbours: Mapping[int, Neig
 
 
 def _performance(outcome: int, damping_ratio: float) -> float:
-    """Distance of a sample beyond flutter; NaN where undecided, minus infinity where it cannot flutter."""
-    name = OUTCOMES[outcome]
-    return np.nan if name == UNDECIDED else -damping_ratio if name in (FLUTTERS, STABLE) else -np.inf
+    """Distance of a sample beyond flutter; NaN where nothing is known of it, minus infinity where it diverges."""
+    return {FLUTTERS: -damping_ratio, STABLE: -damping_ratio, DIVERGES: -np.inf}.get(OUTCOMES[outcome], np.nan)
 
 
 def _are(found: dict[str, np.ndarray], outcome: str) -> np.ndarray:
@@ -217,6 +216,15 @@ def _are(found: dict[str, np.ndarray], outcome: str) -> np.ndarray:
     if outcome == NOT_SEALED:
         return found["flow"] > 0
     return found["outcome"] == OUTCOMES.index(outcome)
+
+
+def _unknown(found: dict[str, np.ndarray], outcome: str) -> np.ndarray:
+    """True for samples of which nothing tells whether they are of an outcome: without a verdict, or with a rubber whose
+    constants do not hold, which is no evidence of stability.
+    """
+    if outcome == NOT_SEALED:
+        return np.isnan(found["flow"])
+    return _are(found, UNDECIDED) | (_are(found, NOT_VALID) & (outcome != NOT_VALID))
 
 
 class _Sampling:
@@ -367,7 +375,7 @@ class UncertaintyResult(StudyResult):
     def probability(self, value: float, outcome: str = FLUTTERS) -> Probability:
         """Probability of an outcome at a value of the range."""
         found, method = self.at(value), self.case.uncertainty.method
-        hits, undecided = _are(found, outcome), _are(found, UNDECIDED)
+        hits, undecided = _are(found, outcome), _unknown(found, outcome)
         if method == "plain":
             return counted(int(hits.sum()), int(undecided.sum()), len(hits))
         if method == "subset":
@@ -386,9 +394,10 @@ class UncertaintyResult(StudyResult):
         return subset(evaluate, len(self.plan.inputs), asked.samples, asked.seed)
 
     def point(self, value: float) -> dict[str, Any]:
-        """Numbers at a value of the range: ``probability`` of flutter among the decided samples with its ``interval``,
-        ``samples``, ``undecided``, ``shared`` (decided on the space that samples share), ``outcomes`` by their names
-        (with ``not sealed`` of a bill that is moulded shut), ``percentiles`` (2.5, 50, 97.5) and ``decides``.
+        """Numbers at a value of the range: ``probability`` of flutter among the decided samples with its ``interval``
+        (those that are not valid are not decided), ``samples``, ``undecided``, ``shared`` (decided on the space that
+        samples share), ``outcomes`` by their names (with ``not sealed`` of a bill that is moulded shut),
+        ``percentiles`` (2.5, 50, 97.5) and ``decides``.
         """
         found, flutter = self.at(value), self.probability(value)
         names = (FLUTTERS, DIVERGES, NOT_VALID, STABLE, *((NOT_SEALED,) if self.case.valve.is_preset else ()))
@@ -421,7 +430,7 @@ class UncertaintyResult(StudyResult):
         the largest first; None where there are too few samples or nothing varies.
         """
         found = self.at(value)
-        plain = (found["stage"] == 0) & ~_are(found, UNDECIDED)
+        plain = (found["stage"] == 0) & ~_unknown(found, FLUTTERS)
         scores = found["scores"][plain]
         margin = shares(scores, found["damping_ratio"][plain])
         outcome = shares(scores, _are(found, FLUTTERS)[plain].astype(float))

@@ -8,8 +8,9 @@ import pytest
 
 import dbvfiv
 from dbvfiv.errors import CaseError
+from dbvfiv.studies.identify.study import IdentifyResult
 from dbvfiv.studies.identify.valves import Places, least_damping, measured_of, onsets
-from dbvfiv.studies.inputs import Plan
+from dbvfiv.studies.inputs import Plan, inputs_of
 from dbvfiv.studies.response.study import Transfer
 from dbvfiv.studies.stability.walk import StabilityWalk
 from tests.observers import Stop
@@ -307,6 +308,33 @@ def test_the_range_without_one_lies_where_something_flows_and_holds_the_records(
     assert places.case.rest_pressure < places.values[0] < places.now < places.values[-1] and places.values[0] > 0
     expected = max(pressure / 2.5, 1.01 * places.case.rest_pressure)
     assert places.values[0] == pytest.approx(expected) or expected > pressure
+
+
+@pytest.mark.parametrize(
+    ("inputs", "keys", "name"),
+    [
+        (INPUTS, {"identify.over": "beta=1e-4,1e-3"}, "beta"),
+        (INPUTS | {"pressure": "normal(3 %)"}, {}, "pressure"),
+        (INPUTS | {"fluid.density": "normal(3 %)"}, {}, "density"),
+    ],
+)
+def test_inputs_that_a_place_names_or_the_range_moves_are_refused(inputs, keys, name, refused):
+    """What the place or the range says stood in for them, and the valve of the record was another one."""
+    record = {"frequency": 20.0, "frequency_interval": 0.1, "at": "pressure=3 kPa, density=1025"}
+    words = f"holds '{name}', which the place of a record or the range of identify moves; one of them has to go"
+    with refused(CaseError, match=words):
+        load(inputs, **keys).identify([record])
+
+
+def test_the_range_of_other_samples_takes_no_input_away():
+    """That of uncertainty, which identify does not walk; the file with what was learned has it no longer."""
+    case = load(MORE, **{"uncertainty.over": "pipe_length=2,4", "uncertainty.samples": 16}).case
+    found = object.__new__(IdentifyResult)
+    header, scores = SimpleNamespace(case=case), np.random.default_rng(1).standard_normal((400, len(MORE) + 2))
+    vars(found).update(record=SimpleNamespace(header=header), samples=scores)
+    assert [one.name for one in found.plan.inputs] == [*MORE]
+    known = found.posterior_case()
+    assert [one.name for one in inputs_of(known)] == [*MORE]
 
 
 def test_a_range_over_what_has_no_one_value_is_refused(refused):

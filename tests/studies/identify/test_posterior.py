@@ -7,7 +7,7 @@ import pytest
 from scipy.stats import norm
 
 from dbvfiv.case.axis import parse_point
-from dbvfiv.case.distribution import Distribution
+from dbvfiv.case.distribution import ALLOWED, Distribution
 from dbvfiv.case.quantity import GRAVITY, Quantity
 from dbvfiv.studies.identify.learning import Emulator, Learned, Learning, expected_variance, sample_posterior
 from dbvfiv.studies.identify.search import Search, _some
@@ -222,9 +222,21 @@ def test_a_posterior_is_written_as_a_distribution(text):
             assert set(found.numbers) <= set(prior.numbers)
 
 
-@pytest.mark.parametrize(("text", "value"), [("samples(1, 2, 4, 8)", 4.0), ("samples(-1, 0, 1)", 0.0)])
-def test_a_posterior_of_one_value_is_written_as_a_narrow_distribution(text, value):
+@pytest.mark.parametrize(("text", "limits"), [("normal(1, 0.2)", (0.0, 10.0)), ("lognormal(1, 1.3)", (0.28, 10.0))])
+def test_a_posterior_lies_where_its_number_can_be(text, limits):
+    """As the prior does: two standard deviations below, at two thirds of the width, a normal form goes beyond 0."""
     prior = Distribution.parse(text, Quantity(""))
-    scores = prior.score(np.array([value])) + 0.01 * np.random.default_rng(6).standard_normal(400)
+    scores = -2 + 0.65 * np.random.default_rng(6).standard_normal(4000)
+    found = Distribution.parse(distribution_text(prior, scores, limits), Quantity(""))
+    assert prior.share_outside(*limits) <= ALLOWED and found.share_outside(*limits) <= ALLOWED
+    assert found.median == pytest.approx(prior.at(np.array([-2.0]))[0], rel=0.02)
+
+
+@pytest.mark.parametrize(
+    ("text", "value", "share"), [("samples(1, 2, 4, 8)", 4.0, 2.5 / 4), ("samples(-1, 0, 1)", 0.0, 0.5)]
+)
+def test_a_posterior_of_one_value_is_written_as_a_narrow_distribution(text, value, share):
+    prior = Distribution.parse(text, Quantity(""))
+    scores = norm.ppf(share) + 0.01 * np.random.default_rng(6).standard_normal(400)
     found = Distribution.parse(distribution_text(prior, scores), Quantity(""))
     assert found.at(np.array([-2.0, 0.0, 2.0])) == pytest.approx([value] * 3, rel=1e-5, abs=1e-5) and found.scale > 0

@@ -107,7 +107,8 @@ def test_a_response_ends_where_waves_are_no_longer_resolved(monkeypatch, resolve
     linear = SimpleNamespace(resolved=lambda _place: resolved)
     keys = {"response.max_frequency": 60.0, "response.count": 240, "damping.band": ["10 Hz", "50 Hz"], **LOSS}
     valve = load_small(keys)
-    walk = SimpleNamespace(case=valve.case, verdict=lambda _: stable, family=lambda _: SimpleNamespace(linear=linear))
+    family = SimpleNamespace(linear=linear)
+    walk = SimpleNamespace(case=valve.case, verdict=lambda _: stable, family=lambda _: family, about_rubbers=list)
     monkeypatch.setattr(study, "StabilityWalk", lambda *_: walk)
     monkeypatch.setattr(study, "Transfer", Oscillators)
     monkeypatch.setattr(study, "all_eigenvalues", lambda _reduced: EIGENVALUES)

@@ -121,6 +121,8 @@ class ClosedSearch(OnsetSearch):
         self.case = Case().replace({"onset.over": f"pressure={','.join(map(repr, values))}"})
         self.axis, self.spectrum, self.missing = self.case.onset.axis, spectrum, missing
         self.scan = Scan(self._beside)
+        model = SimpleNamespace(flow=SimpleNamespace(back=0.0))
+        self.walk = SimpleNamespace(built=lambda place: SimpleNamespace(model=model))
         self.line = SimpleNamespace(locate=lambda crossing, rel: LineOnset(*locate(self.scan, crossing, rel), 0.0))
 
     def _beside(self, value):

@@ -1,5 +1,7 @@
 """Figures and films of time histories: what they say is what the result holds."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from PIL import Image
@@ -7,7 +9,7 @@ from PIL import Image
 import dbvfiv
 from dbvfiv.errors import CaseError
 from dbvfiv.studies.case import thesis_case
-from dbvfiv.studies.transient.figures import draw_together
+from dbvfiv.studies.transient.figures import draw_together, spectra
 from dbvfiv.studies.transient.study import Together
 from dbvfiv.verdict import Series, in_steps
 
@@ -44,12 +46,16 @@ def test_runs_side_by_side_say_which_verdicts_are_not_certain(run, monkeypatch):
 
 
 def test_spectra_say_their_resolution_and_print_no_more_digits(run, monkeypatch):
-    half = len(run.history["time"]) // 2
+    half = 20  # of 40 ms
     fine = 1.0 / Series.of(run.history["time"][half:], run.history["mass_flow"][half:]).duration
     monkeypatch.setitem(run.verdict["lip_opening"], "frequency", 54.98)
     figure = run.figures(only=["spectrum"])["spectrum"]
     assert f"resolution {fine:.2g} Hz" in figure.get_suptitle()
     assert figure.axes[1].get_title("right").endswith(f" {in_steps(54.98, fine)} Hz") and fine > 1
+    time = np.append(1e-4 * np.arange(1000), 0.1 + 1e-3 * np.arange(401))  # short steps and long ones, half at 0.25 s
+    waves = dict.fromkeys(("mass_flow", "lip_opening"), np.sin(400.0 * time))
+    figure = spectra(SimpleNamespace(history={"time": time} | waves, case=run.case, verdict={}))
+    assert "resolution 4 Hz" in figure.get_suptitle()
     assert in_steps(54.98, 50.0) == "55" and in_steps(54.98, 0.3) == "55.0" and in_steps(54.983, 0.02) == "54.98"
 
 

@@ -62,8 +62,11 @@ def test_kick_rings_at_the_eigenvalue(valve):
 def test_a_kick_before_anything_flows_pushes_the_valve_at_rest(valve):
     """The ramp begins below the pressure downstream."""
     changes = {"transient.start": "kick", "transient.ramp": 5e-3, "transient.duration": 5e-3}
-    run = Runner(valve(changes | {"downstream.pressure": 400.0, "drive.pressure": 6e3})).start()
+    model = valve(changes | {"downstream.pressure": 400.0, "drive.pressure": 6e3})
+    run = Runner(model).start()
     assert run.progress.eigenvalue.imag > 0 and run.history["lip_displacement"][0] == pytest.approx(1e-4, rel=1e-6)
+    with pytest.raises(CaseError, match="is 0 Pa, below the 400 Pa at which nothing flows"):
+        dbvfiv.load(model.case, {"fluid.unsteady": False}).transient()
 
 
 @pytest.mark.parametrize(
@@ -186,18 +189,19 @@ def test_a_valve_whose_drive_turns_around_closes_and_without_one_stands_at_its_g
     changes = {"transient.drive_table": str(table), "downstream.pressure": back, "transient.start": "steady"}
     changes |= {"fluid.density": 10.0, "damping.alpha": 400.0, "transient.duration": 0.4}
     run = Runner(valve(changes | {"transient.numerical_damping": 0.1})).start()
+    assert run.history["inlet_pressure"] == pytest.approx([run.drive(time) for time in run.history["time"]], abs=1e-6)
     assert run.history["smallest_area"][0] > 20 * lip_gap(run.model)
     assert (run.verdict.name == "closed" and run.verdict.decided) if back else run.verdict.name != "closed"
 
 
-def made_history(model, share, flow=1e-3):
-    """Even second of a valve under 18 kPa whose passage is a share of the gap at rest."""
-    time = np.linspace(0.0, 1.0, 101)
-    history = {name: np.full(101, 1e-3) for name in ("lip_displacement", "lip_opening", "lip_velocity")}
-    history |= dict.fromkeys(("mass_flow", "inlet_mass_flow"), np.full(101, flow))
-    history |= {"time": time, "inlet_pressure": np.full(101, 18e3)}
-    history |= dict.fromkeys(("stops", "stop_energy"), np.zeros(101))
-    return history | {"smallest_area": np.full(101, lip_gap(model)) * share}
+def made_history(model, share, flow=1e-3, time=np.linspace(0.0, 1.0, 101)):
+    """Time, an even second, of a valve under 18 kPa whose passage is a share of the gap at rest."""
+    ones = np.ones(len(time))
+    history = dict.fromkeys(("lip_displacement", "lip_opening", "lip_velocity"), 1e-3 * ones)
+    history |= dict.fromkeys(("mass_flow", "inlet_mass_flow"), flow * ones)
+    history |= {"time": time, "inlet_pressure": 18e3 * ones}
+    history |= dict.fromkeys(("stops", "stop_energy"), 0.0 * ones)
+    return history | {"smallest_area": lip_gap(model) * share * ones}
 
 
 @pytest.mark.parametrize(
@@ -207,6 +211,16 @@ def test_a_valve_is_closed_that_is_shut_and_lets_nothing_flow(valve, share, flow
     """A passage of half the gap at rest or less is shut, if no more passes than leaks out of it."""
     model = valve()
     assert assess(made_history(model, share, flow), model).name == name
+
+
+@pytest.mark.parametrize("counts, steps", [((1920, 440), (1e-3 / 32, 1e-3)), ((2000, 60), (2e-4, 5e-3))])
+def test_a_run_of_short_steps_and_long_ones_is_judged_to_its_end(valve, counts, steps):
+    """Steps that were halved while lips slammed, and adaptive ones that grow as the valve comes to rest: no gaps."""
+    time = np.append(0.0, np.cumsum(np.repeat(steps, counts)))
+    rings = 5.0 + np.exp(-time / 0.02) * np.sin(2 * np.pi * 200.0 * time)
+    found = assess(made_history(model := valve(), 5.0, time=time) | {"mass_flow": rings}, model)
+    assert found.mass_flow.judged == pytest.approx((0.0, np.dot(counts, steps)))
+    assert found.name == "steady" and found.decided and not any("gap" in note for note in found.mass_flow.notes)
 
 
 @pytest.mark.parametrize("apart", [{"valve.lip_rise": 0.04}, {"valve.lip_radius": 0.01, "supports.contact": "faces"}])

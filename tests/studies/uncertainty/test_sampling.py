@@ -95,6 +95,16 @@ def test_subset_sampling_without_a_hit_tells_what_its_levels_hold(least, most, p
     assert (found.value, found.low) == (0.0, 0.0) and least < found.high < most
 
 
+@pytest.mark.parametrize(("share", "bound"), [(0.1, 4.0), (0.5, 2.5)])
+def test_undecided_samples_of_all_levels_of_subset_sampling_widen_the_interval(share, bound):
+    """A share of the inputs, all of which may be of the event; the value is that of the others."""
+    performance = lambda z, _: np.where(z[:, 1] > norm.isf(share), np.nan, z[:, 0] - bound)  # noqa: E731
+    found = [subset(performance, 2, 1500, seed) for seed in range(20)]
+    assert np.mean([one.value for one in found]) == pytest.approx(norm.sf(bound), rel=0.2)
+    for one in found:
+        assert one.low <= (1 - share) * norm.sf(bound) and one.high >= 0.9 * share
+
+
 def test_two_regions_are_both_found():
     bound, values = 3.3, []
     for seed in range(20):
@@ -123,6 +133,22 @@ def test_no_hit_of_another_density_says_less_than_none_of_the_inputs():
         sizes.append(weighted(np.exp(one.log_weight(scores)), none, none).high)
     assert sizes[0] == pytest.approx(counted(0, 0, 160).high, rel=1e-6) and sizes[0] == pytest.approx(0.0228, rel=0.01)
     assert sizes[1] == pytest.approx(0.228, rel=0.02)
+
+
+@pytest.mark.parametrize("doubtful", [False, True])
+def test_a_usual_outcome_of_weighted_samples_is_as_certain_as_the_rare_one(doubtful):
+    """All but the 1.35e-3 of the inputs beyond three standard deviations, about which nine tenths of the samples are;
+    and with a fifth of the others undecided, of which as many are.
+    """
+    density, values = Shifted(np.array([[3.0, 0.0], [0.0, 0.0]]), np.array([1 - DEFENSIVE, DEFENSIVE])), []
+    for seed in range(10):
+        scores = density.draw(160, np.random.default_rng(seed))
+        weights, rare = np.exp(density.log_weight(scores)), scores[:, 0] > 3
+        undecided = doubtful & ~rare & (scores[:, 1] > 0.84)
+        usual, other = weighted(weights, ~rare & ~undecided, undecided), weighted(weights, rare, undecided)
+        assert 0 <= usual.low <= usual.value <= usual.high <= 1 and usual.value == pytest.approx(1 - other.value)
+        values.append(other.value)
+    assert np.mean(values) == pytest.approx(norm.sf(3) * (1.25 if doubtful else 1), rel=0.1)
 
 
 def test_shares_of_a_linear_function_are_its_squares():

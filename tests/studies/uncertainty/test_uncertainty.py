@@ -15,6 +15,7 @@ from dbvfiv.case.materials import BUILT_IN, RUBBERS, HalpinTsai, ShippedRubber
 from dbvfiv.errors import CaseError
 from dbvfiv.observer import Observer
 from dbvfiv.record.record import GrowingRecord
+from dbvfiv.report.answers import _chance
 from dbvfiv.report.gather import Gathered
 from dbvfiv.report.parts import chance_part
 from dbvfiv.studies import workers
@@ -86,11 +87,29 @@ def refused():
     )
 
 
-def test_samples_that_are_all_not_valid_are_decided(refused):
+def test_samples_whose_constants_do_not_hold_tell_nothing_of_stability(refused):
+    """Nor does page one of a report say 0 %."""
     (point,) = refused.points
     assert point["outcomes"]["not valid"]["probability"] == 1.0 and point["undecided"] == 0
-    assert point["probability"] == 0.0 and point["interval"][1] < 0.25
+    assert point["probability"] is None and point["interval"] == [0.0, 1.0]
+    assert [point["outcomes"][name]["probability"] for name in ("stable", "diverges")] == [None, None]
     assert (refused.at(point["value"])["opening"] > 0).all()
+    said = _chance(SimpleNamespace(get=lambda _: refused, case=refused.case))
+    assert said == "probability of chatter: not known, no sample was decided"
+
+
+@pytest.mark.parametrize("method", ["plain", "rare"])
+def test_samples_whose_constants_do_not_hold_widen_the_interval(method):
+    """Thirty of a hundred, of which none of the others flutters; of all samples 0 is within 3.6 %."""
+    result = object.__new__(UncertaintyResult)
+    outcome = np.where(np.arange(100) < 30, OUTCOMES.index("not valid"), OUTCOMES.index("stable"))
+    rows = {"outcome": outcome, "weight": np.ones(100), "stage": np.zeros(100, int)}
+    case = load_case(None, [f"uncertainty.method={method}"])
+    vars(result).update(record=SimpleNamespace(header=SimpleNamespace(case=case)), at=lambda _: rows)
+    found, stable = result.probability(0.0), result.probability(0.0, "stable")
+    assert found.value == 0.0 and 0.35 < found.high < 0.45
+    assert stable.value == 1.0 and stable.low == pytest.approx(1 - found.high, abs=0.02)
+    assert result.probability(0.0, "not valid").value == pytest.approx(0.3)
 
 
 def test_figures_of_samples_without_a_damping_ratio_are_drawn(refused):
@@ -114,6 +133,18 @@ def test_a_measurement_of_an_input_narrows_the_margin_by_a_share_of_its_median(m
         left = 1.96 / np.hypot(1 / spread, 1.96 / 4.0)
         assert then == pytest.approx(2 * left / 2000, rel=0.02) and then < now
         assert now == pytest.approx(2 * 1.96 * spread / 2000, rel=0.02)
+
+
+def test_a_sealed_bill_is_one_whatever_its_verdict():
+    """Twenty of 256 bills without a verdict: all let flow pass, or two without a steady state."""
+    result = object.__new__(UncertaintyResult)
+    outcome = np.where(np.arange(256) < 20, OUTCOMES.index("undecided"), OUTCOMES.index("stable"))
+    for flow, high in ((np.ones(256), 1.0), (np.where(np.arange(256) < 2, np.nan, 0.0), 0.028)):
+        rows = {"outcome": outcome, "flow": flow}
+        header = SimpleNamespace(case=load_case(None, []))
+        vars(result).update(record=SimpleNamespace(header=header), at=lambda _, rows=rows: rows)
+        found = result.probability(0.0, "not sealed")
+        assert found.value == np.nanmean(flow) and found.high == pytest.approx(high, abs=1e-3)
 
 
 def test_flow_models_are_compared_by_the_same_samples():
@@ -296,7 +327,7 @@ def plies(angle):
         ({}, "angle", "normal", (54.0, 2.0)),
         (plies(90.0), "angle", "uniform", (86.54, 90.0)),
         (plies(1.0), "angle", "uniform", (0.0, 4.46)),
-        (plies(120.0), "angle", None, None),
+        (plies(120.0), "angle", "normal", (60.0, 2.0)),
         ({"valve.scale": 1 / 12}, "thickness", "lognormal", (1.0, 1.2)),
         ({"valve.scale": 1 / 2}, "thickness", "normal", (1.0, 0.0)),
     ],
