@@ -233,7 +233,7 @@ class LoadCurve:
 
     def towards(self, end: int) -> list[int]:
         """Numbers of the points up to one at which the curve goes on from its start, each farther than all before."""
-        on = np.sign(self.pressures[1] - self.pressures[0])
+        on = np.sign(self.pressures[min(1, end)] - self.pressures[0])
         far, slopes = on * self.pressures[: end + 1], on * self._slopes(slice(end + 1))
         return [i for i in range(end + 1) if i == 0 or (slopes[i] > 0 and far[i] > far[:i].max())]
 
@@ -370,7 +370,7 @@ class LoadCurve:
                 self._branch = None
                 raise KeyboardInterrupt
             kind = self._branch.reason.kind
-            ended = kind is Reason.POINTS or (self.stops_at_limit and kind is Reason.LIMIT)
+            ended = kind is Reason.POINTS or (self.stops_at_limit and (kind is Reason.LIMIT or bool(self.limits())))
             if ended or way * (self.pressures[-1] - target) >= -1e-12 * abs(target):
                 return
 

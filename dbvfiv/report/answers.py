@@ -337,8 +337,8 @@ def _collapse(result, rated: float) -> str:
     first, units = buckles_first(result), result.case.units
     if first is None or first.pressure >= rated:
         return ""
-    below = "rated back pressure" if result.case.closure.rated_pressure is not None else "largest one asked for"
-    return f"{_gives_way(first.kind)} at {units.pressure(first.pressure, 3)}, below the {below}"
+    below = ", below the rated back pressure" if result.case.closure.rated_pressure is not None else ""
+    return f"{_gives_way(first.kind)} at {units.pressure(first.pressure, 3)}{below}"
 
 
 def _gives_way(kind: str) -> str:

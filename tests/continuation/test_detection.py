@@ -101,7 +101,7 @@ def test_two_folds_within_the_step_after_the_unit_of_the_state_grew():
     """a = x^3 - 0.03 x with folds at -0.1 and 0.1, the first point in a tenth of the unit of the second."""
     tracer = branch_tracer(cusp(), {"a": 0.0, "b": 0.03}, "a", ContinuationOptions(state_scale=0.1))
     before = tracer.start(np.array([-0.3, -0.018]), np.array([0.0, 1.0]))
-    tracer.problem.rescale(1.0)
+    tracer.problem.rescale(1.0, 1.0)
     before.tangent = before.tangent / tracer.problem.norm(before.tangent)
     after = tracer.start(np.array([0.12, -0.001872]), np.array([0.0, 1.0]))
     folds = FoldMonitor().between(tracer, before, after, 0, [])

@@ -248,7 +248,7 @@ def test_a_run_that_goes_on_ends_without_a_file_that_it_may_not_write(coarse_cas
         folder.rmdir()
         folder.write_text("no folder")
     result = resume(tmp_path / "run.h5")
-    assert result.complete and attempts[1][1] == {} and lost in result.warnings[-1]
+    assert result.complete and attempts[1][1] == {} and any(lost in said for said in result.warnings)
 
 
 def test_kept_runs_are_those_of_the_pressures_that_were_found(coarse_case, tmp_path, attempts, monkeypatch):

@@ -323,7 +323,7 @@ class LimitPath(NamedTuple):
 
 def follow_past_limits(curve: LoadCurve, target: float) -> LimitPath:
     """Follow a curve of equilibria until the pressure is `target`, Pa, or falls to zero; one that stops at limit points
-    to the last point before the first.
+    to the last point before the first. Of one without limit points those points are told that go on towards the target.
 
     Raises
     ------
@@ -333,8 +333,9 @@ def follow_past_limits(curve: LoadCurve, target: float) -> LimitPath:
     curve.extend(target)
     found, limits = curve.limit_states(), []
     points = list(zip(map(float, curve.pressures), curve.states))
-    if curve.stops_at_limit and found:
-        found, points = found[:1], [points[i] for i in curve.towards(found[0].before)]
+    if curve.stops_at_limit or not found:
+        found = found[:1]
+        points = [points[i] for i in curve.towards(found[0].before if found else len(points) - 1)]
     for pressure, q, shape, _ in found:
         vanishing = _least_in_magnitude(curve.model, q, pressure)
         limits.append(Buckling("limit point", pressure, q, shape / shape[np.argmax(np.abs(shape))], vanishing))

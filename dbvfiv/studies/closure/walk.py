@@ -367,9 +367,9 @@ class ClosureWalk:
             if not falls:
                 self._keep_before_limit(start, q)
             raise SolveError(f"{error} Arclength did not get under way either: {reason}") from reason
-        rising = path.limits and not goes_on
+        passes = path.limits and goes_on
         for pressure, place in path.points[1:]:
-            if rising:
+            if not passes:
                 self._watch(pressure, place, point=True)
                 start, q = pressure, place
             else:
@@ -380,11 +380,11 @@ class ClosureWalk:
         if path.limits or not (path.reached or falls):
             self._keep_before_limit(start, q)
         self.beyond_limit = self.beyond_limit or bool(path.limits)
-        for watch in self.watches.values():
+        for watch in self.watches.values() if passes else ():
             watch.forget()
         steps.pressure, steps.q = path.points[-1]
         steps.slope = None
-        if rising:
+        if path.limits and not goes_on:
             raise SolveError(
                 f"The wall has a limit point at {path.limits[0].pressure:.6g} Pa: beyond it no equilibrium is near."
             )

@@ -57,9 +57,20 @@ NARROW = 2e-6
 FORM, KEPT = 0.06, 0.05
 
 
-def rows_to_keep(known: Record, _case: Case) -> dict[str, int]:
+def rows_to_keep(known: Record, case: Case) -> dict[str, int]:
     """Rows that a run goes on from: those of valves; the posterior follows from them."""
+    _require_inputs(known, VALVES, len(Places(case).plan.inputs))
     return {name: known.rows(name) for name in (VALVES, SPECTRA, BEGINS)} | {POSTERIOR: 0}
+
+
+def _require_inputs(known: Record, table: str, count: int) -> None:
+    """Refuse a table of an earlier version, whose valves had inputs that places or the range move, too."""
+    if (kept := int(known.column(table, "input").max(initial=count - 1)) + 1) != count:
+        raise CaseError(
+            f"The result is of an older program: its valves have {kept - count} more inputs, which places or the range "
+            "move; make it anew.",
+            key="identify",
+        )
 
 
 def check(case: Case) -> None:
@@ -185,7 +196,9 @@ class IdentifyResult(StudyResult):
     @cached_property
     def samples(self) -> np.ndarray:
         """Scores (n, d + 2) of the posterior, with those of the common errors of the model."""
-        return self.record.column(POSTERIOR, "score").reshape(-1, len(self.plan.inputs) + 2)
+        width = len(self.plan.inputs) + 2
+        _require_inputs(self.record, POSTERIOR, width)
+        return self.record.column(POSTERIOR, "score").reshape(-1, width)
 
     @property
     def scores(self) -> np.ndarray:
@@ -201,6 +214,7 @@ class IdentifyResult(StudyResult):
         """Emulated modes and measured oscillations."""
         source, score = (self.record.column(VALVES, name) for name in ("round", "score"))
         width = len(self.plan.inputs)
+        _require_inputs(self.record, VALVES, width)
         count = len(score) // width
         scores, rounds = score[: count * width].reshape(count, width), source[: count * width : width]
         use = slice(None)
