@@ -61,7 +61,7 @@ def test_the_command_says_what_is_fixed(command_line, misused, outcome):
     options = settings({"mesh.around": 6, "mesh.along": 10} | PLAIN)
     done = command_line("onset", "--over", "alpha=0:40:3", *options, "-p", "4 kPa", "--density", 10)
     assert done.status == 0, done.err
-    assert done.out.startswith("At 4 kPa static, 10 kg/m³, quasi-steady, β = 0.003 s:")
+    assert done.out.startswith("At 4 kPa static, 10 kg/m³, quasi-steady, β = 0.003 s; class SS alone (")
     _, document, path = outcome
     assert document["fixed"]["pressure"] == 6e3 and "density" not in document["fixed"]
     (figure,) = load_result(path).figures().values()
