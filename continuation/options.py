@@ -262,8 +262,8 @@ class OrbitOptions:
     harmonics, max_harmonics : int
         Harmonics of the first series, and at most.
     tail : float
-        Largest share that the last two harmonics may have in an orbit about its mean; the series is made longer until
-        that holds.
+        Largest share that the last two harmonics may have in an orbit about its mean, its unknowns by how far each
+        moves; the series is made longer until that holds.
     tolerance : float
         Error that the corrections leave, over the size of the orbit about its mean.
     exponents : int

@@ -284,8 +284,9 @@ class GasChannel(AroundChannel):
         are traced; see `dbvfiv.flow.law.solve_steady`.
         """
         own, still = self.without_drives(), parameters["inlet"] == self.channel.back
-        driven = self._driven_at_all(parameters)
-        inner = self.settled(area, parameters)
+        # a pressure of 1 Pa drives the flow where there is none
+        driven = {**parameters, "inlet": jnp.where(still, self.channel.back + 1.0, parameters["inlet"])}
+        inner = _settled(*jax.lax.stop_gradient((own, area, driven)))
         for _ in range(2):
             inner = inner + _newton_step(own, area, driven, inner)
         _, sigma = own.split(inner, parameters)
@@ -293,15 +294,6 @@ class GasChannel(AroundChannel):
         # where nothing flows their derivative by the inlet pressure is that of the flow that 1 Pa drives
         pressure = jnp.where(still, over * jax.lax.stop_gradient(pressure), pressure)
         return pressure + self.channel.static, jnp.where(still, 0.0, inner)
-
-    def settled(self, area, parameters):
-        """Unknowns (l,) that the flow settles in; traceable, without derivatives."""
-        return _settled(*jax.lax.stop_gradient((self.without_drives(), area, self._driven_at_all(parameters))))
-
-    def _driven_at_all(self, parameters):
-        """Parameters with a pressure of one, Pa, that drives the flow where there is none."""
-        still = parameters["inlet"] == self.channel.back
-        return {**parameters, "inlet": jnp.where(still, self.channel.back + 1.0, parameters["inlet"])}
 
     def without_drives(self) -> GasChannel:
         """Copy of the law with only those terms that act on steady flow, which is that of an open passage."""

@@ -67,7 +67,7 @@ def test_steady_flow_of_a_long_step_is_that_of_the_law(terms):
 
 
 def test_a_seal_that_grows_inwards_stays_one():
-    """What is squeezed out from between the old seal and the new one passes neither; a film in an open passage does."""
+    """Fluid squeezed out from between the old seal and the new one passes neither; a film in an open passage does."""
     z, area = passage()
     fluid, speed = MovingFluid(Channel(z, FLOOR, 1.0), DENSITY, lambda area: 3), np.full(len(z), -50.0)
     assert not fluid.facing(area, speed, 18e3).law.sealed

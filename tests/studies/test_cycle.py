@@ -177,7 +177,7 @@ def test_what_is_read_off(found):
 
 
 def test_ranges_for_fatigue(found):
-    """Of each layer, at its faces; those of a smaller cycle are smaller."""
+    """Ranges of each layer, at its faces; those of a smaller cycle are smaller."""
     small, large = (found.points[k].ranges for k in (0, -1))
     layers, orbit = large.largest(), found.points[-1].orbit
     shell, states = orbit.model.shell, orbit.motion.at(orbit.phases)[:, : orbit.model.size]

@@ -57,7 +57,7 @@ def test_a_pressure_downstream_shifts_the_drive():
 
 
 def test_the_pressure_downstream_bears_the_wall():
-    """Of an outfall 45 m deep, whose pipe one metre of drive strains."""
+    """An outfall 45 m deep, whose pipe one metre of drive strains."""
     deep = {"drive.pressure": "46 m", "downstream.pressure": "45 m", "materials.strain_level": "10 %"}
     keys = [f"{name}={value}" for name, value in {**deep, "mesh.around": 6, "mesh.along": 8}.items()]
     session = Session(load_case("cases/dbv4-wide.toml", keys))

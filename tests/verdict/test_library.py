@@ -167,7 +167,7 @@ def test_a_level_without_noise_is_no_oscillation():
     ],
 )
 def test_dates_of_control_systems_are_read(form, separator, decimal, day, command_line, tmp_path):
-    """Those with the day before a slash over the midnights after which they were in another month."""
+    """Dates with the day before a slash, over the midnights after which they were in another month."""
     start = datetime(2026, 3, day, 23 if "%d/%m" in form else 11, 59, 57)
     head = "stamp" if separator not in form else f"date{separator}time"
     rows = [f"{head}{separator}p [bar]"]

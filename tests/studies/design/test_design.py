@@ -200,7 +200,7 @@ def test_the_margin_of_uncertain_loss_factors_is_that_of_the_numbers_written_out
     ("name", "text"), [("thickness", "normal(0.98, 0.01)"), ("damping.beta", "lognormal(2.7e-3, 1.05)")]
 )
 def test_the_margin_of_inputs_whose_medians_are_not_the_numbers_of_the_case(name, text):
-    """That of the valve at the 5 % quantile of its one input: a variable of the design, and a number of the case."""
+    """Margin of the valve at the 5 % quantile of its one input: a variable of the design, and a number of the case."""
     problem = DesignProblem(load_small(KEYS, ASKED, {"uncertainty.inputs": {name: text}}).case)
     here = problem.at(tuple(one.start for one in problem.variables), 6e3, True)
     ends, margins = problem.inputs[0].distribution.at(np.array([-1.645, 1.645])), []

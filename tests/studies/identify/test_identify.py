@@ -319,7 +319,7 @@ def test_the_range_without_one_lies_where_something_flows_and_holds_the_records(
     ],
 )
 def test_inputs_that_a_place_names_or_the_range_moves_are_refused(inputs, keys, name, refused):
-    """What the place or the range says stood in for them, and the valve of the record was another one."""
+    """Numbers of the place or the range stood in for them, and the valve of the record was another one."""
     record = {"frequency": 20.0, "frequency_interval": 0.1, "at": "pressure=3 kPa, density=1025"}
     words = f"holds '{name}', which the place of a record or the range of identify moves; one of them has to go"
     with refused(CaseError, match=words):
@@ -327,7 +327,7 @@ def test_inputs_that_a_place_names_or_the_range_moves_are_refused(inputs, keys, 
 
 
 def test_the_range_of_other_samples_takes_no_input_away():
-    """That of uncertainty, which identify does not walk; the file with what was learned has it no longer."""
+    """Range of uncertainty, which identify does not walk; the file with what was learned has it no longer."""
     case = load(MORE, **{"uncertainty.over": "pipe_length=2,4", "uncertainty.samples": 16}).case
     found = object.__new__(IdentifyResult)
     header, scores = SimpleNamespace(case=case), np.random.default_rng(1).standard_normal((400, len(MORE) + 2))

@@ -91,7 +91,7 @@ def test_cells_whose_mode_grows_too_slowly_to_be_counted_are_uncertain(case):
 
 
 def test_a_growing_mode_of_the_full_matrices_decides_whatever_the_count_says(case):
-    """Such cells are called unstable by the map, so that they are not told as uncertain, and by each class."""
+    """Cells that flutter without a count are unstable to the map and to each class, and not told as uncertain."""
     plan = MapPlan(case.replace({"map.symmetry": "all"}))
     proven = Sample(1.0, np.array([5 + 60j]), unstable=2, counted=0, how=DIRECT)
     cells = dict.fromkeys(range(4), [proven] * len(plan.along.values))
