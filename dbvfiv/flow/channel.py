@@ -18,6 +18,7 @@ Equations (T.9), (T.10), (T.11) and (T.31) of docs/theory.md.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import partial
 
 import jax
 import jax.numpy as jnp
@@ -111,8 +112,7 @@ class Channel(FlowLaw):
                 continue
             for sign in (1.0, -1.0):
                 (head, momentum), (more_head, more_momentum) = (
-                    [np.asarray(part(_trial(self.count, size), parameters)) for part in (term.head, term.momentum)]
-                    for size in (sign, 3.0 * sign)
+                    map(np.asarray, _trial(term, self.count, size, parameters)) for size in (sign, 3.0 * sign)
                 )
                 if not (np.allclose(more_head, 9.0 * head) and np.allclose(more_momentum, 3.0 * momentum)):
                     raise ValueError(
@@ -201,6 +201,7 @@ class Channel(FlowLaw):
         """Momenta (m,) that the terms add; traceable."""
         return sum((term.momentum(stream, parameters) for term in self.terms), jnp.zeros_like(stream.speed))
 
+    @jax.jit
     def sources(self, area, area_rate, inner, parameters, drive=None):
         """Heads (m + 1,), m2/s2, as `FlowLaw.sources` has them; `drive` is the static one at the flange over `back`."""
         source, back = self.supply(parameters)
@@ -211,6 +212,7 @@ class Channel(FlowLaw):
             return jnp.append(still + self.front * (head - source + back), 0.0)
         return self._outlet_behind(head + self.static / parameters["density"])
 
+    @jax.jit
     def held(self, area, area_rate, inner, parameters):
         psi = self.psi(area, area_rate, inner, parameters)
         if self.sealed:
@@ -244,6 +246,7 @@ class Channel(FlowLaw):
         """Derivative (m + 1,) of `sources` by the enthalpy at the flange."""
         return jnp.append(self.front, 0.0) if self.sealed else self._outlet_behind(jnp.ones(self.count))
 
+    @jax.jit
     def speeds_of(self, area, area_rate, inner, parameters):
         return self.speeds(area, area_rate, inner[0], self._blend(parameters))
 
@@ -258,6 +261,7 @@ class Channel(FlowLaw):
         ratio = jnp.maximum((open_[-1] / open_[0]) ** 2 - 1.0, 0.1)
         return jnp.sqrt(2.0 * jnp.abs(parameters["inlet"] - self.back) / (parameters["density"] * ratio))[None] + 1e-3
 
+    @jax.jit
     def steady(self, area, parameters):
         """Bernoulli's pressures, which depend on ratios of areas only; heads go with the square of the discharge. The
         flow of a viscous fluid is searched for.
@@ -294,11 +298,13 @@ class Channel(FlowLaw):
         before = jnp.append(0.0, half)
         return before, jnp.append(half, 0.0) + before
 
+    @jax.jit
     def displaced(self, area, area_rate, storage):
         """Inlet velocity, m/s, of what the wall displaces in front of the seal; traceable."""
         open_, opening = jax.jvp(lambda a: above_floor(a, self.floor), (area,), (area_rate,))
         return storage * jnp.sum(self.spans[1] * opening) / open_[-1]
 
+    @jax.jit
     def at_seal(self, area, parameters):
         """Parameters with the inlet pressure, Pa, that fluid at rest in front of a seal has: that of a pump that
         delivers nothing; traceable.
@@ -314,13 +320,13 @@ class Channel(FlowLaw):
         With the discharges Q_k that the wall displaces, by trapezoids, the kinetic energy is rho/2 sum_k l_k Q_k^2/A_k,
         and pressures follow from it, so that they feed no motion.
         """
-        return np.asarray(self.spans[1]) * np.asarray(jax.grad(lambda a: above_floor(a, self.floor).sum())(area))
+        return np.asarray(_work_lengths(self, area))
 
     def with_displaced(self, area, area_rate, inner):
         if not self.sealed:
             return inner
         found = np.array(inner, float)
-        found[0] = self.displaced(jnp.asarray(area), jnp.asarray(area_rate), self.storage if self.unsteady else 0.0)
+        found[0] = self.displaced(area, area_rate, self.storage if self.unsteady else 0.0)
         return found
 
     def without_drives(self) -> Channel:
@@ -334,11 +340,19 @@ class Channel(FlowLaw):
         return self.changed(reversible=True)
 
 
-def _trial(count: int, size: float) -> Stream:
-    """A stream of some size to try terms on."""
-    area = np.linspace(2.0, 5.0, count)
+@jax.jit
+def _work_lengths(channel, area):
+    return channel.spans[1] * jax.grad(lambda a: above_floor(a, channel.floor).sum())(area)
+
+
+@partial(jax.jit, static_argnames="count")
+def _trial(term, count, size, parameters):
+    """Head and momentum (m,) of a term in a stream of some size."""
+    area = jnp.linspace(2.0, 5.0, count)
     speed = size / area
-    return Stream(area, size * np.linspace(0.1, 0.3, count), speed, speed[-1:], area, step=np.ones(count - 1))
+    opening, step = size * jnp.linspace(0.1, 0.3, count), jnp.ones(count - 1)
+    stream = Stream(area, opening, speed, speed[-1:], area, step=step)
+    return term.head(stream, parameters), term.momentum(stream, parameters)
 
 
 def outward_head(speed, velocity):

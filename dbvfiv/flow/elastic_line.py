@@ -330,12 +330,14 @@ class LineChannel(AroundChannel):
     # -- the definition
     # ----
 
+    @jax.jit
     def held(self, area, area_rate, inner, parameters):
         own, velocity, pressure = self.split(inner, parameters)
         momentum, stored = self.line.held(velocity, pressure, area[-1], parameters)
         passage = self.channel.held(area, area_rate, own, parameters) - self.channel.drive_share * momentum[-1]
         return jnp.concatenate([passage, momentum[:-1], stored])
 
+    @jax.jit
     def sources(self, area, area_rate, inner, parameters):
         own, velocity, pressure = self.split(inner, parameters)
         source, back = self.channel.supply(parameters)
@@ -349,6 +351,7 @@ class LineChannel(AroundChannel):
         line = jnp.full(self.line.size, parameters["density"])
         return jnp.concatenate([self.channel.scales(area, parameters), line])
 
+    @jax.jit
     def speeds_of(self, area, area_rate, inner, parameters):
         return self.channel.speeds_of(area, area_rate, inner[: self.channel.inner], parameters)
 
@@ -384,6 +387,7 @@ class LineChannel(AroundChannel):
     def reversed(self) -> LineChannel:
         return self.changed(channel=self.channel.reversed())
 
+    @jax.jit
     def steady(self, area, parameters):
         """Steady flow of the rigid column of fluid, with a uniform velocity in the line."""
         source, _ = self.channel.supply(parameters)

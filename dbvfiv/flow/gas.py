@@ -27,6 +27,7 @@ Equations (T.23), (T.24) and (T.25) of docs/theory.md.
 
 from __future__ import annotations
 
+from functools import partial
 from typing import ClassVar
 
 import jax
@@ -35,7 +36,7 @@ import numpy as np
 
 from .channel import AroundChannel, Channel
 from .energy import GAS_BOOKS, gas_books, gas_energy, gas_powers
-from .law import FlowParameter, above_floor, newton_step
+from .law import FlowParameter, above_floor, newton_step, with_derivatives
 
 #: Relative error of the frequency of waves that counts as resolved; the box scheme's is (k h)^2/12.
 _RESOLVED = 0.01
@@ -146,6 +147,7 @@ class GasChannel(AroundChannel):
         over = jnp.log(jnp.maximum(speed / c, 1.0))
         return 2.0 * c / (parameters["heat_capacity_ratio"] - 1.0) * over
 
+    @jax.jit
     def split(self, inner, parameters):
         """Velocities (m,), m/s, and sigma (m,), m/s, at the stations from the law's unknowns; traceable."""
         speed, sigma = jnp.concatenate([inner[1 : self.count], inner[:1]]), inner[self.count :]
@@ -223,9 +225,11 @@ class GasChannel(AroundChannel):
         mass = jnp.full(self.count - 1, density * parameters["sound_speed"]) / above_floor(area[-1], self.floor)
         return jnp.concatenate([jnp.ones(self.count), jnp.full(self.count, density), mass])
 
+    @jax.jit
     def held(self, area, area_rate, inner, parameters):
         return jnp.concatenate([jnp.zeros(self.count), self.stored(area, area_rate, inner, parameters)])
 
+    @jax.jit
     def sources(self, area, area_rate, inner, parameters, drive=None):
         """As `FlowLaw.sources` has them; `drive` is the enthalpy at the flange, m2/s2, where a line stands in front."""
         _, sigma = self.split(inner, parameters)
@@ -246,6 +250,7 @@ class GasChannel(AroundChannel):
         found = self.enthalpy(self.compression(parameters["inlet"] - self.channel.back, parameters), parameters)
         return found, 0.0
 
+    @jax.jit
     def at_seal(self, area, parameters):
         """As `Channel.at_seal`; the head of a pump is an enthalpy."""
         c, slope = parameters["sound_speed"], parameters["heat_capacity_ratio"] - 1.0
@@ -279,16 +284,14 @@ class GasChannel(AroundChannel):
         sigma = self.compression(jnp.maximum(pressure - self.channel.static, least), parameters)
         return jnp.concatenate([speed[-1:], speed[:-1], sigma[1:]])
 
+    @jax.jit
     def steady(self, area, parameters):
-        """Searched for; none where no pressure drives it. Newton's steps end the search, two through which derivatives
-        are traced; see `dbvfiv.flow.law.solve_steady`.
-        """
+        """Searched for; none where no pressure drives it. See `dbvfiv.flow.law.with_derivatives`."""
         own, still = self.without_drives(), parameters["inlet"] == self.channel.back
         # a pressure of 1 Pa drives the flow where there is none
         driven = {**parameters, "inlet": jnp.where(still, self.channel.back + 1.0, parameters["inlet"])}
         inner = _settled(*jax.lax.stop_gradient((own, area, driven)))
-        for _ in range(2):
-            inner = inner + _newton_step(own, area, driven, inner)
+        inner = with_derivatives(partial(_newton_step, own, area, driven), inner)
         _, sigma = own.split(inner, parameters)
         pressure, over = self.pressure(sigma, parameters), parameters["inlet"] - self.channel.back
         # where nothing flows their derivative by the inlet pressure is that of the flow that 1 Pa drives
@@ -308,6 +311,7 @@ class GasChannel(AroundChannel):
         """
         return density * self.sound_speed**2 / self.ratio < GAS
 
+    @jax.jit
     def speeds_of(self, area, area_rate, inner, parameters):
         return self.split(inner, parameters)[0]
 

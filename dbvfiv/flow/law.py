@@ -230,7 +230,7 @@ class FlowLaw(Traceable, ABC):
 
     def at_rest(self, area, inner, parameters: Mapping[str, Any]) -> tuple[Any, Any]:
         """`equations` of a passage at rest with constant inner unknowns; traceable."""
-        return self.equations(FlowMotion.still(area, inner), parameters)
+        return self.changed(unsteady=False).equations(FlowMotion.still(area, inner), parameters)
 
     def steady_start(self, area, parameters: Mapping[str, Any]):
         """Initial guess of the steady inner unknowns (l,); traceable."""
@@ -339,12 +339,12 @@ class FlowLaw(Traceable, ABC):
 
     def steady_operator(self, area: np.ndarray, inlet: float) -> tuple[np.ndarray, np.ndarray]:
         """Steady pressures (m,) and their derivative (m, m) with respect to the areas."""
-        slope, pressure = _steady_operator(self, area, self._driven(inlet))
+        slope, _, pressure = _steady_operator(self, area, self._driven(inlet))
         return np.asarray(pressure), np.asarray(slope)
 
     def steady_slope(self, area: np.ndarray, inlet: float) -> np.ndarray:
         """Derivative (m,) of the steady pressures by the inlet pressure."""
-        return np.asarray(_steady_slope(self, area, self._driven(inlet)))
+        return np.asarray(_steady_operator(self, area, self._driven(inlet))[1])
 
     def _driven(self, inlet: float) -> dict[str, float]:
         """Parameters for steady pressures."""
@@ -449,8 +449,9 @@ class FlowLaw(Traceable, ABC):
         return motion._replace(inner=inner.astype(float), inner_rate=rate.astype(float))
 
 
-#: Newton steps within which the steady flow must be found, and the relative size of the last one.
-_STEPS, _TOLERANCE = 60, 1e-12
+#: Newton steps within which a flow must be found, and the relative size of the last one; what rounding may leave of it,
+#: where steps no longer fall.
+_STEPS, _TOLERANCE, _ROUNDING = 60, 1e-11, 1e-9
 
 
 def along(function, *directions):
@@ -475,60 +476,79 @@ def _linearised(law, motion, parameters):
 
 @jax.jit
 def _steady_operator(law, area, parameters):
-    """Derivative (m, m) of the steady pressures by the areas, and they (m,)."""
-    return jax.jacfwd(lambda x: (law.steady(x, parameters)[0],) * 2, has_aux=True)(area)
+    """Derivatives (m, m) and (m,) of the steady pressures by the areas and by the inlet pressure, and they (m,)."""
 
+    def pressures(area, inlet):
+        return (law.steady(area, {**parameters, "inlet": inlet})[0],) * 2
 
-@jax.jit
-def _steady_slope(law, area, parameters):
-    """Derivative (m,) of the steady pressures by the inlet pressure."""
-    inlet = parameters["inlet"]
-    return jax.jacfwd(lambda p: law.steady(area, parameters | {"inlet": p})[0])(inlet)
+    slopes, found = jax.jacfwd(pressures, (0, 1), has_aux=True)(area, parameters["inlet"])
+    return *slopes, found
 
 
 def solve_steady(law, area, parameters):
     """Pressures (m,) and inner unknowns (l,) at which the law's equations are met in a passage at rest; traceable.
 
-    Newton's method finds the unknowns. Two more steps, through which derivatives are traced, leave them where they are
-    and make their derivatives by areas and parameters exact up to the third: each step doubles the order, as it does
-    the digits. Not numbers where the search fails.
+    Newton's method finds the unknowns. Not numbers where the search fails.
     """
     inner = jnp.zeros(0)
     if law.inner:
-        inner = _root(*jax.lax.stop_gradient((law, area, parameters)))
-        for _ in range(2):
-            inner = inner + _newton_step(law, area, parameters, inner)
+        still = jax.lax.stop_gradient((law, area, parameters))
+        inner = find_root(partial(_newton_step, *still), still[0].steady_start(*still[1:]))
+        inner = with_derivatives(partial(_newton_step, law, area, parameters), inner)
     return law.at_rest(area, inner, parameters)[0], inner
-
-
-def newton_step(function, at):
-    """Step of Newton's method from a place (l,) towards a zero (l,) of a function; traceable."""
-    return -jnp.linalg.solve(jax.jacfwd(function)(at), function(at))
 
 
 def _newton_step(law, area, parameters, inner):
     return newton_step(lambda x: law.at_rest(area, x, parameters)[1], inner)
 
 
-def _root(law, area, parameters):
-    """Inner unknowns (l,) by Newton's method, a step halved as long as it makes the next one longer."""
+def with_derivatives(step_at, inner):
+    """Unknowns (l,) after two more steps of Newton's method, which leave them where they are and make their derivatives
+    by all that the steps depend on exact up to the third: each step doubles the order, as it does the digits;
+    traceable.
+    """
+    return jax.lax.fori_loop(0, 2, lambda _, x: x + step_at(x), inner)
+
+
+def newton_step(function, at):
+    """Step of Newton's method from a place (l,) towards a zero (l,) of a function; traceable."""
+    slope, value = jax.jacfwd(lambda x: (function(x),) * 2, has_aux=True)(at)
+    return -jnp.linalg.solve(slope, value)
+
+
+def find_root(step_at, start, least=0.0):
+    """Zero (l,) by Newton's method, a step halved as long as it makes the next one longer; not numbers where it is not
+    found; traceable.
+
+    Parameters
+    ----------
+    step_at : callable
+        Step of Newton's method from a place (l,).
+    start : (l,) array
+    least : float
+        Length of a last step that is small enough whatever the size of the zero.
+    """
+
+    def small(inner, step, share):
+        return jnp.linalg.norm(step) <= share * jnp.linalg.norm(inner) + least
 
     def advance(carried):  # a step is evaluated at one place of the code, which takes long to compile
-        inner, step, fraction, count = carried
+        inner, step, fraction, count, _ = carried
         there = inner + fraction * step
-        new = _newton_step(law, area, parameters, there)
-        taken = (count < 0) | (fraction <= 1e-3) | (jnp.linalg.norm(new) <= jnp.linalg.norm(step))
+        new = step_at(there)
+        before, after = jnp.linalg.norm(step), jnp.linalg.norm(new)
+        taken = (count < 0) | (fraction <= 1e-3) | (after <= before)
+        stays = taken & (count >= 0) & small(there, step, _ROUNDING) & ~(after <= 0.5 * before)
         inner, step = jnp.where(taken, there, inner), jnp.where(taken, new, step)
-        return inner, step, jnp.where(taken, 1.0, 0.5 * fraction), count + taken
+        return inner, step, jnp.where(taken, 1.0, 0.5 * fraction), count + taken, stays
 
     def goes_on(carried):
-        inner, step, _, count = carried
-        return (count < 0) | ((count < _STEPS) & (jnp.linalg.norm(step) > _TOLERANCE * jnp.linalg.norm(inner)))
+        inner, step, _, count, stays = carried
+        return (count < 0) | ((count < _STEPS) & ~stays & ~small(inner, step, _TOLERANCE))
 
-    start = law.steady_start(area, parameters)
-    inner, step, *_ = jax.lax.while_loop(goes_on, advance, (start, jnp.zeros_like(start), jnp.ones(()), -1))
-    found = jnp.linalg.norm(step) <= _TOLERANCE * jnp.linalg.norm(inner)
-    return jnp.where(found, inner, jnp.nan)
+    begin = start, jnp.zeros_like(start), jnp.ones(()), -1, False
+    inner, step, _, _, stays = jax.lax.while_loop(goes_on, advance, begin)
+    return jnp.where(stays | small(inner, step, _TOLERANCE), inner + step, jnp.nan)
 
 
 class UniformLoad(FlowLaw):

@@ -39,11 +39,10 @@ import numpy as np
 
 from ..errors import SolveError
 from .energy import GAS_BOOKS, LINE_BOOKS, BookStep, Instant
-from .law import FlowLaw, FlowMotion, call_compiled, newton_step
+from .law import FlowLaw, FlowMotion, call_compiled, find_root, newton_step
 
-#: Newton steps within which the flow of a step must be found, and the size of the last one, relative and absolute; what
-#: rounding may leave of it, where steps no longer fall.
-_STEPS, _TOLERANCE, _SMALLEST, _ROUNDING = 40, 1e-11, 1e-12, 1e-9
+#: Length of Newton's last step to the flow of a step that is small enough where nothing flows.
+_SMALLEST = 1e-12
 #: Inlet velocity, m/s, beyond which no root is looked for.
 _RUNAWAY = 1e12
 #: Share of a step at which the equations of a compressed fluid are met, and r, for the difference of second order.
@@ -454,40 +453,11 @@ def _advanced(law, parameters, mid, new, old, theta, weight, known, start):
     """Unknowns (l,), pressures (m,), what is held (m + l,) and speeds (m,); not numbers where none are found."""
     values = partial(_values, law, parameters, mid, new, old, theta, weight, known)
     residual = lambda inner: values(inner)[law.count :]  # noqa: E731
-    inner = _next_root(residual, start) if law.inner == 1 else _newton(residual, start)
+    inner = (
+        _next_root(residual, start) if law.inner == 1 else find_root(partial(newton_step, residual), start, _SMALLEST)
+    )
     held = law.held(*new, inner, parameters)
     return inner, values(inner)[: law.count], held, law.speeds_of(*new, inner, parameters)
-
-
-def _newton(residual, start):
-    """Zero (l,) by Newton's method, a step halved as long as the next one by it is longer."""
-    step_at = partial(newton_step, residual)
-
-    def longer(tried):
-        fraction, inner, step, _, after = tried
-        return (fraction > 1e-3) & ~(jnp.linalg.norm(after) <= jnp.linalg.norm(step))
-
-    def halved(tried):
-        fraction, inner, step, _, _ = tried
-        there = inner + 0.5 * fraction * step
-        return 0.5 * fraction, inner, step, there, step_at(there)
-
-    def small(inner, step, share):
-        return jnp.linalg.norm(step) <= share * jnp.linalg.norm(inner) + _SMALLEST
-
-    def advance(carried):
-        inner, step, count, _ = carried
-        there = inner + step
-        tried = jax.lax.while_loop(longer, halved, (jnp.ones(()), inner, step, there, step_at(there)))
-        stays = small(there, step, _ROUNDING) & ~(jnp.linalg.norm(tried[4]) <= 0.5 * jnp.linalg.norm(step))
-        return tried[3], tried[4], count + 1, stays
-
-    def goes_on(carried):
-        inner, step, count, stays = carried
-        return (count < _STEPS) & ~stays & ~small(inner, step, _TOLERANCE)
-
-    inner, step, _, stays = jax.lax.while_loop(goes_on, advance, (start, step_at(start), 0, False))
-    return jnp.where(stays | small(inner, step, _TOLERANCE), inner + step, jnp.nan)
 
 
 def _next_root(residual, start):

@@ -133,7 +133,7 @@ class LoadSteps:
             if straight is not None and abs(step) < max(smallest, WIDE**2 * abs(target - self.origin)):
                 # the path ends, as at a limit point: what lies beyond is where Newton's method strays to
                 straight, step = None, target - self.pressure
-            elif abs(step) <= smallest:
+            elif abs(step) < smallest * (1 - 1e-12):
                 raise SolveError(
                     f"No equilibrium was found between {self.pressure:.6g} Pa, the last one, and {aim:.6g} "
                     f"Pa on the way to {target:.6g} Pa: "

@@ -62,7 +62,7 @@ def test_onsets_under_both_laws_are_those_of_each():
     assert law == "storage"
     assert (low, high) == pytest.approx((other.points[0]["value"], found.points[0]["value"]), rel=1e-6)
     assert "(stable under storage alone)" in found.comparison and "conserves volume" in found.comparison
-    assert "other_law" in found.summary() and "Under storage continuity:" in "\n".join(found.lines())
+    assert "other_law" in found.summary() and "Under storage continuity;" in "\n".join(found.lines())
 
 
 @pytest.mark.parametrize(

@@ -61,6 +61,7 @@ class Pump(FlowTerm):
         before, after = ([0.0, 0.0, slope, value] for value, slope in ends)
         self.series = np.column_stack([before, inside.c, after])
 
+    @jax.jit
     def curve(self, flow):
         """Head, m, of a flow, m3/s; traceable."""
         place = jnp.searchsorted(self.flow, flow, side="right")
