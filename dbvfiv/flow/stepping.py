@@ -195,7 +195,7 @@ class MovingFluid:
         if seal not in self._behind:
             law = open_.law.shut(seal)
             self._behind[seal] = open_ if law is open_.law else open_._with(law)
-        if self._behind[seal] is open_ or speed[0] == 0.0:  # also where a seal grows inwards
+        if self._behind[seal] is open_ or speed[seal] == 0.0:
             return self._behind[seal]
         passing = abs(speed) * open_.law.open_area(area)
         film = open_.steady_inner(area, inlet)[0] * open_.law.open_area(area)[-1]

@@ -64,12 +64,3 @@ def test_steady_flow_of_a_long_step_is_that_of_the_law(terms):
     flow = fluid.step(state, still, 1e9, 1.0, 1.0, INLET).at(still, still)
     assert flow.inner[0] == pytest.approx(fluid.law.inlet_velocity(area, INLET, DENSITY), rel=1e-8)
     assert flow.pressure == pytest.approx(fluid.law.steady_pressure(area, INLET), rel=1e-7, abs=1e-5)
-
-
-def test_a_seal_that_grows_inwards_stays_one():
-    """Fluid squeezed out from between the old seal and the new one passes neither; a film in an open passage does."""
-    z, area = passage()
-    fluid, speed = MovingFluid(Channel(z, FLOOR, 1.0), DENSITY, lambda area: 3), np.full(len(z), -50.0)
-    assert not fluid.facing(area, speed, 18e3).law.sealed
-    speed[:3] = 0.0
-    assert fluid.facing(area, speed, 18e3).law.sealed
