@@ -96,7 +96,7 @@ def test_sigterm_twice_and_in_time(tmp_path, pause):
         pytest.param(signal.SIGKILL, -9, marks=pytest.mark.slow),
     ],
 )
-def test_workers_of_a_map_end_with_it(tmp_path, number, status):
+def test_a_map_ends_with_all_its_processes(tmp_path, number, status):
     path = tmp_path / "m.h5"
     arguments = ("map", *COARSE, "--x", "density=1:100:300:log", "--y", "alpha=0.1:30:4:log", "--workers", 2)
     run = start(*arguments, "-o", path, start_new_session=True)
