@@ -210,9 +210,7 @@ class ElasticLine(Traceable):
         """Total pressure at the far end over the density, m2/s2, from the velocity there referred to the flange and the
         enthalpy of what drives the flow.
         """
-        speed = self.line.section(inlet_area)[1] * velocity
-        gained = jnp.minimum(speed, 0.0) if self.line.reservoir else speed
-        head = source + 0.5 * gained**2
+        head = source + 0.5 * self.line.far_speed(velocity, inlet_area) ** 2
         if self.pump is None or steady:
             return head
         return head + self.pump.gain(velocity, inlet_area, parameters)

@@ -36,7 +36,7 @@ import numpy as np
 
 from .channel import AroundChannel, Channel
 from .energy import GAS_BOOKS, gas_books, gas_energy, gas_powers
-from .law import FlowParameter, above_floor, newton_step, with_derivatives
+from .law import FlowParameter, above_floor, step_at_rest, with_derivatives
 
 #: Relative error of the frequency of waves that counts as resolved; the box scheme's is (k h)^2/12.
 _RESOLVED = 0.01
@@ -291,7 +291,7 @@ class GasChannel(AroundChannel):
         # a pressure of 1 Pa drives the flow where there is none
         driven = {**parameters, "inlet": jnp.where(still, self.channel.back + 1.0, parameters["inlet"])}
         inner = _settled(*jax.lax.stop_gradient((own, area, driven)))
-        inner = with_derivatives(partial(_newton_step, own, area, driven), inner)
+        inner = with_derivatives(partial(step_at_rest, own, area, driven), inner)
         _, sigma = own.split(inner, parameters)
         pressure, over = self.pressure(sigma, parameters), parameters["inlet"] - self.channel.back
         # where nothing flows their derivative by the inlet pressure is that of the flow that 1 Pa drives
@@ -376,24 +376,13 @@ class GasChannel(AroundChannel):
         return flow[0], flow[-1], jnp.max(jnp.abs(speed) / self.local_sound_speed(sigma, parameters))
 
 
-def _left(law: GasChannel, area, parameters, inner):
-    """Residual of the equations (l,), Pa, in a passage whose walls are at rest."""
-    balance = law.balances(area, jnp.zeros_like(area), inner, parameters)
-    return law.scales(area, parameters)[law.count :] * balance
-
-
-def _newton_step(law: GasChannel, area, parameters, inner):
-    return newton_step(lambda x: _left(law, area, parameters, x), inner)
-
-
 def _settling_step(law: GasChannel, area, parameters, inner):
     """Change (l,) of the unknowns in an implicit step of time, the longer the less is left."""
     c, still = parameters["sound_speed"], jnp.zeros_like(area)
-    left = _left(law, area, parameters, inner)
+    slope, left = jax.jacfwd(lambda x: (law.at_rest(area, x, parameters)[1],) * 2, has_aux=True)(inner)
     passing = jnp.sum(law.channel.step) / c  # time that a wave takes
     rate = jnp.linalg.norm(left) / (_USUAL * parameters["density"] * c * c * passing)
     held = jax.jacfwd(law.stored, 2)(area, still, inner, {**parameters, "storage": 1.0})
-    slope = jax.jacfwd(_left, 3)(law, area, parameters, inner)
     return -jnp.linalg.solve(slope + rate * law.scales(area, parameters)[law.count :, None] * held, left)
 
 

@@ -493,12 +493,13 @@ def solve_steady(law, area, parameters):
     inner = jnp.zeros(0)
     if law.inner:
         still = jax.lax.stop_gradient((law, area, parameters))
-        inner = find_root(partial(_newton_step, *still), still[0].steady_start(*still[1:]))
-        inner = with_derivatives(partial(_newton_step, law, area, parameters), inner)
+        inner = find_root(partial(step_at_rest, *still), still[0].steady_start(*still[1:]))
+        inner = with_derivatives(partial(step_at_rest, law, area, parameters), inner)
     return law.at_rest(area, inner, parameters)[0], inner
 
 
-def _newton_step(law, area, parameters, inner):
+def step_at_rest(law, area, parameters, inner):
+    """Step (l,) of Newton's method towards the steady inner unknowns; traceable."""
     return newton_step(lambda x: law.at_rest(area, x, parameters)[1], inner)
 
 

@@ -22,10 +22,14 @@ from ..term import FlowTerm
 class _Pipes(FlowTerm):
     """Head and inertance of pipes in series, whose `parts`, `section`, `length` and `reservoir` a subclass has."""
 
+    def far_speed(self, velocity, inlet_area):
+        """Speed, m/s, at the far end whose kinetic energy adds to the head that drives; none out of a reservoir."""
+        speed = self.section(inlet_area)[1] * velocity
+        return jnp.minimum(speed, 0.0) if self.reservoir else speed
+
     def head(self, stream, parameters):
         inlet, velocity = stream.area[-1], stream.velocity
-        speed = self.section(inlet)[1] * velocity
-        gained = jnp.minimum(speed, 0.0) if self.reservoir else speed
+        gained = self.far_speed(velocity, inlet)
         stretch, lost = parameters["pipe_length"] / self.length, 0.0
         for part in self.parts:
             diameter, ratio = part.section(inlet)
