@@ -98,7 +98,8 @@ def candidates_of(result: StudyResult, error: float) -> list[Candidate]:
         ]
     elif result.kind == "transient":
         seen = result.history["time"] >= result.judged_from
-        verdict = judge_record(*(result.history[name][seen] for name in ("time", "lip_displacement")), gaps=False)
+        signal = (result.history[name][seen] for name in ("time", "lip_displacement"))
+        verdict = judge_record(*signal, gaps=False, mains=())
         found = [
             Candidate(
                 "run" if number == 0 else f"run, line {number + 1}",
@@ -213,7 +214,7 @@ class Recognition:
             part = judged.signal.between(*judged.verdict.judged)
             if len(part.time) >= 16:
                 frequency, amplitude = spectrum(Series.of(part.time, part.values))
-                lower.semilogy(frequency, np.maximum(amplitude, 1e-6 * amplitude.max()), lw=1.0, label=part.name)
+                lower.semilogy(frequency, np.maximum(amplitude, max(1e-6 * amplitude.max(), 1e-300)), lw=1.0, label=part.name)
         upper.axhline(0.0, color="black", lw=0.8)
         upper.set_ylabel("Damping ratio, %")
         lower.set(xlabel="Frequency, Hz", ylabel="Amplitude of the record", xlim=(0, 1.2 * highest))

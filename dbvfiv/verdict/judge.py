@@ -306,7 +306,8 @@ def judge(
     time, values, facts = longest_samples(time, values, gaps)
     if len(values) < _FEWEST:
         words = f"There are fewer than {_FEWEST} samples{' between two gaps' if gaps and facts['notes'] else ''}."
-        return Verdict("undecided", False, words, mean=float(values[-1]), amplitude=0.0, rms=0.0, **facts)
+        sizes = {"mean": float(values.mean()), "amplitude": 0.5 * float(np.ptp(values)), "rms": float(values.std())}
+        return Verdict("undecided", False, words, **sizes, **facts)
     found = _judge(Series.of(time, values), options, residual, closed_below)
     return replace(found, **facts)
 

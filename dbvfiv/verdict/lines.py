@@ -28,8 +28,9 @@ _MOST, _SMALLEST, LEVEL = 12, 0.01, 5
 _NEAR = 10.0
 #: Rounds of a fit to clipped samples at most, and relative change of its amplitudes at which it ends.
 _HIDDEN, _SETTLED = 60, 1e-6
-#: Multiples of the mains looked for, and how far off, Hz, the mains may be.
-_MULTIPLES, _OFF = 8, 0.2
+#: Multiples of the mains looked for, how far off, Hz, the mains may be, and their cycles without which a record does
+#: not tell them from what oscillates.
+_MULTIPLES, _OFF, _CYCLES = 8, 0.2, 5
 
 
 @dataclass(frozen=True)
@@ -457,6 +458,8 @@ def mains_lines(series: Series, left: np.ndarray, mains: Sequence[float]) -> tup
     part = Series(series.start, series.step, left)
     power, floor = density(left, series.step)
     for own in mains:
+        if own * series.duration < _CYCLES:
+            continue
         found = []
         for multiple in range(1, _MULTIPLES + 1):
             wide = max(_OFF * multiple, 1.0 / series.duration)

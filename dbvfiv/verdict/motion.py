@@ -88,7 +88,7 @@ def _candidates(frequency: np.ndarray, power: np.ndarray, low: float):
         inner = np.flatnonzero((smooth[1:-1] > smooth[:-2]) & (smooth[1:-1] >= smooth[2:])) + 1
         inner = inner[(frequency[inner] > low) & (frequency[inner] < 0.9 * frequency[-1])]
         around = np.convolve(power, np.full(8 * length, 1.0 / (8 * length)), "same")
-        best = inner[np.argsort(-(smooth / around)[inner])[:_MOST]]
+        best = inner[np.argsort(-smooth[inner] / around[inner])[:_MOST]]
         for at in best:
             yield float(frequency[at]), length * step / _SMOOTHED
         length *= 3
@@ -171,8 +171,6 @@ _HELD = 0.3
 _FEW = 12
 #: Least of a ring-down, of its amplitude at the start, that is left where it has not died.
 _DIED = 0.02
-#: Cycles over which an amplitude is followed.
-_PARTS = 24
 
 
 @dataclass(frozen=True)
@@ -191,8 +189,6 @@ class Motion:
         Beginning of what was fitted.
     noise : float
         Root mean square of the noise.
-    left : float
-        Share of the power that neither lines nor level hold.
     returns : bool
         True where oscillations die and come back.
     base : float, Hz
@@ -207,7 +203,6 @@ class Motion:
     modulation: tuple[float, float] = (np.nan, np.nan)
     start: float = np.nan
     noise: float = np.nan
-    left: float = np.nan
     returns: bool = False
     base: float = np.nan
     level: float | np.ndarray = 0.0
@@ -218,6 +213,8 @@ _FASTEST = 0.4
 #: Least number of different values of a record that may be clipped; share of samples at a rail over that beside it,
 #: which is 2.4 at the crest of a sine that a converter has made steps of.
 _LEVELS, _CROWDED = 200, 4
+#: Largest of what a fit leaves over the largest value, below which it is rounding.
+_ROUNDING = 1e-11
 #: Frequencies of the mains, Hz.
 MAINS = (50.0, 60.0)
 #: Samples without which no line is sought, and motions that are one.
@@ -232,6 +229,7 @@ def judge_record(
     detrend: bool = True,
     closed_below: float | None = None,
     gaps: bool = True,
+    mains: Sequence[float] = MAINS,
 ) -> Verdict:
     """Verdict on a measured record: what oscillates under its noise, on a level that may drift; of what has no line the
     level, as `judge` has it.
@@ -242,6 +240,8 @@ def judge_record(
         As for `judge`.
     detrend : bool
         Take a polynomial level off.
+    mains : sequence of float, Hz
+        Frequencies that may be picked up; none in what is computed.
 
     Raises
     ------
@@ -256,19 +256,20 @@ def judge_record(
     if shut is not None and shut.name == "closed":
         return shut
     series = Series.of(time, values)
-    found = find_motion(series, detrend, MAINS)
+    found = find_motion(series, detrend, mains)
     if shut is not None and shut.name == "chatters" and found.name != "limit cycle":
         return shut
     if found.name not in _LINES:
         level = judged()
-        peaks = () if found.returns or level.name == "decaying" else resonances(series)
+        goes_one_way = level.name in ("decaying", "growing")
+        peaks = () if found.returns or goes_one_way else resonances(series)
         level = replace(level, lines=tuple(map(_summary, peaks)))
         if found.returns:
             return replace(level, name="irregular", decided=True, reason=found.reason)
         if found.name == "steady" and level.name != "steady":
             words = "Nothing stands out of its noise."
             return replace(level, name="steady", decided=True, reason=words, noise=found.noise, cycles=0, period=np.nan)
-        if level.name in ("steady", "decaying", "undecided"):
+        if goes_one_way or level.name in ("steady", "undecided"):
             return level
         return replace(level, name="irregular", decided=True, reason=found.reason)
     line = found.lines[0]
@@ -341,6 +342,8 @@ def find_motion(series: Series, detrend: bool = True, mains: Sequence[float] = (
     picked = mains_lines(series, flat.left, mains)
     base = fit(series, picked, level)
     picked = tuple(replace(line, called="mains") for line in base.lines)
+    if np.abs(base.left).max() <= _ROUNDING * np.abs(series.values).max():
+        return _without_lines(base, series, picked)
     frequency, margin, _, cell = strongest(base.left, series.step, 1.5 / series.duration)
     # slopes show what rings beside a level that moves
     steep, above, _, beside = strongest(np.diff(base.left), series.step, 1.5 / series.duration)
@@ -539,8 +542,10 @@ def _without_lines(fitted: Fit, series: Series, mains: tuple[Line, ...]) -> Moti
     bands = bands / bands.max() if bands.min() > 0 else bands  # squares of large values overflow
     filled = bands.mean() ** 2 / (bands**2).mean() if bands.min() > 0 else 0.0
     parts = np.array([part.std() for part in np.array_split(values, 4)])
-    if filled < FILLED or parts.max() > 1.5 * parts.min():
-        return Motion("irregular", "It moves without a line.", **facts)
-    if mains:
+    nothing = np.abs(values).max() <= _ROUNDING * np.abs(series.values).max()
+    even = filled >= FILLED and parts.max() <= 1.5 * parts.min()
+    if mains and (even or nothing):
         return Motion("mains", "Nothing but the mains.", **facts)
-    return Motion("steady", "It is noise.", **facts)
+    if even and not nothing:
+        return Motion("steady", "It is noise.", **facts)
+    return Motion("irregular", "It moves without a line.", **facts)
