@@ -146,7 +146,7 @@ def unstable_count(
         zeros = pencil.fluid.zeros
         hints += list(zeros[zeros.imag > 0])
     walk = _Walk(determinant, max_points, band)
-    walk.start(scale, hints, own)
+    walk.start(scale, hints, own, structure.slowest)
     walk.refine()
     return walk.count()
 
@@ -185,12 +185,15 @@ class _Walk:
         if sentence not in self.notes:
             self.notes.append(sentence)
 
-    def start(self, scale, hints, zeros=()):
+    def start(self, scale, hints, zeros=(), slowest=np.inf):
         self._add(0.0)
         self.smallest = 1e-9 * scale
         self.values.setdefault(0.0, 0j)  # kept as a place even where the value is lost
         steps = scale * 10.0 ** np.arange(-3, 1.01, 0.25)
-        places, widths = list(steps), []
+        # two real zeros that grow slowly turn the phase by nothing between places far above both
+        last = np.clip(np.log10(slowest / scale) - 3.0, -9.0, -3.0)
+        places = [*steps, *scale * 10.0 ** np.arange(-3.5, last, -0.5)]
+        widths = []
         if np.isfinite(self.turn):
             places += [self.turn, *(self.turn + steps)]
         for h, offsets in [*((h, OPTIONS.beside) for h in hints), *((h, (0,)) for h in zeros)]:

@@ -185,6 +185,14 @@ class Structure:
         """Estimates of the zeros of the oscillators in the upper half-plane, relative to the line."""
         return self._oscillators.zeros(self._relaxation)
 
+    @property
+    def slowest(self) -> float:
+        """Least rate of what creeps, 1/s: of overdamped oscillators and of relaxations; infinite where nothing does."""
+        damping, slow, _ = self._oscillators
+        creeping = damping**2 > 4.0 * slow
+        times = () if self._relaxation is None else self._relaxation.times
+        return float(min([*(slow[creeping] / damping[creeping]), *(1.0 / np.asarray(times))], default=np.inf))
+
     def _computed(self, z):
         response, total = solved(self._dynamic_stiffness(self.line + z), self._G)
         own = np.log(self._oscillators.values(self._relaxation, z)).sum(axis=1)

@@ -164,7 +164,7 @@ class Distribution:
         """The distribution as a case would hold it."""
         if self.form == "samples":
             return f"samples of {len(self.numbers)} values"
-        first, second = (f"{number:.4g} {quantity.si}".strip() for number in self.numbers)
+        first, second = map(quantity.amount, self.numbers)
         return (
             f"{self.form}({first}, {self.numbers[1]:.4g})"
             if self.form == "lognormal"

@@ -211,6 +211,11 @@ class Quantity:
         text = f"{value / factor:.15g} {self.shown}"
         return text if self.parse(text) == value else value
 
+    def amount(self, value: float, form: str = ".4g") -> str:
+        """A value in its usual unit, in words."""
+        unit = self.shown or self.si
+        return f"{value / (1.0 if unit == self.si else _factor(unit, self.si)):{form}} {unit}".strip()
+
     def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler):
         def parse(given: Any, info: core_schema.ValidationInfo) -> float:
             return self.parse(given, (info.context or {}).get("density"))

@@ -310,12 +310,13 @@ def fit_rubber(
         if given not in known:
             raise MaterialError(f"The {what} must be one of {', '.join(known)}, but {given!r} was given.")
     unknowns = len(form.names) + len(form.exponent_names)
-    different = len({(test.mode, float(s)) for test in tests for s in test.strain if s != 0.0})
+    counted = [(test.mode, float(s), p) for test in tests for s, p in zip(test.strain, test.stress) if s != 0.0]
+    different = len({(mode, s) for mode, s, p in counted if error == "absolute" or p != 0.0})
     if different < unknowns + 1:
         which = "tension test has" if len(tests) == 1 and tests[0].mode == "uniaxial" else "tests have"
         raise MaterialError(
-            f"A fit of {unknowns} constants needs at least {unknowns + 1} different strains other than zero, but the "
-            f"{which} {different}."
+            f"A fit of {unknowns} constants needs at least {unknowns + 1} different strains other than zero"
+            f"{', with stress' if error == 'relative' else ''}, but the {which} {different}."
         )
     problem = _Problem(tests, form, constraint, stable_to, error)
     return problem.describe(*problem.search())

@@ -186,9 +186,10 @@ class MovingFluid:
         self.traced = jax.device_put(law.reversed())
         self._behind: dict[int | None, MovingFluid] = {None: self}
 
-    def facing(self, area: np.ndarray, speed: np.ndarray, inlet: float) -> MovingFluid:
-        """The fluid of a step from areas and speeds (m,) under an inlet pressure, Pa: this one, or still in front of a
-        seal; of a liquid that is compressed a film passes, since stopping it would be a blow.
+    def facing(self, area: np.ndarray, speed: np.ndarray, inlet: float | None = None) -> MovingFluid:
+        """The fluid of areas and speeds (m,): this one, or still in front of a seal. What moves comes to rest in a new
+        state under an inlet pressure, Pa, where no more than a film passes the seal; without one it is a state that
+        has been found, which keeps its law. A liquid that is compressed passes, since stopping it would be a blow.
         """
         open_ = self._behind[None]
         seal = None if open_.compressed and not open_.quiet_inward else self.seal(area)
@@ -197,6 +198,8 @@ class MovingFluid:
             self._behind[seal] = open_ if law is open_.law else open_._with(law)
         if self._behind[seal] is open_ or speed[seal] == 0.0:
             return self._behind[seal]
+        if inlet is None:
+            return open_
         passing = abs(speed) * open_.law.open_area(area)
         film = open_.steady_inner(area, inlet)[0] * open_.law.open_area(area)[-1]
         return self._behind[seal if passing[seal] <= film else None]
@@ -241,11 +244,11 @@ class MovingFluid:
         """A step of length h, s, from a state in a passage of areas and rates, with the inlet pressure, Pa, at its
         share theta, and the weight of new rates there.
         """
-        return FluidStep(self.facing(old.area, old.speed, inlet), old, h, theta, rate, inlet)
+        return FluidStep(self.facing(old.area, old.speed), old, h, theta, rate, inlet)
 
     def instant(self, state: FluidState, inlet: float) -> FluidInstant:
         """A step of no length at a state."""
-        return FluidInstant(self.facing(state.area, state.speed, inlet), state, inlet)
+        return FluidInstant(self.facing(state.area, state.speed), state, inlet)
 
     def steady_inner(self, area: np.ndarray, inlet: float) -> np.ndarray:
         """Unknowns (l,) of a steady flow; those of a fluid at rest at the pressure behind where there is none."""
@@ -409,7 +412,7 @@ class FrozenFluid(MovingFluid):
     """
 
     def step(self, old, passage, h, theta, rate, inlet) -> FrozenStep:
-        return FrozenStep(FluidStep(self.facing(old.area, old.speed, inlet), old, h, 1.0, 1.0, inlet), passage)
+        return FrozenStep(FluidStep(self.facing(old.area, old.speed), old, h, 1.0, 1.0, inlet), passage)
 
 
 class FrozenStep:

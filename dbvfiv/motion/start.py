@@ -15,9 +15,9 @@ from eigen.spectrum import SearchOptions, Spectrum
 from ..case.model import Case
 from ..case.parameters import Mu
 from ..errors import SolveError
-from ..model.dynamics import linearise
+from ..model.dynamics import LinearisedState, linearise
 from ..model.equilibria import LoadPath, SteadyOptions
-from ..model.leading import select_search
+from ..model.leading import LEAST_MODES, select_search
 from ..model.valve import ValveModel
 from ..observer import Observer
 from .equations import ValveMotion
@@ -109,9 +109,8 @@ def kicked(
     """
     model = motion.model
     linear = linearise(model, q, max(inlet, model.flow.back))  # below that nothing flows either
-    pencil = linear.pencil(motion.mu)
     try:
-        found, index = _find_mode(pencil, motion.mu, case, linear.resolved(motion.mu))
+        found, index = _find_mode(linear, motion.mu, case)
     except (SingularShiftError, np.linalg.LinAlgError) as error:
         said = str(error).rstrip(".")
         raise SolveError(f"The mode to push along at {inlet:.6g} Pa was not found: {said}.") from error
@@ -160,14 +159,16 @@ def on_mode(
     return consistent_state(motion, 0.0, moved, v, inlet, still + flow, memory)
 
 
-def _find_mode(pencil: CoupledPencil, mu: Mu, case: Case, resolved: float) -> tuple[Spectrum, int]:
+def _find_mode(linear: LinearisedState, mu: Mu, case: Case) -> tuple[Spectrum, int]:
     """Leading modes, by the rule of all studies, and the place of the one to push along among them; more are searched
     for than the case lists where these hold too few that oscillate.
     """
     wanted, asked = case.transient.kick_mode, SearchOptions(case.modes.max_frequency, tolerance=case.modes.tolerance)
-    count = max(case.modes.count, wanted)
+    count, pencil = max(case.modes.count, wanted), linear.pencil(mu)
+    structure = CoupledPencil(linear.mass, 0.0 * linear.mass, linear.stiffness)
     while True:
-        search = select_search(asked, mu, lambda n: lowest_frequencies(pencil, n), count, resolved)
+        listed = max(count, LEAST_MODES)
+        search = select_search(asked, mu, lambda n: lowest_frequencies(structure, n), listed, linear.resolved(mu))
         found = leading_modes(pencil, count, search.options)
         oscillating = [i for i in range(len(found)) if found.eigenvalues[i].imag > 1e-6 * abs(found.eigenvalues[i])]
         if len(oscillating) >= wanted:

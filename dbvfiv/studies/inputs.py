@@ -42,6 +42,7 @@ HELD_BY = {
     "sealing": ("valve.sealing_pressure", "valve.sealing_force", "valve.overlap"),
     "angle": (".angle",),
     "strain": (".strain_level",),
+    "thickness": ("valve.thickness_factor",),
 }
 #: Confidence of intervals.
 CONFIDENCE = 0.95
@@ -336,8 +337,8 @@ def _input(case: Case, name: str, text: str, source: str) -> Input:
     if outside > ALLOWED:
         raise CaseError(
             f"{key} is given as {text!r}, of which {outside:.2g} lies where {name} cannot be: it must be within "
-            f"{limits[0]:g} to {limits[1]:g} {quantity.si}".rstrip()
-            + "; choose a narrower one, or a lognormal one.",
+            f"{quantity.amount(limits[0], 'g')} to {quantity.amount(limits[1], 'g')}; choose a narrower one, or a "
+            "lognormal one.",
             key=key,
         )
     surrounding = name in PARAMETERS and is_surrounding(case, name)

@@ -214,7 +214,9 @@ class Recognition:
             part = judged.signal.between(*judged.verdict.judged)
             if len(part.time) >= 16:
                 frequency, amplitude = spectrum(Series.of(part.time, part.values))
-                lower.semilogy(frequency, np.maximum(amplitude, max(1e-6 * amplitude.max(), 1e-300)), lw=1.0, label=part.name)
+                lower.semilogy(
+                    frequency, np.maximum(amplitude, max(1e-6 * amplitude.max(), 1e-300)), lw=1.0, label=part.name
+                )
         upper.axhline(0.0, color="black", lw=0.8)
         upper.set_ylabel("Damping ratio, %")
         lower.set(xlabel="Frequency, Hz", ylabel="Amplitude of the record", xlim=(0, 1.2 * highest))

@@ -357,6 +357,24 @@ def share_samples(
         yield k, rows
 
 
+def share_all(team: Workers, tasks: Iterable, ask: Callable[[Any], Any], told: Callable[[Any], str]) -> Iterator:
+    """`Workers.share`, with what is lost as the end, when all else is known, so that another attempt does it again.
+
+    Raises
+    ------
+    SolveError
+        If workers died over a task, with `told` of it.
+    """
+    lost = []
+    for task, found in team.share(tasks, ask):
+        if found is Lost:
+            lost.append(told(task))
+        else:
+            yield task, found
+    if lost:
+        raise SolveError(f"{', '.join(lost)} could not be computed: {Lost.sentence}")
+
+
 #: One task at a time in a process, whatever threads a cluster has there; what they share is made once.
 _one = threading.Lock()
 _known: tuple[bytes | Path, Any] | None = None

@@ -45,12 +45,17 @@ def find_onset(case: Case, walk: StabilityWalk, observer: Observer) -> Onset:
     observer.progress(f"steady states over {axis.parameter}")
     line = ParameterLine(walk, Mu.of(case), *asked, snapshots=len(values), counts="none")
     crossings = line.scan.run(values)
+    failures = []
     for crossing in crossings[::-1] if case.cycle.start == "last" else crossings:
-        found = line.locate(crossing, LOCATED)
-        onset = onset_at(walk, line.place(found.value), found.value, found.eigenvalue)
+        try:
+            found = line.locate(crossing, LOCATED)
+            onset = onset_at(walk, line.place(found.value), found.value, found.eigenvalue)
+        except SolveError as error:  # where the state jumps, for instance; another crossing may be an onset
+            failures.append(error)
+            continue
         if onset is not None:
             return onset
-    raise SolveError(_without(case, line.scan))
+    raise failures[0] if failures else SolveError(_without(case, line.scan))
 
 
 def _without(case: Case, scan: Scan) -> str:

@@ -162,14 +162,12 @@ def statements_of(case: Case) -> tuple[Statement, ...]:
 @dataclass(frozen=True)
 class AtHead:
     """Performance of a valve at a pressure: values by quantity, and their derivatives (n,) by the variables; how much
-    of the margin 5 % of valves with uncertain inputs lack, below 0 where their medians add more; the frequency, Hz, up
-    to which modes count in it, where one ends them.
+    of the margin 5 % of valves with uncertain inputs lack, below 0 where their medians add more.
     """
 
     values: dict[str, float]
     slopes: dict[str, np.ndarray]
     reserve: float = 0.0
-    band: float | None = None
 
 
 class DesignProblem:
@@ -182,16 +180,23 @@ class DesignProblem:
         Found earlier, by values of the variables, pressure and whether modes were asked: what the valve does, or the
         sentence why it does not.
     keep : callable, optional
-        Called with the key and what is found under it, as soon as it is.
+        Called with the key, what is found under it, as soon as it is, and `band`.
+    band : float, optional
+        Frequency, Hz, up to which modes count in margins; without it that of the first state that has one.
     """
 
-    def __init__(self, case: Case, known: Mapping[tuple, AtHead | str] = {}, keep: Callable = lambda key, found: None):
+    def __init__(
+        self,
+        case: Case,
+        known: Mapping[tuple, AtHead | str] = {},
+        keep: Callable = lambda key, found, band: None,
+        band: float | None = None,
+    ):
         self.case, self.variables = case, variables_of(case)
         self.known: dict[tuple, AtHead | str] = dict(known)
         self.inputs: list[Input] = inputs_of(case) if case.uncertainty.inputs else []
         self._keep = keep
-        bands = (found.band for found in self.known.values() if isinstance(found, AtHead))
-        self.band: float | None = next((band for band in bands if band), case.modes.max_frequency)
+        self.band = case.modes.max_frequency if band is None else band
 
     def values_at(self, share: np.ndarray) -> tuple[float, ...]:
         """Values of the variables from their shares (n,) of the way between the bounds."""
@@ -238,7 +243,7 @@ class DesignProblem:
                 found: AtHead | str = self._solved(values, pressure, margin)
             except (SolveError, CaseError, ValueError) as error:
                 found = str(error)
-            self._keep(key, found)
+            self._keep(key, found, self.band)
             self.known[key] = found
         found = self.known[key]
         if isinstance(found, str):
@@ -312,7 +317,7 @@ class DesignProblem:
             apart = [0.0 if one.name == "pressure" else one.distribution.median - one.own for one in self.inputs]
             reserve -= float(by @ apart)
         told = {name: np.array(slope) for name, slope in slopes.items()}
-        return AtHead(found, told, reserve, self.band if margin else None)
+        return AtHead(found, told, reserve)
 
     def _modes(self, walk: StabilityWalk, place: Mu):
         """Modes that the margin depends on, with left vectors.

@@ -15,7 +15,7 @@ from ...case.parameters import PARAMETERS, Mu
 from ...case.statement import QUANTITIES, Statement
 from ...case.write import case_toml, write_case
 from ...drawing.style import headline, limits, log_axis, new_figure, parameter_label
-from ...errors import SolveError
+from ...errors import CaseError, SolveError
 from ...model.closed import close_valve
 from ...model.leading import other_end
 from ...model.symmetry import equilibria_of, only_class_of
@@ -23,6 +23,7 @@ from ...record.record import GrowingRecord
 from ...record.table import Column, TableSpec
 from ...texts import digits
 from ..case import Case
+from ..inputs import inputs_of
 from ..result import StudyResult
 from ..session import Session, Study
 from ..stability.place import check_scan, number_of, require_head
@@ -71,6 +72,13 @@ def check(case: Case) -> None:
     statements_of(case)
     for name in case.design.variables.keys() - PARAMETERS.keys():
         number_of(case, name, f"design.variables.{name}")
+    for one in inputs_of(case) if case.uncertainty.inputs else ():
+        if one.own is None:
+            raise CaseError(
+                f"uncertainty.inputs holds {one.name}, which has no one value in this case, so no margin can be "
+                "differentiated by it; leave it out.",
+                key="uncertainty.inputs",
+            )
 
 
 def run(session: Session, record: GrowingRecord, cases: Path | None = None) -> None:
@@ -88,8 +96,8 @@ def run(session: Session, record: GrowingRecord, cases: Path | None = None) -> N
     """
     case = session.case
     aim, *constraints = statements_of(case)
-    problem = DesignProblem(case, _known(record), partial(_keep, record))
     result = DesignResult(record, session)
+    problem = DesignProblem(case, _known(record), partial(_keep, record), result.band)
     bounds = result.bounds
     starts = starts_of(problem, case.design.starts)
     record.begin("design", len(bounds) * len(starts) * case.design.evaluations)
@@ -159,16 +167,16 @@ def _known(record: GrowingRecord) -> dict[tuple, AtHead | str]:
         key = tuple(note["values"]), note["pressure"], note["margin"]
         known = note["found"]
         slopes = {} if isinstance(known, str) else {name: np.array(slope) for name, slope in note["slopes"].items()}
-        found[key] = known if isinstance(known, str) else AtHead(known, slopes, note["reserve"], note["band"])
+        found[key] = known if isinstance(known, str) else AtHead(known, slopes, note["reserve"])
     return found
 
 
-def _keep(record: GrowingRecord, key: tuple, found: AtHead | str) -> None:
-    """Keep a state in the record as soon as it is known."""
+def _keep(record: GrowingRecord, key: tuple, found: AtHead | str, band: float | None) -> None:
+    """Keep a state in the record as soon as it is known, with the frequency up to which modes count."""
     state, why = dict(zip(("values", "pressure", "margin"), key)), isinstance(found, str)
     at = AtHead({}, {}) if why else found
     told = found if why else at.values
-    record.note(_STATE, **state, found=told, slopes=at.slopes, reserve=at.reserve, band=at.band)
+    record.note(_STATE, **state, found=told, slopes=at.slopes, reserve=at.reserve, band=band)
 
 
 #: Names of the case files of designs.

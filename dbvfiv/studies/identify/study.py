@@ -28,7 +28,7 @@ from ..session import Session, Study
 from ..stability.place import check_scan, describe_fixed, require_head
 from ..stability.walk import StabilityWalk
 from ..workers import Workers
-from .learning import Learned, Learning, coordinates
+from .learning import MORE, Learned, Learning, coordinates
 from .search import (
     BEGINS,
     POSTERIOR,
@@ -92,7 +92,13 @@ def check(case: Case) -> None:
             f"{row.amount(places.now)}, about which onsets are sought; give a range that holds it.",
             key="identify.over",
         )
-    inputs_of(case, places.plan.moved, places.plan.by)
+    least = len(inputs_of(case, places.plan.moved, places.plan.by)) + MORE
+    if case.identify.samples < least:
+        raise CaseError(
+            f"identify.samples is {case.identify.samples}; with {least - MORE} uncertain inputs at least {least} are "
+            "needed.",
+            key="identify.samples",
+        )
 
 
 def run(
@@ -380,6 +386,9 @@ class IdentifyResult(StudyResult):
     def posterior_case(self) -> Case:
         """The case with what was learned as its uncertainty, without a range over one of its inputs."""
         (texts, pairs), axis = self.uncertainty(), self.case.uncertainty.axis
+        if not self.case.uncertainty.inputs:  # what the records do not tell of stays as uncertain as it was
+            shipped = inputs_of(self.case.replace({"uncertainty.over": None}))
+            texts = {one.name: one.distribution.words(one.quantity) for one in shipped} | texts
         keys = {"uncertainty.over": None} if axis is not None and axis.parameter in texts else {}
         return self.case.replace(keys | {"uncertainty.inputs": texts, "uncertainty.correlation": pairs})
 

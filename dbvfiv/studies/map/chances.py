@@ -23,7 +23,7 @@ from ..stability.neighbours import CHECKS, NEAR_SEED, TAKEN, Beside, find_neighb
 from ..stability.place import is_surrounding
 from ..stability.verdict import FLUTTERS
 from ..stability.walk import StabilityWalk
-from ..workers import Lost, Work, Workers
+from ..workers import Work, Workers, share_all
 from .column import MapPlan
 
 #: Probabilities whose curves are drawn.
@@ -138,8 +138,9 @@ def find_chances(case: Case, record: GrowingRecord, workers: int | str) -> None:
         say(value, note)
 
     with Workers(workers, _start, (case.to_dict(),), record.warn, chances) as team:
-        for value, found in team.share(wanted, lambda value: Work(_column, (value,))):
-            keep(value, {"failure": Lost.sentence} if found is Lost else found)
+        told = lambda value: f"The probability at {row.amount(value, 4)}"  # noqa: E731
+        for value, found in share_all(team, wanted, lambda value: Work(_column, (value,)), told):
+            keep(value, found)
 
 
 def chance_grid(record: Record, plan: MapPlan) -> np.ndarray:

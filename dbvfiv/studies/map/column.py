@@ -24,7 +24,7 @@ from ..stability.place import is_surrounding
 from ..stability.samples import Sample, SampleKey
 from ..stability.verdict import Verdict
 from ..stability.walk import StabilityWalk
-from ..workers import Lost, Work, Workers
+from ..workers import Work, Workers, share_all
 
 #: Relative accuracy of onsets along a column that the full matrices do not correct.
 LOCATED = 1e-10
@@ -303,8 +303,11 @@ class ColumnPool(Workers):
             for task in wanted:
                 yield self._recalled(task) or solve_column(self.plan, self.walk, task)
             return
-        for task, column in self.share(sorted(wanted), self._asked):
-            yield MapColumn.gap(task, Lost.sentence) if column is Lost else column
+        named = PARAMETERS[self.plan.across.parameter].named
+        for _, column in share_all(
+            self, sorted(wanted), self._asked, lambda task: f"The column at {named(task.value)}"
+        ):
+            yield column
 
     def _asked(self, task: ColumnTask) -> MapColumn | Work:
         column = self._recalled(task)

@@ -29,6 +29,7 @@ from ...case.parameters import DESIGN, PARAMETERS, SURROUNDINGS, Mu
 from ...case.quantity import GRAVITY
 from ...errors import CaseError, SolveError
 from ...flow.outside.shape import ShapeDerivative
+from ...materials.energy import MOONEY_RIVLIN
 from ...model.dynamics import LinearisedState, linearise
 from ...model.sizes import ValveSizes
 from ...model.state import describe_state
@@ -184,15 +185,25 @@ class Neighbourhood:
         """
         require_number(self.model, name)
         value = _value(self.model, self.pressure, self.mu, name)
-        spans = spans_about(self.model.case, name, value, self.step * (abs(value) or 1.0))
+        size = abs(value) or self._usual_size(name)
+        spans = spans_about(self.model.case, name, value, self.step * size)
         near, *far = (self._between(name, value, *ends) for ends in spans)
         if not far:
             return self._behind_pump(near)
         values = [mode.eigenvalue for mode in self.modes]
         sizes = np.array([*(np.abs(self.sums) @ np.abs(values) if values else ()), *self.performance.values()])
-        if not near.is_like(*far, np.abs(sizes) / (abs(value) or 1.0)):
+        if not near.is_like(*far, np.abs(sizes) / size):
             raise SolveError(f"Nothing can be differentiated by {name} at {value:g}: next to it is another valve.")
         return self._behind_pump(near.towards(*far))
+
+    def _usual_size(self, name: str) -> float:
+        """Size of numbers that stand beside a parameter which is 0, SI: of a constant of a rubber its shear modulus."""
+        first, *rest = name.replace(".", " ").split()
+        if unit_of(self.model.case, name) != "Pa" or first not in ("layer", "materials"):
+            return 1.0
+        layers = self.model.shell.section.layers
+        laws = [layers[int(rest[0]) - 1].law] if first == "layer" else [o.law for o in layers if o.name == rest[0]]
+        return max((law.small_strain_shear_modulus for law in laws if law.kind == MOONEY_RIVLIN), default=1.0)
 
     def _behind_pump(self, found: Sensitivity) -> Sensitivity:
         """Derivatives with the pressure that a pump gives at the flow that changes with a parameter."""
