@@ -23,7 +23,7 @@ from dbvfiv.studies.stability.samples import Sample
 from dbvfiv.studies.steady.study import LIMIT
 from tests.golden.compare import differences, steady
 from tests.observers import Stop
-from tests.small_valves import FORMER
+from tests.small_valves import FORMER, SMALL
 from tests.studies.map.axes import AXES
 
 ONSET = {"onset.over": "pressure=4 kPa:12 kPa:5", "onset.normal_form": False, "fluid.density": 4.0, **FORMER}
@@ -107,7 +107,7 @@ def slow(*where):
     "name, share",
     [
         ("modes", 0.5),
-        ("modes-undecided", 0.5),
+        slow("modes-undecided", 0.5),
         ("sweep", 0.5),
         ("sensitivity", 0.5),
         slow("onset", 0.1),
@@ -257,10 +257,10 @@ def test_kept_runs_are_those_of_the_pressures_that_were_found(coarse_case, tmp_p
     monkeypatch.setattr(sessions, "operating_pressure", lambda *_: 5e3)
     monkeypatch.setattr(sessions, "sealing_for_cracking", lambda *_: 300.0)
     monkeypatch.setattr(Session, "mesh", MeshData.of(Session(coarse_case).model))
-    level = "materials.strain_level=10 %"
-    pump = load_case(None, ["upstream.pump=[[0, 3.0], [0.1, 0.3]]", "upstream.length=3 m", level])
+    keys = ["materials.strain_level=10 %", *(f"{key}={value}" for key, value in SMALL.items())]
+    pump = load_case(None, ["upstream.pump=[[0, 3.0], [0.1, 0.3]]", "upstream.length=3 m", *keys])
     cracks = {"valve.sealing_pressure": None, "valve.cracking_head": 0.1}
-    head = load_case("cases/dbv12-moulded.toml", [level]).replace(cracks)
+    head = load_case("cases/dbv12-moulded.toml", keys).replace(cracks)
     for case, key, value in ((pump, "drive", 5e3), (head, "valve", 300.0)):
         path = tmp_path / f"{key}.h5"
         for _ in range(2):  # each time by a session that knows nothing

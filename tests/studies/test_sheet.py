@@ -11,10 +11,10 @@ from dbvfiv.case import CaseError
 from dbvfiv.studies.case import load_case
 from dbvfiv.studies.session import Session
 from dbvfiv.studies.steady import require_sheet, sheet_rows
-from tests.small_valves import THESIS_SET
+from tests.small_valves import SMALL, settings
 
-OPTIONS = (*THESIS_SET, "--set", "mesh.around=4", "--set", "mesh.along=6")
-CHANGES = [text.removeprefix("--set=") for text in OPTIONS if "=" in text]
+OPTIONS = settings(SMALL)
+CHANGES = [text.removeprefix("--set=") for text in OPTIONS]
 
 
 def rows_of(path):

@@ -24,7 +24,7 @@ from tests.small_valves import SMALL
 
 @pytest.fixture(scope="module")
 def model():
-    return ValveModel(thesis_case({"mesh.around": 8, "mesh.along": 12}))
+    return ValveModel(thesis_case(SMALL))
 
 
 @pytest.mark.parametrize("pressure", [50.0, 400.0, 2e3, 18e3, 60e3])
@@ -174,7 +174,7 @@ def test_failure_is_one_sentence(model, refused):
 
 
 def test_uniform_pressure():
-    model = ValveModel(thesis_case({"mesh.around": 8, "mesh.along": 12, "drive.kind": "uniform"}))
+    model = ValveModel(thesis_case(SMALL | {"drive.kind": "uniform"}))
     state = LoadPath(model).go_to(2e3)
     assert state.converged and state.mass_flow == 0.0 and state.lip_displacement > 0
 

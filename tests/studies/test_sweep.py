@@ -214,7 +214,9 @@ def test_what_is_done_is_kept_on_the_way(model, state, over_density, monkeypatch
     assert np.allclose(eigenvalues(whole), eigenvalues(over_density), rtol=1e-9, atol=0.0, equal_nan=True)
 
 
-@pytest.mark.parametrize("over", ["density=5:50:4:log", "loss_factor=0.5:2:4:log"])
+@pytest.mark.parametrize(
+    "over", [pytest.param("density=5:50:4:log", marks=pytest.mark.slow), "loss_factor=0.5:2:4:log"]
+)
 def test_a_wall_that_relaxes_agrees_with_full_solves(over):
     changes = {"mesh.around": 8, "mesh.along": 14, "drive.pressure": 6000}
     changes |= {"damping.model": "loss factor", "materials.constants": "stable", "fluid.density": 10.0}

@@ -48,11 +48,7 @@ def test_a_number_of_workers_may_be_a_text(kind, monkeypatch):
     assert (ask(workers="2"), ask(workers=None), ask(workers="tcp://host:1")) == (2, None, "tcp://host:1")
 
 
-def test_processes_give_what_one_gives():
-    assert shared(2) == expected()
-
-
-def test_a_killed_process_costs_nothing_but_time():
+def test_processes_give_what_one_gives_and_a_killed_one_costs_nothing_but_time():
     killed, said = [], []
 
     def kill(_task):

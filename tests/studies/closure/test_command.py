@@ -7,13 +7,13 @@ import json
 import pytest
 
 from dbvfiv.studies.session import load_result
-from tests.small_valves import settings
+from tests.small_valves import SMALL, settings
 
 COARSE = settings({"mesh.around": 6, "mesh.along": 10, "closure.max_step": "5 kPa"})
 
 
 def test_one_json_document(command_line):
-    done = command_line("closure", *COARSE, "-p", "5 kPa", "--json")
+    done = command_line("closure", *settings(SMALL | {"closure.max_step": "5 kPa"}), "-p", "5 kPa", "--json")
     assert done.status == 0, done.err
     document = json.loads(done.out)
     point = document["points"][0]

@@ -12,13 +12,14 @@ import dbvfiv
 from dbvfiv.api import load
 from dbvfiv.studies.case import thesis_case
 from dbvfiv.studies.session import Session, load_result
+from tests.small_valves import SMALL
 
-COARSE = {
-    "mesh.around": 6,
-    "mesh.along": 10,
-    "closure.max_step": "5 kPa",
-    "closure.eigenvalues": 2,
-}
+COARSE = SMALL | {"closure.max_step": "5 kPa", "closure.eigenvalues": 2}
+
+
+@pytest.fixture(scope="module")
+def figures(run):
+    return run[0].figures()
 
 
 @pytest.fixture(scope="module")
@@ -72,10 +73,8 @@ def test_paraview_gets_contact_pressure_and_gap_on_all_four_quarters(run, tmp_pa
         )
 
 
-def test_figures(run, tmp_path):
-    result, _ = run
-    names = {path.stem for path in result.plot(tmp_path)}
-    assert {"side-views", "contact-map", "closure-curve", "passage", "layer-stress"} == names
+def test_figures(figures):
+    assert set(figures) == {"side-views", "contact-map", "closure-curve", "passage", "layer-stress"}
 
 
 @pytest.mark.parametrize(
@@ -97,8 +96,8 @@ def test_python_interface_refuses_what_is_no_pressure():
 # ----
 
 
-def test_the_contact_map_reaches_to_its_maximum_and_says_it(run):
-    figure = run[0].figures(only=["contact-map"])["contact-map"]
+def test_the_contact_map_reaches_to_its_maximum_and_says_it(run, figures):
+    figure = figures["contact-map"]
     mesh = figure.axes[0].collections[0]
     largest = [s.contact_pressure.max() / s.pressure for s in run[0].states if s.contact_nodes]
     assert mesh.norm.vmax == pytest.approx(max(largest))
@@ -106,8 +105,8 @@ def test_the_contact_map_reaches_to_its_maximum_and_says_it(run):
         assert f"largest {ratio:.3g} times" in axes.get_title("left")
 
 
-def test_the_closure_curve_has_no_lines_but_its_own(run):
-    figure = run[0].figures(only=["closure-curve"])["closure-curve"]
+def test_the_closure_curve_has_no_lines_but_its_own(run, figures):
+    figure = figures["closure-curve"]
     buckled = len(run[0].buckling[:1])
     for axes in figure.axes:
         upright = [line for line in axes.lines if len(set(line.get_xdata())) == 1 and len(line.get_xdata()) == 2]
@@ -116,9 +115,8 @@ def test_the_closure_curve_has_no_lines_but_its_own(run):
         assert dots and np.allclose(dots[0].get_xdata(), [s.pressure / 1e3 for s in run[0].states])
 
 
-def test_side_views_show_the_faces(run):
-    figure = run[0].figures(only=["side-views"])["side-views"]
-    axes = figure.axes[0]
+def test_side_views_show_the_faces(figures):
+    axes = figures["side-views"].axes[0]
     wall = next(c for c in axes.collections if c.get_label() == "wall")
     upper, lower = (path.vertices for path in wall.get_paths())
     at_lip = upper[np.isclose(upper[:, 0], upper[:, 0].min(), atol=2.0), 1]

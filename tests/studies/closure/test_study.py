@@ -137,7 +137,7 @@ def test_the_answer_does_not_depend_on_the_penalty(case, pressed):
 
 
 def test_the_answer_does_not_depend_on_the_steps(case, pressed):
-    one = reach(case, 28e3, closure__max_step=1.5e3)
+    one = reach(case, 28e3, closure__max_step=2.5e3)
     assert one.contact_force == pytest.approx(pressed.states[-1].contact_force, rel=1e-4)
     assert one.max_displacement == pytest.approx(pressed.states[-1].max_displacement, rel=1e-4)
 
@@ -269,6 +269,7 @@ def test_work_and_energies_balance_the_better_the_smaller_the_steps(case):
     assert errors[1] < errors[0] < 1e-2 and errors[2] < 1e-5, errors
 
 
+@pytest.mark.slow
 def test_a_pair_of_limit_points_of_the_mesh_ends_no_path_without_arclength():
     """At 50 872 Pa such a pair ended it with no buckling, next to where the wall snaps."""
     keys = {"mesh.around": 6, "mesh.along": 8, "materials.strain_level": 0.2, "closure.max_step": "10 kPa"}

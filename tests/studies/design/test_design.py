@@ -72,16 +72,15 @@ def check_gradients(changes, share, way):
         assert slope @ (widths * way) == pytest.approx(direct, rel=1e-6, abs=1e-6 * size), name
 
 
-@pytest.mark.parametrize("changes", [{}, LOSSY])
-def test_gradients_are_those_of_valves_solved_anew(changes):
-    """Away from the case itself, for a factor and lengths alike, both flow models, with and without loss factors."""
-    check_gradients(changes, np.array([0.35, 0.55, 0.3]), np.array([0.6, -0.5, 0.8]))
+def test_gradients_are_those_of_valves_solved_anew():
+    """Away from the case itself, for a factor and lengths alike."""
+    check_gradients({}, np.array([0.35, 0.55, 0.3]), np.array([0.6, -0.5, 0.8]))
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("number", range(20))
+@pytest.mark.parametrize("number", range(8))
 def test_gradients_at_random_designs(number):
-    """Five designs for each flow model, with Rayleigh damping and with loss factors."""
+    """Two designs for each flow model, with Rayleigh damping and with loss factors."""
     share, way = np.random.default_rng(number).uniform(0.05, 0.95, (2, 3))
     lossy = LOSSY if number % 2 else {}
     check_gradients(lossy | {"fluid.continuity": ("quasi-steady", "storage")[number // 2 % 2]}, share, 2 * way - 1)

@@ -22,8 +22,15 @@ def walk_of(**keys):
     return case, StabilityWalk(case)
 
 
-@pytest.mark.parametrize("law", ["quasi-steady", "storage"])
-@pytest.mark.parametrize("fluid", ["same", 1000.0])
+@pytest.mark.parametrize(
+    ("law", "fluid"),
+    [
+        ("quasi-steady", 1000.0),
+        ("storage", "same"),
+        pytest.param("quasi-steady", "same", marks=pytest.mark.slow),
+        pytest.param("storage", 1000.0, marks=pytest.mark.slow),
+    ],
+)
 def test_columns_over_density_agree_with_full_spectra(law, fluid):
     case, walk = walk_of(**{"outside.fluid": fluid, "fluid.continuity": law})
     base = Mu.of(case).at(pressure=6e3)

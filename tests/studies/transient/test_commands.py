@@ -54,28 +54,22 @@ def write(path, t, *columns, header=""):
 
 
 def test_verdict_of_csv(command_line, tmp_path):
-    t = np.linspace(0, 10, 5001)
-    file = write(tmp_path / "a.csv", t, 2 + np.sin(20 * t), np.exp(-0.5 * t) * np.cos(20 * t), header="t,lift,drag")
+    """Of two signals whose names look alike in files, of which each has its own."""
+    t = np.linspace(0, 10, 2001)
+    file = write(
+        tmp_path / "a.csv", t, 2 + np.sin(20 * t), np.exp(-0.5 * t) * np.cos(20 * t), header="t,lift (in),lift_in"
+    )
     outcome = command_line("verdict", file, "--json", "--plots", tmp_path / "figures")
     lift, drag = json.loads(outcome.out)["signals"]
-    assert (lift["name"], lift["verdict"]) == ("lift", "limit cycle")
+    assert (lift["name"], lift["verdict"]) == ("lift (in)", "limit cycle")
     assert lift["frequency"] == pytest.approx(20 / (2 * np.pi), rel=1e-6)
     assert (lift["mean"], lift["amplitude"], lift["rms"]) == pytest.approx((2, 1, np.sqrt(0.5)), rel=1e-3)
     assert (lift["smallest"], lift["largest"]) == pytest.approx((1, 3), abs=1e-3)
     assert lift["peaks"][0]["frequency"] == pytest.approx(20 / (2 * np.pi), abs=0.1)
     assert drag["verdict"] == "decayed"
-    assert {p.name for p in (tmp_path / "figures").iterdir()} == {"lift.png", "drag.png"}
-    outcome = command_line("verdict", file, "-c", "drag")
-    assert outcome.out.startswith("drag: decayed")
-
-
-def test_signals_with_names_that_look_alike_in_files_have_their_own(command_line, tmp_path):
-    t = np.linspace(0, 10, 501)
-    file = write(
-        tmp_path / "a.csv", t, np.sin(20 * t), np.cos(20 * t), np.sin(9 * t), header="t,p (in),p_in,Druck \u03c1"
-    )
-    assert command_line("verdict", file, "--plots", tmp_path / "figures").status == 0
-    assert {p.name for p in (tmp_path / "figures").iterdir()} == {"p-in.png", "p-in-2.png", "Druck-\u03c1.png"}
+    assert {p.name for p in (tmp_path / "figures").iterdir()} == {"lift-in.png", "lift-in-2.png"}
+    outcome = command_line("verdict", file, "-c", "lift_in")
+    assert outcome.out.startswith("lift_in: decayed")
 
 
 def test_columns_of_a_run_have_numbers_too():

@@ -88,13 +88,13 @@ AIR = {"fluid.density": 1.2, "fluid.continuity": "storage", "fluid.sound_speed":
 @pytest.mark.parametrize(
     "keys, after, column",
     [
-        pytest.param(SLAMS, 66, "stops", id="slams"),
+        pytest.param(SLAMS, 66, "stops", id="slams", marks=pytest.mark.slow),
         pytest.param(SLAMS | {"transient.adaptive": True}, 1, "stops", id="slams, adaptive"),
         pytest.param(LOSSY, 40, "line_supply", id="line and relaxing wall", marks=pytest.mark.slow),
         pytest.param(
             LOSSY | {"transient.adaptive": True}, 40, "branch_loss", id="both, adaptive", marks=pytest.mark.slow
         ),
-        pytest.param(AIR | {"transient.duration": 0.012}, 10, "gas_supply", id="gas"),
+        pytest.param(AIR | {"transient.duration": 0.006}, 9, "gas_supply", id="gas"),
     ],
 )
 def test_a_resumed_run_gives_the_same_numbers(tmp_path, valve, keys, after, column, all_restart_points):

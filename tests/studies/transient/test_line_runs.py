@@ -18,7 +18,7 @@ WAVES = {
 
 def test_a_line_at_rest_has_the_pressure_behind_the_valve(valve):
     """Nothing is drawn in before the wave of the far end arrives, after 10 ms."""
-    keys = {"transient.duration": 5e-3, "transient.step": 1e-4, "fluid.density": 100.0, "downstream.pressure": 2e4}
+    keys = {"transient.duration": 5e-3, "transient.step": 2e-4, "fluid.density": 100.0, "downstream.pressure": 2e4}
     run = transient(valve(SHORT | WAVES | keys | {"drive.pressure": 2.6e4, "upstream.elements": 8}))
     assert np.abs(run.history["station_pressure"]).max() < 0.05 * 6e3
 
@@ -42,7 +42,7 @@ def test_from_rest_a_wave_has_to_arrive_first(valve, law):
 
 
 def test_a_steady_start_stays(valve):
-    keys = {"transient.duration": 0.02, "transient.step": 1e-3, "transient.start": "steady", "fluid.density": 100.0}
+    keys = {"transient.duration": 0.01, "transient.step": 1e-3, "transient.start": "steady", "fluid.density": 100.0}
     run = transient(valve(SHORT | WAVES | keys | {"upstream.friction": 0.02, "drive.at": "line"}))
     flow = run.history["mass_flow"]
     assert np.abs(flow / flow[0] - 1).max() < 1e-8

@@ -11,6 +11,7 @@ from dbvfiv.motion.start import steady_positions
 from dbvfiv.studies.case import thesis_case
 from dbvfiv.studies.session import load_result
 from dbvfiv.studies.transient.run import Runner, assess, beyond_model, lip_gap, parting
+from tests.small_valves import SMALL
 
 from .runs import SHORT, transient
 
@@ -104,7 +105,8 @@ def test_storage_law_lets_the_wall_displace_fluid(valve):
 @pytest.mark.parametrize("kpa", [18, pytest.param(36, marks=pytest.mark.slow)])
 def test_storage_law_draws_water_in_through_shut_lips_and_opens(valve, kpa):
     """The saddle grows while the lips are shut; the valve opens all the same and rests where load steps lead."""
-    run = Runner(valve({"fluid.continuity": "storage", "drive.pressure": 1e3 * kpa, "transient.duration": 0.5})).start()
+    changes = {"fluid.continuity": "storage", "drive.pressure": 1e3 * kpa, "transient.duration": 0.5}
+    run = Runner(valve(changes | {"transient.step": 2e-3})).start()
     h = run.history
     assert not run.failures
     drawn = h["time"][h["mass_flow"] < 0]
@@ -173,7 +175,7 @@ def test_a_valve_without_pressure_stays_as_it_is(tmp_path, valve, command_line, 
 def test_a_stiff_valve_that_stands_at_its_gap_is_open(valve, start, density):
     """It opens by a thousandth of its gap at rest, and lets flow what a jet of that area carries."""
     changes = {"valve.thickness_factor": 8.0, "drive.pressure": 500.0, "fluid.density": density}
-    changes |= {"damping.alpha": 400.0, "transient.start": start, "transient.duration": 0.5}
+    changes |= {"damping.alpha": 400.0, "transient.start": start, "transient.duration": 0.5, "transient.step": 2e-3}
     run = Runner(valve(changes | {"transient.numerical_damping": 0.1})).start()
     assert run.verdict.name == "steady" and run.verdict.decided
     area = run.history["smallest_area"][-1]
@@ -187,7 +189,7 @@ def test_a_valve_whose_drive_turns_around_closes_and_without_one_stands_at_its_g
     table = tmp_path / "drive.csv"
     table.write_text("0, 6000\n0.05, 6000\n0.15, 0\n")
     changes = {"transient.drive_table": str(table), "downstream.pressure": back, "transient.start": "steady"}
-    changes |= {"fluid.density": 10.0, "damping.alpha": 400.0, "transient.duration": 0.4}
+    changes |= {"fluid.density": 10.0, "damping.alpha": 400.0, "transient.duration": 0.4, "transient.step": 2e-3}
     run = Runner(valve(changes | {"transient.numerical_damping": 0.1})).start()
     assert run.history["inlet_pressure"] == pytest.approx([run.drive(time) for time in run.history["time"]], abs=1e-6)
     assert run.history["smallest_area"][0] > 20 * lip_gap(run.model)
@@ -305,7 +307,7 @@ def test_impossible_starts(tmp_path, valve):
 
 
 def test_the_python_interface_runs_and_resumes(tmp_path):
-    small = dbvfiv.load(thesis_case(), {"mesh.around": 4, "mesh.along": 6, "transient.step": "2 ms"})
+    small = dbvfiv.load(thesis_case(), SMALL | {"transient.step": "2 ms"})
     path = tmp_path / "run.h5"
     run = small.transient("10 ms", density=500.0, output=path)
     assert run.case.transient.duration == 0.01 and run.case.fluid.density == 500.0

@@ -193,11 +193,11 @@ def test_samples_that_diverge_are_told(found):
     assert table.rows[0][list(table.head).index("diverges, %")] == "25"
 
 
-def test_workers_and_interruptions_change_no_digit(valve, found, tmp_path):
+def test_interruptions_change_no_digit(valve, found, tmp_path):
     path = tmp_path / "samples.h5"
     partly = valve.uncertainty(inputs=OWN, output=path, observer=Stop(8))
     assert partly.interrupted and 0 < len(partly.at(partly.plan.values[0])["outcome"]) < 16
-    whole = dbvfiv.resume(path, workers=2)
+    whole = dbvfiv.resume(path)
     assert whole.complete and whole.summary() == found.summary() == load_result(path).summary()
 
 
@@ -236,10 +236,15 @@ def test_surroundings_are_asked_side_by_side(valve):
         assert alone.state.volume_flow == pytest.approx(samples["flow"][3], rel=1e-9)
 
 
-@pytest.mark.parametrize("name", ["pressure", "drive.pressure"])
-def test_a_pressure_may_be_uncertain(valve, name):
-    found = valve.uncertainty(inputs={name: "normal(5 %)", "beta": "lognormal(0.002, 2)"})
-    assert [one.name for one in found.plan.inputs] == ["pressure", "beta"]
+def test_a_pressure_may_be_uncertain(valve):
+    """By its parameter and by its key, which are one input."""
+    own = {"beta": "lognormal(0.002, 2)"}
+    plans = [
+        Plan(valve.case.replace({"uncertainty.inputs": {name: "normal(5 %)"} | own}))
+        for name in ("pressure", "drive.pressure")
+    ]
+    assert [one.name for one in plans[0].inputs] == ["pressure", "beta"] and plans[0].inputs == plans[1].inputs
+    found = valve.uncertainty(inputs={"drive.pressure": "normal(5 %)"} | own)
     samples = found.at(found.plan.values[0])
     pressure, beta = samples["inputs"][3]
     modes = valve.modes(pressure, beta=beta)
