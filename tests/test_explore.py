@@ -45,7 +45,7 @@ THIN = {"valve.thickness_factor": 0.586, "materials.strain_level": 0.1, "drive.h
 WET = THIN | {"fluid.density": 813.1, "outside.fluid": "same", "outside.lips": "open", "mesh.element": "MITC4"}
 
 
-@pytest.mark.parametrize("keys", [{"materials.strain_level": 0.1}, THIN, WET])
+@pytest.mark.parametrize("keys", [THIN, WET])
 def test_bounds_hold_where_corrections_do_not_converge(keys):
     """Walls that relax, on a coarse mesh: the leading mode of the last one had the wrong sign, and was called exact."""
     explorer = dbvfiv.load(None, COARSE | keys).explore()
@@ -55,23 +55,27 @@ def test_bounds_hold_where_corrections_do_not_converge(keys):
     assert predicted.verdict.outcome == exact.verdict.outcome == "stable"
 
 
+def offered(keys) -> dict:
+    """Ranges that are offered of a case, without its state."""
+    found = object.__new__(Explorer)
+    found.case = Case().replace(keys)
+    flow, relaxation = SimpleNamespace(back=0.0), SimpleNamespace(highest=lambda own, highest: highest)
+    found.base, found.model = Mu.of(found.case), SimpleNamespace(flow=flow, relaxation=relaxation)
+    return dict(found._offered())
+
+
 @pytest.mark.parametrize(("alpha", "beta", "name"), [(2.0, 0.0, "alpha"), (2.0, 0.003, "beta")])
 def test_the_damping_that_a_wall_has_is_offered(alpha, beta, name):
-    damping = {"damping.model": "rayleigh", "damping.alpha": alpha, "damping.beta": beta}
-    ranges = dbvfiv.load(None, COARSE | damping).explore().ranges
+    ranges = offered({"damping.model": "rayleigh", "damping.alpha": alpha, "damping.beta": beta})
     assert {"alpha", "beta", "loss_factor"} & set(ranges) == {name}
 
 
 def test_the_density_behind_a_pump_is_not_offered():
     """Its head is another pressure in another fluid."""
     line = {"drive.pressure": 6e3, "upstream.length": 3.0, "upstream.diameter": 0.3}
-    for more, offered in (({}, True), ({"upstream.pump": [[0, 3.0], [0.1, 0.3]]}, False)):
-        found = object.__new__(Explorer)
-        found.case = Case().replace(line | more)
-        flow, relaxation = SimpleNamespace(back=0.0), SimpleNamespace(highest=lambda own, highest: highest)
-        found.base, found.model = Mu.of(found.case), SimpleNamespace(flow=flow, relaxation=relaxation)
-        ranges = dict(found._offered())
-        assert ("density" in ranges) is offered and {"pressure", "pipe_length"} <= set(ranges)
+    for more, there in (({}, True), ({"upstream.pump": [[0, 3.0], [0.1, 0.3]]}, False)):
+        ranges = offered(line | more)
+        assert ("density" in ranges) is there and {"pressure", "pipe_length"} <= set(ranges)
 
 
 def test_heads_begin_at_none_where_weight_opens_the_valve():
@@ -134,19 +138,15 @@ def test_classes_that_the_case_asks_for_are_confirmed_too(monkeypatch, asked, ou
 
 
 def test_an_unstable_mode_far_above_the_list_is_told():
-    """At 489 Hz, where the list of leading modes ends at 113 Hz."""
-    changes = COARSE | {"drive.pressure": 450.0, "damping.beta": 4.64e-4}
-    valve = dbvfiv.load(thesis_case(), changes)
+    """At 489 Hz, where the list of leading modes ends at 113 Hz. A band up to 100 Hz is left open, as `modes` says it:
+    stable there, and the count finds the flutter.
+    """
+    valve = dbvfiv.load(thesis_case(), COARSE | {"drive.pressure": 450.0, "damping.beta": 4.64e-4})
     answer, modes = valve.explore().confirm(), valve.modes()
     assert answer.verdict.outcome == modes.verdict.outcome == "flutters"
     assert answer.verdict.frequency == pytest.approx(modes.verdict.frequency, rel=1e-6)
     assert answer.verdict.frequency > 400
-
-
-def test_a_band_below_the_flutter_is_left_open():
-    """As `modes` says it: stable up to 100 Hz, and the count finds the flutter at 489 Hz."""
-    changes = COARSE | {"drive.pressure": 450.0, "damping.beta": 4.64e-4, "modes.max_frequency": 100.0}
-    valve = dbvfiv.load(thesis_case(), changes)
+    valve = valve.replace({"modes.max_frequency": 100.0})
     answer, modes = valve.explore().confirm().verdict, valve.modes().verdict
     assert answer.outcome == modes.outcome == "undecided" and not answer.certain
     assert answer.reason.endswith("modes.max_frequency moves the end.")
@@ -167,7 +167,7 @@ def test_corners_are_prepared():
         steps += 1
     assert steps == 9  # four of density and damping, six heads, the last told
     free = {name: explorer.ranges[name] for name in ("density", "beta")}
-    for share in np.random.default_rng(3).uniform(size=(8, 2)):
+    for share in np.random.default_rng(3).uniform(size=(3, 2)):
         asked = {name: low + s * (high - low) for s, (name, (low, high)) in zip(share, free.items())}
         predicted, exact = explorer.predict(**asked), explorer.confirm(**asked)
         assert predicted.eigenvalues[0] == pytest.approx(exact.eigenvalues[0], rel=1e-3)

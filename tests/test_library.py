@@ -32,8 +32,13 @@ def is_short(thing):
 
 
 @pytest.fixture(scope="module")
-def state():
-    return dbvfiv.load(thesis_case(), {"mesh.around": 4, "mesh.along": 6}).steady("12 kPa")
+def valve():
+    return dbvfiv.load(thesis_case(), {"mesh.around": 4, "mesh.along": 6})
+
+
+@pytest.fixture(scope="module")
+def state(valve):
+    return valve.steady("12 kPa")
 
 
 def test_results_are_named_at_the_top():
@@ -69,9 +74,8 @@ def reached(thing, depth=2, seen=None):
     return list(seen.values())
 
 
-def test_texts_of_all_that_a_result_leads_to_are_short(state):
+def test_texts_of_all_that_a_result_leads_to_are_short(valve, state):
     """Case and sections, mesh, fields of layers, samples, verdicts: no arrays, ten lines at most."""
-    valve = dbvfiv.load(thesis_case(), {"mesh.around": 4, "mesh.along": 6})
     modes = state.modes(count=2)
     for start in (valve, valve.damping(), state, modes, valve.sweep("density=10,20"), valve.closure(["100 Pa"])):
         long = {type(thing) for thing in reached(start) if not is_short(thing)}
@@ -90,8 +94,7 @@ def test_texts_of_spectra_are_short_and_say_whether_they_are_certain():
     assert "agree" in repr(found[0]) and "2 values, confidence at least" in repr(found[1])
 
 
-def test_tables_come_with_units_and_ranges_as_arrays():
-    valve = dbvfiv.load(thesis_case(), {"mesh.around": 4, "mesh.along": 6})
+def test_tables_come_with_units_and_ranges_as_arrays(valve):
     swept = valve.sweep({"density": np.array([10.0, 20.0, 100.0])})
     frame = swept.table("samples")
     assert list(frame["value"]) == [10.0, 20.0, 100.0] and frame.attrs["units"]["growth_rate"] == "1/s"
@@ -133,9 +136,9 @@ def test_tables_come_with_units_and_ranges_as_arrays():
         lambda valve: dbvfiv.resume(5),
     ],
 )
-def test_wrong_types_are_answered_by_a_sentence(ask):
+def test_wrong_types_are_answered_by_a_sentence(valve, ask):
     with pytest.raises(dbvfiv.CaseError) as refused:
-        ask(dbvfiv.load(thesis_case(), {"mesh.around": 4, "mesh.along": 6}))
+        ask(valve)
     assert str(refused.value).endswith(".") and "given" in str(refused.value)
 
 

@@ -7,11 +7,14 @@ import re
 import subprocess
 import sys
 
+import pytest
+
 from tests.pages import ROOT
 
 DOCS = ROOT / "docs"
 
 
+@pytest.mark.slow
 def test_the_site_builds_without_a_warning(tmp_path):
     build = [sys.executable, "-m", "mkdocs", "build", "--strict", "--quiet", "--site-dir", str(tmp_path / "site")]
     done = subprocess.run(build, cwd=ROOT, capture_output=True, text=True)
@@ -29,6 +32,13 @@ def test_the_site_builds_without_a_warning(tmp_path):
 
 def _index(site):
     return json.loads((site / "search/search_index.json").read_text())["docs"]
+
+
+def test_links_between_pages_lead_to_files():
+    for page in DOCS.rglob("*.md"):
+        for link in re.findall(r"\]\(([^)#:\s]+)", page.read_text()):
+            made = (page.parent / link).with_suffix(".ipynb")  # notebooks of the gallery are pages
+            assert (page.parent / link).exists() or made.exists(), f"{page.name}: {link}"
 
 
 def test_every_page_is_in_the_contents():

@@ -61,7 +61,7 @@ def test_a_strip_pressed_on_a_plane_lifts_off_where_beam_theory_says():
     free, force = _beam(q)
     assert 0.1 < free < 0.35
     errors, fronts = [], []
-    for elements in (40, 80, 160):
+    for elements in (40, 160):
         model, u = _pressed_strip(elements, q)
         state = model.contact.state(u)
         assert state.penetration < 1e-7
@@ -172,25 +172,20 @@ def test_a_squeezed_ring_follows_the_elastica_before_and_after_it_lies_flat():
     small = _elastica(1e-3 * ei / radius**2)[0]
     assert radius - small == pytest.approx(0.5 * (np.pi / 4 - 2 / np.pi) * 1e-3 * radius, rel=1e-3)
     assert expected[0][1] == 0.0 and expected[1][1] > 0.02 * radius
-    for elements, tolerances in ((20, (0.004, 0.004)), (80, (2e-5, 5e-4))):
-        states = _squeezed(elements, [radius - height for height, _ in expected])
-        for state, force, tolerance in zip(states, forces, tolerances):
-            # half of the ring's lower half rests on the plane
-            assert 2 * state.total / WIDTH == pytest.approx(force, rel=tolerance), elements
+    states = _squeezed(80, [radius - height for height, _ in expected])
+    for state, force, tolerance in zip(states, forces, (2e-5, 5e-4)):
+        # half of the ring's lower half rests on the plane
+        assert 2 * state.total / WIDTH == pytest.approx(force, rel=tolerance)
 
 
 def test_forces_and_energies_of_a_pressed_strip_balance():
-    model, q = _pressed_strip(40, 10.0)
-    assert force_imbalance(model, q, model.nodal_pressure_force(model.nodal(q), 10.0)) < 1e-8
-    errors = []
-    for count in (8, 32, 128):
-        model = _strip(40)
-        ledger = EnergyLedger(model)
-        steps = LoadSteps(model, LoadStepOptions(NewtonOptions(1e-12, 40), 1e-7))
-        steps.reach(10.0)
-        ledger.begin(steps.q, 10.0, steps.slope)
-        for p in np.linspace(10.0, 10.5, count + 1)[1:]:
-            steps.reach(p)
-            ledger.add(steps.q, p, steps.slope)
-        errors.append(ledger.error)
-    assert errors[-1] < 1e-8, errors
+    model = _strip(40)
+    ledger = EnergyLedger(model)
+    steps = LoadSteps(model, LoadStepOptions(NewtonOptions(1e-12, 40), 1e-7))
+    steps.reach(10.0)
+    assert force_imbalance(model, steps.q, model.nodal_pressure_force(model.nodal(steps.q), 10.0)) < 1e-8
+    ledger.begin(steps.q, 10.0, steps.slope)
+    for p in np.linspace(10.0, 10.5, 129)[1:]:
+        steps.reach(p)
+        ledger.add(steps.q, p, steps.slope)
+    assert ledger.error < 1e-8

@@ -39,9 +39,8 @@ KINDS = {
 }
 
 
-@pytest.mark.parametrize(
-    "kind", [kind if kind.startswith("half") else pytest.param(kind, marks=pytest.mark.slow) for kind in KINDS]
-)
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", KINDS)
 def test_a_kick_grows_as_the_eigenvalue_and_energies_close(kind):
     valve = dbvfiv.load(thesis_case(), COARSE | KINDS[kind])
     if kind.startswith("pump"):

@@ -57,7 +57,8 @@ def test_a_line_of_more_waves_than_a_count_follows_is_counted_in_its_band():
     assert found.agrees and found.stable and np.isfinite(found.count.band)
 
 
-@pytest.mark.parametrize("elements", [67, pytest.param(100, marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize("elements", [67, 100])
 def test_seventy_modes_of_a_line_are_listed_and_counted(elements):
     """50 m at 300 m/s have a mode every 3 Hz; more elements of the line change neither the list nor the verdict.
 

@@ -22,9 +22,9 @@ from eigen import leading_modes
 from tests.small_valves import FORMER
 from tests.verification.test_transient_modes import LINE, QUASI, STORAGE
 
-SMALL = {"mesh.around": 8, "mesh.along": 12, **FORMER}
+SMALL = {"mesh.around": 6, "mesh.along": 8, **FORMER}
 WATER = {"drive.pressure": 500.0, "damping.alpha": 0.0, "damping.beta": 4e-4}
-LENGTHS = [0.5, 2.0, 10.0, 100.0]
+LENGTHS = [0.5, 100.0]
 
 
 def by_hand(bare, conditions, storage: float, length: float, velocity: float):
@@ -41,7 +41,7 @@ def by_hand(bare, conditions, storage: float, length: float, velocity: float):
 
 @pytest.mark.parametrize("storage", [0.0, 1.0])
 @pytest.mark.parametrize("at", ["line", "reservoir"])
-def test_modes_for_pipes_of_four_lengths(at, storage):
+def test_modes_for_pipes_of_two_lengths(at, storage):
     conditions = Mu(density=1000.0, alpha=0.0, beta=4e-4)
     piped = thesis_case(SMALL | WATER | {"upstream.length": 1.0, "drive.at": at})
     bare, model = ValveModel(thesis_case(SMALL | WATER)), ValveModel(piped)

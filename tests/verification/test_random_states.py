@@ -123,9 +123,11 @@ def against_all_that_relaxes(result: Examined) -> None:
     assert result.certified.unstable_count_independent == np.where(there.imag > 0, 2, 1).sum(), str(result.state)
 
 
-@pytest.mark.parametrize("number", [12, pytest.param(300, marks=pytest.mark.slow)])
-def test_random_states(number):
-    judge(examined(8, 14, number, seed=0, pressures=20 if number > 60 else 5), exact_every=50)
+@pytest.mark.parametrize(
+    ("mesh", "number", "pressures"), [((8, 14), 6, 5), pytest.param((8, 14), 300, 20, marks=pytest.mark.slow)]
+)
+def test_random_states(mesh, number, pressures):
+    judge(examined(*mesh, number, 0, pressures), exact_every=50)
 
 
 @pytest.mark.slow
@@ -172,13 +174,11 @@ def away_from(growth_rates: np.ndarray, line: float, least: float = 1e-2, most: 
     return float(above[i] + min(0.5 * gaps[i], most))
 
 
-@pytest.mark.parametrize("number", [2, pytest.param(100, marks=pytest.mark.slow)])
-def test_random_states_that_relax(number):
-    judge(
-        examined_relaxing(8, 14, number, seed=0, pressures=12 if number > 10 else 4),
-        exact_every=25,
-        exact=against_the_full_pencil,
-    )
+@pytest.mark.parametrize(
+    ("mesh", "number", "pressures"), [((6, 8), 2, 2), pytest.param((8, 14), 100, 12, marks=pytest.mark.slow)]
+)
+def test_random_states_that_relax(mesh, number, pressures):
+    judge(examined_relaxing(*mesh, number, 0, pressures), exact_every=25, exact=against_the_full_pencil)
 
 
 @pytest.mark.slow
