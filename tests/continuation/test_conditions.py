@@ -4,6 +4,8 @@ The block-eliminated Newton step is compared with the Jacobian of the whole augm
 formed by automatic differentiation of the dense bordered solve.
 """
 
+from functools import cache
+
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -93,37 +95,41 @@ CASES = {
 }
 
 
+@cache
+def differentiated(case):
+    """Values of the dense condition, and the derivatives of the whole augmented system; compiled once."""
+    _, dense, extra = CASES[case]
+
+    def everything(z):
+        return jnp.concatenate([force(z[:N], {"a": z[N], "b": z[N + 1]}), dense(z)])
+
+    x = jnp.asarray(full_state(extra))
+    return tuple(np.asarray(part) for part in jax.jit(lambda x: (everything(x), jax.jacfwd(everything)(x)))(x))
+
+
 @pytest.mark.parametrize("case", CASES)
 def test_values_and_derivatives_equal_automatic_differentiation(system, case):
-    make, dense, extra = CASES[case]
-    x = full_state(extra)
+    make, _, extra = CASES[case]
+    expected, matrix = differentiated(case)
     value = make().evaluate(system, U, MU, ("a", "b"), system.linear(U, MU), extra)
-    assert np.allclose(value.values, dense(x), rtol=1e-12, atol=1e-13)
-    gradient = np.asarray(jax.jacfwd(dense)(jnp.asarray(x)))
+    assert np.allclose(value.values, expected[N:], rtol=1e-12, atol=1e-13)
     for _ in range(3):
         step = RNG.standard_normal(N + 2)
         along = value.along(step[:N], {"a": step[N], "b": step[N + 1]})
-        assert np.allclose(along, gradient[:, : N + 2] @ step, rtol=1e-10, atol=1e-12)
-    assert np.allclose(value.d_extra, gradient[:, N + 2 :], rtol=1e-10, atol=1e-12)
+        assert np.allclose(along, matrix[N:, : N + 2] @ step, rtol=1e-10, atol=1e-12)
+    assert np.allclose(value.d_extra, matrix[N:, N + 2 :], rtol=1e-10, atol=1e-12)
 
 
 @pytest.mark.parametrize("case", CASES)
 def test_newton_step_equals_that_of_the_whole_augmented_jacobian(system, case):
-    make, dense, extra = CASES[case]
-    condition = make()
+    make, _, extra = CASES[case]
     # One row closes what is left open, so that the step is unique.
-    names = ("a", "b")
-    problem = Problem(system, MU, names, condition)
+    problem = Problem(system, MU, ("a", "b"), make())
     x = full_state(extra)
     closing = problem.m < problem.k + problem.e
     normal = RNG.standard_normal(x.size) if closing else None
-
-    def everything(z):
-        parts = [force(z[:N], {"a": z[N], "b": z[N + 1]}), dense(z)]
-        return jnp.concatenate(parts)
-
-    matrix = np.asarray(jax.jacfwd(everything)(jnp.asarray(x)))
-    right = -np.asarray(everything(jnp.asarray(x)))
+    expected, matrix = differentiated(case)
+    right = -expected
     if closing:
         matrix, right = np.vstack([matrix, normal]), np.append(right, -0.2)
     local = Local(problem, x, np.hstack([0.1 * np.ones((2, N)), np.eye(2)]))

@@ -12,14 +12,8 @@ from continuation.event_location import FoldMonitor, locate_zero
 from continuation.jax_system import JaxSystem
 from continuation.normal_form import hopf_normal_form
 from continuation.spectra import count_unstable, match_modes
-from tests.systems.brusselator import brusselator, brusselator_1d
-from tests.systems.normal_forms import (
-    bogdanov_takens,
-    cusp,
-    pitchfork,
-    stuart_landau,
-    subcritical_double,
-)
+from tests.continuation.known import bogdanov_takens, brusselator, brusselator_1d, cusp, pitchfork, stuart_landau
+from tests.systems.normal_forms import subcritical_double
 from tests.systems.operator_only import OperatorOnly
 
 
@@ -124,7 +118,7 @@ def test_leaving_and_returning_within_a_few_steps():
     assert branch.of_kind("hopf")[1].values["crossing_real"] < 0
 
 
-@pytest.mark.parametrize("centre", [0.0, 0.07, 0.2, -0.92])
+@pytest.mark.parametrize("centre", [0.07, -0.92])
 def test_a_tongue_narrower_than_the_step_is_not_stepped_over(centre):
     """Unstable only within 0.06 of the centre, steps of 0.16; points on neither side see it, those of the first step
     together with the next one.
@@ -242,7 +236,7 @@ def test_missing_second_derivative_leaves_the_point_bracketed_with_the_reason():
 
 def test_only_products_and_solves_are_used():
     """Branch, Hopf points and normal form of a system that never shows a matrix."""
-    points = 31
+    points = 15
     inner = brusselator_1d(points)
     system = OperatorOnly(inner, 2.2j)
     mu = {"A": 2.0, "B": 5.45, "D1": 0.008, "D2": 0.004, "l": 0.3}

@@ -17,7 +17,7 @@ from continuation import (
     orbit_at,
     orbits_from_hopf,
 )
-from tests.systems.normal_forms import bautin, cusp
+from tests.continuation.known import bautin, cusp
 
 
 def test_public_functions_have_arguments_and_an_example():

@@ -7,8 +7,7 @@ import scipy.sparse as sp
 
 from continuation.jax_system import JaxSystem, colour_columns
 from continuation.system import System
-from tests.systems.brusselator import brusselator_1d
-from tests.systems.normal_forms import warped_stuart_landau
+from tests.continuation.known import brusselator_1d, warped_stuart_landau
 
 MU = {"mu": 0.3, "w": 2.0, "c": 0.7}
 POINT = np.array([0.4, -0.2])

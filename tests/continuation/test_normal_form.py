@@ -10,9 +10,8 @@ from continuation.amplitude import amplitude_equation
 from continuation.first_order import FirstOrderSystem
 from continuation.jax_system import JaxSystem
 from continuation.normal_form import SystemForms
-from tests.systems.brusselator import brusselator
+from tests.continuation.known import bautin, brusselator, stuart_landau, warped_stuart_landau
 from tests.systems.following import follow, normal_form_of
-from tests.systems.normal_forms import bautin, stuart_landau, warped_stuart_landau
 
 MU = {"mu": -0.5, "w": 2.0, "c": 0.7}
 

@@ -25,7 +25,7 @@ from continuation import (
     resume,
     switch_branch,
 )
-from tests.systems.brusselator import brusselator
+from tests.continuation.known import brusselator
 
 BAD = [
     (NewtonOptions, {"tolerance": 0.0}),

@@ -31,19 +31,27 @@ from continuation.harmonics import Harmonics
 from continuation.normal_form import SystemForms
 from continuation.orbit_branches import OrbitSolver
 from continuation.periodic import PeriodicMotion
-from tests.systems.brusselator import brusselator, brusselator_1d
+from tests.continuation.known import (
+    bautin,
+    brusselator,
+    brusselator_1d,
+    fitzhugh_nagumo,
+    lorenz,
+    stuart_landau,
+    van_der_pol,
+    warped_stuart_landau,
+)
 from tests.systems.following import Stop, follow, hopf_of, normal_form_of
-from tests.systems.literature import fitzhugh_nagumo
-from tests.systems.lorenz import lorenz
-from tests.systems.normal_forms import bautin, stuart_landau, warped_stuart_landau
-from tests.systems.van_der_pol import van_der_pol
 
 MU = {"mu": 0.3, "w": 2.0, "c": 0.7}
 PHASE = 2 * np.pi * np.arange(60) / 60
 CIRCLE = np.stack([np.cos(PHASE), np.sin(PHASE)], axis=1)
 
 
-@pytest.mark.parametrize("system", [stuart_landau(), warped_stuart_landau(), warped_stuart_landau(np.ones((2, 2)))])
+SPARSE = warped_stuart_landau.__wrapped__(np.ones((2, 2)))
+
+
+@pytest.mark.parametrize("system", [stuart_landau(), warped_stuart_landau(), SPARSE])
 def test_stuart_landau_is_exact(system):
     """Radius sqrt(mu), frequency w - c mu, exponent -2 mu; with a state-dependent mass too, dense and sparse."""
     orbit = find_orbit(system, 0.4 * CIRCLE, 3.0, MU)
@@ -202,18 +210,30 @@ def test_the_amplitude_equation_begins_with_the_normal_form():
     assert found.amplitude == pytest.approx(2 * abs(form.q[0]) * np.sqrt(-5e-7 / form.c1.real), rel=1e-5)
 
 
-@pytest.mark.parametrize("scale", [None, 0.1, 1.0])
-def test_steps_of_any_unit_pass_a_fold_of_cycles_once(scale):
-    """Cycles mu = r^4 - nu r^2 of the Bautin system in order, by steps of a fifth of the range and others."""
-    system, given = bautin(), {} if scale is None else {"mu": scale}
-    hopf = hopf_of(system, [0, 0], {"mu": -0.5, "nu": 1.0}, "mu", (-1, 1))
-    branch = orbits_from_hopf(system, hopf, "mu", ContinuationOptions(limits={"mu": (-1, 0.3)}, parameter_scales=given))
-    assert branch.values()[-1] == 0.3
-    assert [(s.kind, s.located) for s in branch.special] == [("fold of cycles", True)]
-    assert branch.plot().get_ylabel() == "period"
-    radius = np.array([orbit_at(system, branch, i).amplitude()[0] for i in range(len(branch))])
-    assert np.all(np.diff(radius) > 0)
-    assert np.allclose(branch.values(), radius**4 - radius**2, rtol=0, atol=1e-8)
+BAUTIN_RANGE = ContinuationOptions(limits={"mu": (-1, 0.3)})
+
+
+@pytest.fixture(scope="module")
+def bautin_hopf():
+    return hopf_of(bautin(), [0, 0], {"mu": -0.5, "nu": 1.0}, "mu", (-1, 1))
+
+
+@pytest.fixture(scope="module")
+def bautin_cycles(bautin_hopf):
+    """z' = (mu + i) z + nu z|z|^2 - z|z|^4, nu = 1: cycles mu = r^4 - r^2, fold at -1/4."""
+    return orbits_from_hopf(bautin(), bautin_hopf, "mu", BAUTIN_RANGE)
+
+
+def test_steps_of_any_unit_pass_a_fold_of_cycles_once(bautin_hopf, bautin_cycles):
+    """Cycles of the Bautin system in order, by steps of a fifth of the range and by others."""
+    larger = orbits_from_hopf(bautin(), bautin_hopf, "mu", replace(BAUTIN_RANGE, parameter_scales={"mu": 1.0}))
+    for branch in (bautin_cycles, larger):
+        assert branch.values()[-1] == 0.3
+        assert [(s.kind, s.located) for s in branch.special] == [("fold of cycles", True)]
+        radius = np.array([orbit_at(bautin(), branch, i).amplitude()[0] for i in range(len(branch))])
+        assert np.all(np.diff(radius) > 0)
+        assert np.allclose(branch.values(), radius**4 - radius**2, rtol=0, atol=1e-8)
+    assert bautin_cycles.plot().get_ylabel() == "period"
 
 
 @pytest.mark.slow
@@ -226,29 +246,21 @@ def test_orbits_towards_a_homoclinic_one_have_no_false_bifurcations():
     assert abs(branch.values()[-1] - 13.926) < 1e-2 and "harmonics are too few" in branch.reason
 
 
-def test_fold_of_cycles_of_the_bautin_system(tmp_path):
-    """z' = (mu + i) z + nu z|z|^2 - z|z|^4, nu = 1: cycles mu = r^4 - r^2, fold at -1/4."""
-    system = bautin()
-    hopf = hopf_of(system, [0, 0], {"mu": -0.5, "nu": 1.0}, "mu", (-1, 1))
-    assert hopf.values["criticality"] == "sub"
-    branch = orbits_from_hopf(system, hopf, "mu", ContinuationOptions(limits={"mu": (-1, 0.3)}))
+def test_fold_of_cycles_of_the_bautin_system(tmp_path, bautin_hopf, bautin_cycles):
+    system, branch = bautin(), bautin_cycles
+    assert bautin_hopf.values["criticality"] == "sub"
     (fold,) = branch.of_kind("fold of cycles")
     assert abs(fold.mu["mu"] + 0.25) < 1e-8
     at = fold.index
     assert set(branch.unstable[: at + 1]) == {1} and set(branch.unstable[at + 1 :]) == {0}
     branch.save(tmp_path / "cycles.h5")
-    part = orbits_from_hopf(system, hopf, "mu", ContinuationOptions(limits={"mu": (-1, 0.3)}, max_points=5))
+    part = orbits_from_hopf(system, bautin_hopf, "mu", replace(BAUTIN_RANGE, max_points=5))
     part.save(tmp_path / "part.h5")
-    longer = resume(
-        system,
-        Branch.load(tmp_path / "part.h5"),
-        ContinuationOptions(limits={"mu": (-1, 0.3)}),
-    )
+    longer = resume(system, Branch.load(tmp_path / "part.h5"), BAUTIN_RANGE)
     assert np.allclose(longer.values(), branch.values(), rtol=0, atol=1e-7)
     assert [(s.kind, s.index) for s in longer.special] == [("fold of cycles", at)]
     again = orbit_at(system, Branch.load(tmp_path / "cycles.h5"), -1)
-    r2 = 0.5 + np.sqrt(0.25 + 0.3)
-    assert np.allclose(again.amplitude(), np.sqrt(r2), rtol=1e-6)
+    assert np.allclose(again.amplitude(), np.sqrt(0.5 + np.sqrt(0.25 + 0.3)), rtol=1e-6)
 
 
 def test_a_fold_of_cycles_that_an_interruption_follows_is_listed_once():
@@ -265,31 +277,21 @@ def test_period_doubling_of_a_twisted_band():
     a = 0.3
 
     def residual(u, mu):
+        # (p, q) rotates at half the speed of (x, y); in the rotated frame one direction grows at mu - a, the other
+        # decays: cos and sin of the full angle give the symmetric matrix with half-angle axes
         x, y, p, q = u
         r2 = x**2 + y**2
-        # (p, q) rotates at half the speed of (x, y) and decays; along the rotated frame one
-        # direction grows at mu - a, the other decays.
-        half = 0.5
         c, s = x / jnp.sqrt(r2), y / jnp.sqrt(r2)
         g = mu["mu"] - a
-        # cos and sin of the full angle give the symmetric matrix with half-angle axes.
-        m = 0.5 * (g - 1.0)
-        d = 0.5 * (g + 1.0)
-        return jnp.stack(
-            [
-                x - y - r2 * x,
-                x + y - r2 * y,
-                (m + d * c) * p + (d * s - half) * q - p**3,
-                (d * s + half) * p + (m - d * c) * q - q**3,
-            ]
-        )
+        m, d = 0.5 * (g - 1.0), 0.5 * (g + 1.0)
+        slow = (m + d * c) * p + (d * s - 0.5) * q - p**3, (d * s + 0.5) * p + (m - d * c) * q - q**3
+        return jnp.stack([x - y - r2 * x, x + y - r2 * y, *slow])
 
     system = JaxSystem(residual, 4)
-    guess = np.hstack([CIRCLE, np.zeros_like(CIRCLE)])
-    orbit = find_orbit(system, guess, 6.0, {"mu": 0.0})
-    real = orbit.nontrivial[np.argmin(np.abs(orbit.nontrivial + np.exp(-2 * np.pi * a)))]
-    assert np.isclose(real, -np.exp(-2 * np.pi * a), rtol=1e-6)
-    branch = continue_orbits(system, orbit, "mu", ContinuationOptions(limits={"mu": (0, 0.6)}, max_step=0.1))
+    orbit = find_orbit(system, np.hstack([CIRCLE, np.zeros_like(CIRCLE)]), 6.0, {"mu": 0.2})
+    real = orbit.nontrivial[np.argmin(np.abs(orbit.nontrivial + np.exp(-0.2 * np.pi)))]
+    assert np.isclose(real, -np.exp(-0.2 * np.pi), rtol=1e-6)
+    branch = continue_orbits(system, orbit, "mu", ContinuationOptions(limits={"mu": (0, 0.4)}, max_step=0.3))
     (point,) = branch.of_kind("period doubling")
     assert abs(point.mu["mu"] - a) < 1e-7
     assert branch.unstable[0] == 0 and branch.unstable[-1] == 1
@@ -300,7 +302,7 @@ def test_a_branch_whose_series_grow(tmp_path):
     system = van_der_pol()
     orbit = find_orbit(system, 2 * CIRCLE * [1, -1], 2 * np.pi, {"mu": 0.5})
     seen = []
-    options = ContinuationOptions(limits={"mu": (0.1, 1.0)}, step=0.1, max_step=0.2)
+    options = ContinuationOptions(limits={"mu": (0.1, 1.0)}, step=0.2, max_step=0.4)
     path = tmp_path / "orbits.h5"
     branch = continue_orbits(
         system, orbit, "mu", options, observers=[lambda b: seen.append(len(b)), Checkpoint(path, 2)]
@@ -314,7 +316,8 @@ def test_a_branch_whose_series_grow(tmp_path):
         continue_orbits(system, orbit_at(system, branch, -1), "mu", options)
     part = continue_orbits(system, orbit, "mu", replace(options, max_points=1))
     states, values = part.states, part.values()
-    longer = resume(system, part, options)
+    grown = int(np.argmax(np.diff(branch.values("harmonics")) > 0))
+    longer = resume(system, part, replace(options, max_points=grown + 2))
     assert longer.size > part.size == states.shape[1]
     assert np.array_equal(part.states, states) and np.array_equal(part.values(), values)
 
@@ -329,7 +332,7 @@ def test_a_branch_stops_where_it_is_asked_to():
 
 
 def test_an_orbit_of_a_discretised_equation_takes_few_sparse_factorisations(monkeypatch):
-    """The Brusselator with diffusion, 40 unknowns: at most three for an orbit, the one of its exponents among them."""
+    """The Brusselator with diffusion, 20 unknowns: at most three for an orbit, the one of its exponents among them."""
     from continuation import linear
 
     made = []
@@ -338,14 +341,14 @@ def test_an_orbit_of_a_discretised_equation_takes_few_sparse_factorisations(monk
         made.append(matrix.shape[0])
         original(self, matrix, *arguments)
 
-    points, mu = 20, {"A": 2.0, "B": 5.45, "D1": 0.008, "D2": 0.004, "l": 0.49}
+    points, mu = 10, {"A": 2.0, "B": 5.45, "D1": 0.008, "D2": 0.004, "l": 0.49}
     system, limits = brusselator_1d(points), (0.48, 0.53)
     hopf = hopf_of(system, np.tile([2.0, 2.725], points), mu, "l", limits, eigenvalues=4, near=2.2j)
     original = linear.SparseSolver.__init__
     monkeypatch.setattr(linear.SparseSolver, "__init__", count)
     monkeypatch.setattr(linear.DenseSolver, "__init__", None)
-    branch = orbits_from_hopf(system, hopf, "l", ContinuationOptions(limits={"l": limits}))
-    assert branch.reason.kind is Reason.LIMIT and set(branch.unstable) == {0} and not branch.special
+    branch = orbits_from_hopf(system, hopf, "l", ContinuationOptions(limits={"l": limits}, max_points=3))
+    assert branch.reason.kind is Reason.POINTS and set(branch.unstable) == {0} and not branch.special
     whole = [size for size in made if size > system.size]
     assert len(whole) <= 3 * len(branch)
 

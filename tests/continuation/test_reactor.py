@@ -54,13 +54,13 @@ def _branch_is_right(seed):
     assert np.allclose([D for _, D in found], [D for _, D in expected], rtol=0, atol=1e-7), (seed, found, expected)
 
 
-@pytest.mark.parametrize("seeds", [range(30), pytest.param(range(30, 300), marks=pytest.mark.slow)], ids=str)
+@pytest.mark.parametrize("seeds", [range(8), pytest.param(range(8, 200), marks=pytest.mark.slow)], ids=str)
 def test_branches_meet_their_folds_hopf_points_and_limits(seeds):
     for seed in seeds:
         _branch_is_right(seed)
 
 
-@pytest.mark.parametrize("seed", [2, 5, 7, 9])
+@pytest.mark.parametrize("seed", [9, pytest.param(2, marks=pytest.mark.slow)])
 def test_orbits_of_the_reactor_have_the_mean_divergence_for_exponent(seed):
     """Liouville: the exponent of a planar orbit is the mean of the trace along it; towards homoclinic orbits too."""
     draw = np.random.default_rng(seed)

@@ -47,8 +47,8 @@ OPTIONS = ContinuationOptions(
 
 
 def test_condensed_and_dense_find_the_same_hopf_point():
-    chain = CoupledChain(40)
-    found = [continue_branch(s, np.zeros(80), MU, "mu", OPTIONS).of_kind("hopf")[0] for s in (chain, dense_twin(chain))]
+    chain = CoupledChain(20)
+    found = [continue_branch(s, np.zeros(40), MU, "mu", OPTIONS).of_kind("hopf")[0] for s in (chain, dense_twin(chain))]
     one, two = found
     assert np.isclose(one.mu["mu"], two.mu["mu"], rtol=1e-9)
     assert np.isclose(one.values["omega"], two.values["omega"], rtol=1e-9)

@@ -6,8 +6,8 @@ import pytest
 
 from continuation import ContinuationOptions, NotABifurcation, continue_branch, switch_branch
 from continuation.jax_system import JaxSystem
+from tests.continuation.known import pitchfork, transcritical
 from tests.systems.following import follow
-from tests.systems.normal_forms import pitchfork, transcritical
 
 OPTIONS = ContinuationOptions(eigenvalues=2, limits={"mu": (-1.0, 1.0)}, max_step=0.3)
 

@@ -68,8 +68,9 @@ def conditions(alpha, beta, law):
     return [Point(inertia, alpha, beta, law) for inertia in np.geomspace(0.01, 100, 7)]
 
 
-@pytest.mark.parametrize("law", [0.0, 1.0])
-@pytest.mark.parametrize("alpha, beta", [(0.0, 2e-4), (1.0, 1e-5), (0.5, 0.0), (0.0, 0.0)])
+@pytest.mark.parametrize(
+    "alpha, beta, law", [(0.0, 2e-4, 0.0), (0.0, 2e-4, 1.0), (1.0, 1e-5, 0.0), (0.5, 0.0, 1.0), (0.0, 0.0, 0.0)]
+)
 def test_cells_agree_with_dense_eigenvalues(alpha, beta, law):
     family = Chain()
     column = ColumnSolver().solve(family, conditions(alpha, beta, law))

@@ -27,13 +27,13 @@ def full_matrix(pencil, s):
         SearchOptions(left=True, method="krylov", shifts=(0.5 + 2j, 8.0)),
     ],
 )
-@pytest.mark.parametrize("m, b", [(0, 0), (4, 0), (4, 1), (4, 2)])
+@pytest.mark.parametrize("m, b", [(0, 0), (4, 1), (4, 2)])
 def test_left_vectors_and_their_scaling(options, m, b):
     check_left_vectors(random_pencil(np.random.default_rng(m + b), 30, m, b), options)
 
 
 @pytest.mark.parametrize("method", ["dense", "krylov"])
-@pytest.mark.parametrize("m, b", [(0, 0), (4, 0), (4, 1), (4, 2)])
+@pytest.mark.parametrize("m, b", [(0, 0), (4, 1), (4, 2)])
 def test_left_vectors_where_the_stiffness_relaxes(method, m, b):
     pencil = relaxing_random(np.random.default_rng(m + b), 30, m, b, scale=0.1)
     check_left_vectors(pencil, SearchOptions(left=True, method=method, max_frequency=10.0))

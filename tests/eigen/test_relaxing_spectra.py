@@ -80,7 +80,7 @@ def test_a_lower_end_that_is_given_keeps_slow_modes_in_a_wide_band():
     assert modes.region.lowest == pytest.approx(2 * np.pi * 0.8 * slow)
 
 
-@pytest.mark.parametrize("shifts", [(30.0,), (20.0, 120.0), (15 + 60j,), (40.0, 10 + 120j)])
+@pytest.mark.parametrize("shifts", [(30.0,), (40.0, 10 + 120j)])
 def test_any_shift_gives_the_same_modes(shifts):
     pencil, _, roots = relaxing_beam(24)
     modes = leading_modes(pencil, 5, SearchOptions(max_frequency=40.0, shifts=shifts))
@@ -109,8 +109,7 @@ def test_random_pencils_against_dense_solutions(n, m, b):
         assert np.abs(values - value).min() < 1e-8 * abs(value)
 
 
-@pytest.mark.parametrize("storage", [False, True])
-@pytest.mark.parametrize("density", [1e-3, 10.0, 1000.0])
+@pytest.mark.parametrize("storage, density", [(True, 1e-3), (False, 10.0), (True, 1000.0)])
 def test_plate_over_decades_of_density_against_dense(storage, density):
     pencil = relaxing_plate(4, 7, density=density, storage=storage)
     modes = leading_modes(pencil, 4, SearchOptions(method="krylov", max_frequency=60.0))
@@ -162,7 +161,7 @@ def test_a_note_says_where_was_searched():
     assert any("between 1 and 20 Hz" in note and "damping ratio below 0.6" in note for note in modes.notes)
 
 
-@pytest.mark.parametrize("storage, density", [(False, 10.0), (True, 10.0), (True, 1000.0)])
+@pytest.mark.parametrize("storage, density", [(False, 10.0), (True, 1000.0)])
 def test_a_large_plate_against_newton_from_a_small_model(storage, density):
     pencil = relaxing_plate(14, 24, storage=storage, density=density)
     workspace = Workspace()

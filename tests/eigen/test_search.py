@@ -10,7 +10,7 @@ from tests.systems.random_pencils import dense_eigenvalues, leading_of, random_p
 
 @pytest.fixture(scope="module")
 def plate():
-    return plate_over_channel(6, 12)
+    return plate_over_channel(5, 8)
 
 
 @pytest.mark.parametrize("method", ["dense", "krylov"])
@@ -31,8 +31,7 @@ def test_random_pencils_against_dense_solutions(method, added_mass, n, m, b):
         assert np.linalg.norm(sum(fluid)) < 1e-8 * np.linalg.norm(fluid[0])
 
 
-@pytest.mark.parametrize("storage", [False, True])
-@pytest.mark.parametrize("density", [1e-3, 10.0, 1000.0, 2e4])
+@pytest.mark.parametrize("density, storage", [(1e-3, True), (10.0, False), (1000.0, True), (2e4, False)])
 def test_plate_over_four_decades_of_density_against_dense(storage, density):
     pencil = plate_over_channel(5, 8, density=density, storage=storage)
     assert pencil.order > 300
@@ -48,7 +47,6 @@ def test_the_leading_modes_depend_neither_on_the_number_nor_on_the_shift(plate):
     for options, count in (
         (SearchOptions(max_frequency=40.0), 8),
         (SearchOptions(shifts=(250.0,), max_frequency=40.0), 4),
-        (SearchOptions(shifts=(100 + 200j,), max_frequency=40.0), 4),
         (SearchOptions(shifts=(300.0, 80 + 150j), max_frequency=40.0), 4),
     ):
         other = leading_modes(plate, count, options)
@@ -71,10 +69,10 @@ def test_the_region_holds_what_it_claims(plate):
 
 
 def test_several_shifts_give_no_duplicates(plate):
-    modes = leading_modes(plate, 8, SearchOptions(shifts=(300.0, 200.0, 60 + 100j, 60 + 180j)))
+    modes = leading_modes(plate, 4, SearchOptions(shifts=(200.0, 60 + 100j, 60 + 180j)))
     gaps = np.abs(modes.eigenvalues[:, None] - modes.eigenvalues) + 1e9 * np.eye(len(modes))
     assert gaps.min() > 1e-3
-    assert len(modes.shifts) == 4
+    assert len(modes.shifts) == 3
 
 
 def test_multiple_eigenvalues_are_all_found():
@@ -155,7 +153,7 @@ def test_fewer_than_asked_in_the_band_is_said(plate):
 
 def test_a_workspace_serves_one_pencil_after_another(plate):
     workspace = Workspace()
-    other = plate_over_channel(6, 12, density=200.0, beta=2e-3)
+    other = plate_over_channel(5, 8, density=200.0, beta=2e-3)
     small = random_pencil(np.random.default_rng(1), 50, 3, 1)
     for pencil in (plate, other, small, plate):
         modes = leading_modes(pencil, 3, SearchOptions(method="krylov"), workspace=workspace)

@@ -49,13 +49,17 @@ def slepc_pairs(shifted, wanted, *, transposed=False, **_) -> KrylovPairs:
     return KrylovPairs(shifted.shift + 1 / theta, q, u, float(1 / np.abs(theta).min()), 1, exhausted=False)
 
 
-@pytest.mark.parametrize("left", [False, True])
-@pytest.mark.parametrize("solver", [dense_pairs, slepc_pairs], ids=["dense", "SLEPc"])
-def test_another_solver_gives_the_same_spectrum_of_a_valve(solver, left):
+@pytest.fixture(scope="module")
+def pencil():
     keys = {"mesh.around": 4, "mesh.along": 8, "fluid.density": 100.0, "drive.pressure": 6e3}
     model = ValveModel(thesis_case(keys))
     linear = linearise(model, LoadPath(model).go_to(6e3).q, 6e3)
-    pencil = linear.pencil(Mu.of(model.case))
+    return linear.pencil(Mu.of(model.case))
+
+
+@pytest.mark.parametrize("left", [False, True])
+@pytest.mark.parametrize("solver", [dense_pairs, slepc_pairs], ids=["dense", "SLEPc"])
+def test_another_solver_gives_the_same_spectrum_of_a_valve(pencil, solver, left):
     search = SearchOptions(max_frequency=60.0, left=left)
     own, other = certified_spectrum(pencil, 6, search), certified_spectrum(pencil, 6, search, solver=solver)
     assert own.agrees and other.agrees and other.spectrum.applications < 10 < own.spectrum.applications

@@ -36,7 +36,7 @@ def random_case(rng, relaxing=False):
     return random_pencil(rng, *size, **own, algebraic=rng.random() < 0.2)
 
 
-@pytest.mark.parametrize("seed, relaxing", [*((k, False) for k in range(4)), *((100 + k, True) for k in range(5))])
+@pytest.mark.parametrize("seed, relaxing", [(0, False), (1, False), (100, True), (101, True)])
 def test_counts_of_random_pencils(seed, relaxing):
     rng = np.random.default_rng(seed)
     uncertain = 0
@@ -78,7 +78,7 @@ def test_lines_beside_the_axis(line, relaxing):
             unstable_count(pencil, line=-0.2)
 
 
-@pytest.mark.parametrize("storage, density", [(False, 10.0), (True, 10.0), (True, 1000.0)])
+@pytest.mark.parametrize("storage, density", [(False, 10.0), (True, 1000.0)])
 def test_certificate_where_the_stiffness_relaxes(storage, density):
     elastic, stiffness = plate_over_channel(5, 8, beta=0.0, storage=storage, density=density, with_parts=True)
     pencil = elastic.replace(relaxation=Relaxation([stiffness], [STRENGTHS], TIMES))
@@ -119,8 +119,8 @@ def test_counts_within_a_band():
 
 
 def test_an_undamped_plate_is_counted_in_the_band_of_its_spectrum():
-    pencil = plate_over_channel(6, 15, beta=0.0)
-    result = certified_spectrum(pencil, 8, SearchOptions(max_frequency=40.0))
+    pencil = plate_over_channel(5, 10, beta=0.0)
+    result = certified_spectrum(pencil, 8, SearchOptions(max_frequency=40.0), dense=100)
     assert result.agrees, result.statement
     assert result.count.band < 40.0 and "Hz" in result.statement
     values = dense_eigenvalues(pencil)
@@ -145,11 +145,11 @@ def test_poles_of_the_fluid_in_the_right_half_plane_are_no_trouble():
 
 @pytest.mark.parametrize(
     "velocity, storage, density",
-    [(3.0, False, 10.0), (3.0, True, 10.0), (6.0, False, 10.0), (8.0, False, 2.0), (5.0, True, 1000.0)],
+    [(3.0, True, 10.0), (8.0, False, 2.0), (5.0, True, 1000.0)],
 )
 def test_large_pencils_by_basis(velocity, storage, density):
-    pencil = plate_over_channel(6, 15, inlet_velocity=velocity, storage=storage, density=density)
-    result = certified_spectrum(pencil, 4)
+    pencil = plate_over_channel(5, 10, inlet_velocity=velocity, storage=storage, density=density)
+    result = certified_spectrum(pencil, 4, dense=100)
     assert result.agrees, result.statement
     assert result.unstable_count == int(np.sum(dense_eigenvalues(pencil).real > result.count.line))
     assert result.response_error < 1e-4

@@ -7,7 +7,7 @@ from importlib.resources import files
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from dbvfiv.case import CaseError
@@ -233,6 +233,7 @@ TITLE = st.sampled_from(
 )
 
 
+@settings(max_examples=20)
 @given(
     titles=st.lists(TITLE | st.text(max_size=8), max_size=4),
     rows=st.lists(st.lists(CELL, max_size=4), max_size=8),
@@ -250,6 +251,7 @@ def test_random_tables_are_read_or_refused_in_a_sentence(tmp_path, one_sentence,
             assert min(found.strengths) >= 0
 
 
+@settings(max_examples=25)
 @given(
     values=st.lists(st.floats(0.011, 1.9), min_size=2, max_size=12),
     inner=st.lists(st.floats(1.1, 199.0), min_size=12, max_size=12, unique_by=lambda f: round(f, 6)),

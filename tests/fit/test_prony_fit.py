@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import example, given
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from dbvfiv.fit import fit_constant, fit_moduli, fit_relaxation, fit_tan_delta
@@ -67,6 +67,7 @@ def test_relaxation_of_a_series_gives_the_series(strengths, slow):
     assert found.largest_error < 1e-8
 
 
+@settings(max_examples=20)
 @given(st.lists(st.floats(0.01, 1.0), min_size=5, max_size=40))
 def test_any_table_gives_a_series_that_gives_no_energy_away(tan_delta):
     frequency = np.geomspace(1.0, 200.0, len(tan_delta))

@@ -19,6 +19,7 @@ from dbvfiv.fit.curves import MODES, loading_tests, read_curves, read_tests
 from dbvfiv.fit.report import describe_fits, toml_table
 from dbvfiv.fit.rubber import LEAST_MARGIN, RAYS
 from dbvfiv.materials import MaterialError, published_rubber, rubber_names, strain_levels
+from dbvfiv.materials.energy import rubber_energy
 from dbvfiv.materials.stability import hill_margin
 from dbvfiv.studies.case import load_case
 
@@ -57,7 +58,8 @@ def _energy(form, constants, exponents, ln):
     return sum(c * i1**i * i2**j for c, (i, j) in zip(constants, powers))
 
 
-@pytest.mark.parametrize("name, constants, exponents", LAWS)
+# those of most terms: the others have some of their columns
+@pytest.mark.parametrize("name, constants, exponents", [LAWS[2], LAWS[4], LAWS[5], LAWS[8]])
 def test_stresses_and_moduli_are_derivatives_of_the_energy(name, constants, exponents):
     form = form_of(name, len(constants))
     slope, curvature = (jax.jit(d(lambda x: _energy(form, constants, exponents, x))) for d in (jax.grad, jax.hessian))
@@ -77,7 +79,7 @@ def test_stresses_and_moduli_are_derivatives_of_the_energy(name, constants, expo
             assert moduli[3, 3] == pytest.approx(across, abs=1e-10 * scale)
 
 
-@pytest.mark.parametrize("name, constants, exponents", LAWS)
+@pytest.mark.parametrize("name, constants, exponents", [*LAWS[:-1], pytest.param(*LAWS[-1], marks=pytest.mark.slow)])
 def test_constants_of_every_form_come_back(name, constants, exponents):
     form = form_of(name, len(constants))
     fit = fit_rubber(_tests(form, constants, exponents), form)
@@ -168,7 +170,7 @@ SCATTER = st.integers(0, 10**6)
 FORMS = st.sampled_from([("mooney-rivlin", 2), ("mooney-rivlin", 3), ("yeoh", 3), ("yeoh", 2)])
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=15, deadline=None)
 @given(FORMS, SCATTER, st.sampled_from([MODES, ("uniaxial",), ("uniaxial", "planar")]), st.floats(0.05, 2.0))
 def test_stable_holds_over_the_range_it_promises(which, seed, modes, far):
     """Softening curves with scatter, which a free fit answers with constants of opposite sign."""
@@ -191,6 +193,7 @@ def test_stable_holds_over_the_range_it_promises(which, seed, modes, far):
 
 def test_the_fitted_law_of_a_wall_is_the_fit(treloar):
     """Stress of thin sheets by the energy that the wall integrates against those of the fit."""
+    slope = jax.jit(jax.grad(rubber_energy, argnums=1))
     for name, terms in (("neo-hookean", 1), ("mooney-rivlin", 3), ("yeoh", 2), ("yeoh", 3)):
         fit = fit_rubber(treloar, form_of(name, terms), "stable")
         law = fit.law(1300.0)
@@ -199,7 +202,7 @@ def test_the_fitted_law_of_a_wall_is_the_fit(treloar):
         for mode in MODES:
             for stretch in (1.1, 1.8):
                 e = jnp.array([(stretch**2 - 1) / 2, (across[mode](stretch) ** 2 - 1) / 2, 0.0, 0.0, 0.0])
-                second = jax.grad(law.energy)(e)[0]
+                second = slope(law.parameters, e)[0]
                 assert stretch * second == pytest.approx(fit.stress(mode, [stretch - 1])[0], rel=1e-10)
 
 
@@ -306,5 +309,5 @@ def test_bad_questions_are_refused(tmp_path, treloar):
 
 def loaded(folder):
     path = folder / "falling.csv"
-    path.write_text("stretch [-],nominal_stress [Pa]\n" + "".join(f"{1 + s / 10},{-s}\n" for s in range(1, 9)))
+    path.write_text("stretch [-],nominal_stress [Pa]\n" + "".join(f"{1 + s / 10},{-s}\n" for s in range(1, 4)))
     return read_tests(path)

@@ -99,8 +99,9 @@ def test_softening_energy_is_its_formula():
 
 
 def test_rubber_without_a_knee_has_finite_derivatives_by_its_constants():
+    law = published_rubber("CR")
     for derivative in (jax.grad, jax.hessian):
-        assert np.all(np.isfinite(derivative(rubber_energy)(published_rubber("CR").parameters, STRAINS[0])))
+        assert np.all(np.isfinite(jax.jit(derivative(rubber_energy))(law.parameters, STRAINS[0])))
 
 
 def test_kirchhoff_energy_is_the_laminate_formula():
@@ -119,8 +120,8 @@ def test_isotropic_is_the_equal_ply():
 def test_reference_state_is_free_and_has_the_small_strain_stiffness(law):
     zero = jnp.zeros(5)
     assert float(law.energy(zero)) == 0.0
-    np.testing.assert_array_equal(jax.grad(law.energy)(zero), 0.0)
-    tangent = np.asarray(jax.hessian(law.energy)(zero))
+    np.testing.assert_array_equal(stress_of[law.kind](law.parameters, zero), 0.0)
+    tangent = np.asarray(tangent_of[law.kind](law.parameters, zero))
     assert tangent[2, 2] == pytest.approx(law.small_strain_shear_modulus, rel=1e-14)
     assert np.linalg.eigvalsh(tangent)[0] > 0.0
 
@@ -129,7 +130,7 @@ def test_rubber_at_rest_is_incompressible_plane_stress():
     law = published_rubber("EPDM", 0.2)
     mu = law.small_strain_shear_modulus
     expected = mu * np.array([[4, 2, 0, 0, 0], [2, 4, 0, 0, 0], [0, 0, 1, 0, 0], [0, 0, 0, 1, 0], [0, 0, 0, 0, 1]])
-    np.testing.assert_allclose(jax.hessian(law.energy)(jnp.zeros(5)), expected, rtol=1e-13, atol=1e-6)
+    np.testing.assert_allclose(tangent_of[law.kind](law.parameters, jnp.zeros(5)), expected, rtol=1e-13, atol=1e-6)
 
 
 def test_stress_by_complex_step(law):

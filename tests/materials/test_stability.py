@@ -10,7 +10,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.optimize import brentq
 
@@ -184,7 +184,7 @@ def test_margin_vanishes_with_the_moduli_slow_and_instantaneous(law, path):
     ends = []
     for r in (1.0, 1.6, 20.0):
         way = np.linspace(0.0, 0.2, 401)
-        first = int(np.argmax([stability_margin(law, PATHS[path](s), r) <= 0 for s in way]))
+        first = int(np.argmax(stability_margin(law, [PATHS[path](s) for s in way], r) <= 0))
         end = brentq(lambda s: float(stability_margin(law, PATHS[path](s), r)), way[first - 1], way[first], xtol=1e-14)
         values = np.concatenate([np.linalg.eigvalsh(_instantaneous_moduli(law, PATHS[path](end), x)) for x in {1.0, r}])
         assert abs(values.min()) < 1e-8 * values.max()
@@ -204,7 +204,7 @@ def test_instant_of_a_sound_material():
     assert stability_margin(law, below, 1e6) > 0.0
 
 
-@pytest.mark.parametrize("level", np.linspace(0.1, 0.6, 26))
+@pytest.mark.parametrize("level", [0.1, 0.14, 0.2, 0.3, 0.4, 0.5, 0.6])
 @pytest.mark.parametrize("name", rubber_names())
 def test_shipped_rubbers_are_stable_at_every_level_and_in_every_state(name, level):
     """All isochoric states to logarithmic strains of ln 10; those to 1.2 in an instant of any r, normals anywhere."""
@@ -220,11 +220,12 @@ def _states(reach):
     rng = np.random.default_rng(7)
     angle, size = np.meshgrid(np.linspace(0, 2 * np.pi, 48, endpoint=False), np.linspace(0, reach, 25))
     ln = (size[..., None] * np.cos(angle[..., None] - np.arange(3) * 2 * np.pi / 3)).reshape(-1, 3)
-    turns = [np.eye(3), *(np.linalg.qr(rng.normal(size=(3, 3)))[0] for _ in range(10))]
+    turns = [np.eye(3), *(np.linalg.qr(rng.normal(size=(3, 3)))[0] for _ in range(4))]
     c = np.concatenate([(turn * np.exp(2 * ln)[:, None]) @ turn.T for turn in turns])
     return np.stack([(c[:, 0, 0] - 1) / 2, (c[:, 1, 1] - 1) / 2, c[:, 0, 1], c[:, 0, 2], c[:, 1, 2]], axis=-1)
 
 
+@settings(max_examples=20)
 @given(st.floats(0.0, 1.0), st.floats(-8.0, 2.0), st.floats(0.0, 1e3), st.floats(0.0, 1e3))
 def test_softening_rubber_is_stable_whatever_its_constants(mu_inf, log_knee, c, c_3):
     """With mu_inf of mu_0/200 or more: without it the power law loses a three hundredth of its stiffness."""

@@ -13,11 +13,9 @@ from tests.shell.structures import (
     grid,
     isotropic_section,
     mixed_section,
-    random_unknowns,
     rectangle,
     single_element,
 )
-from tests.shell.test_element_loop import check_loop
 
 
 def textbook_stiffness(corners, plane, enhanced: int) -> np.ndarray:
@@ -60,11 +58,6 @@ def test_flat_element_is_the_textbook_one(element):
     plane = 1e6 / (1 - 0.09) * np.array([[1, 0.3, 0], [0.3, 1, 0], [0, 0, 0.35]])
     expected = 0.01 * textbook_stiffness(CORNERS, plane, 0 if element == MITC4 else 4)
     assert np.abs(own - expected).max() < 1e-12 * np.abs(expected).max()
-
-
-def test_loop_of_the_plain_element_is_its_energy(mesh):
-    shell = Shell(mesh, mixed_section(), element=MITC4)
-    check_loop(shell, random_unknowns(shell, 31, 0.02, 0.1), rigid=False)
 
 
 @pytest.mark.parametrize("element", ELEMENTS)
