@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import inspect
 import math
-import pickle
 import subprocess
 import sys
 from operator import attrgetter
@@ -94,9 +93,10 @@ def test_overrides_become_si(override, key, value):
 
 def test_a_quantity_in_its_usual_unit_is_the_same_float():
     # otherwise a case file in mm and kPa would not equal the defaults
+    assert load_case(None, ["drive.pressure=17.23 kPa"]).drive.pressure == 17230.0
+    quantity = PARAMETERS["pressure"].quantity
     for number in range(1, 2000):
-        case = load_case(None, [f"drive.pressure={number / 100} kPa"])
-        assert case.drive.pressure == number * 10.0
+        assert quantity.parse(f"{number / 100} kPa") == number * 10.0
 
 
 @pytest.mark.parametrize(
@@ -164,12 +164,6 @@ def test_texts_may_be_numbers_and_dates():
     with pytest.raises(CaseError, match="revision"):
         load_case(None, ["project.revision=1.10"])  # 1.1 as a number
     assert change_case(Case(), "report.heads=5000").report.heads == (5000.0,)
-
-
-def test_a_rubber_takes_another_hardness():
-    case = Case().replace({"materials.tube": {"hardness": "60 Shore A", "density": 1200}})
-    harder = case.replace({"materials.tube.hardness": "70 Shore A"}).materials.named["tube"]
-    assert harder.shear_modulus == pytest.approx(1.848e6, rel=1e-3)
 
 
 def test_a_case_cannot_be_changed_in_place():
@@ -361,11 +355,6 @@ def test_every_study_brings_its_section_and_the_physics_does_without():
     assert physics.replace({"drive.pressure": "36 kPa"}).drive.pressure == 36e3
     with pytest.raises(CaseError, match="^steady is not a key of the case file"):
         make_case(PhysicsCase, {"steady": {}})
-
-
-def test_the_whole_case_travels_between_processes():
-    case = load_case(None, ["modes.count=3", "drive.pressure=7 kPa"])
-    assert pickle.loads(pickle.dumps(case)) == case
 
 
 def test_keys_are_light_to_import():

@@ -1,4 +1,4 @@
-"""Ten thousand damaged case files: each is read or refused in one sentence, and what is read can be written again."""
+"""Damaged case files: each is read or refused in one sentence, and what is read can be written again."""
 
 from __future__ import annotations
 
@@ -20,23 +20,8 @@ NAMES = sorted({key.replace("[]", "").split(".")[-1].split("(")[0] for key in KE
 LINES = case_toml(Case(), comments=False).splitlines()
 UNITS = "kPa Pa mm m cm deg rad % kg/m^3 1/s Hz N/m s ms m^2 mH2O cmH2O degC bar psi L/s m^3/h".split()
 UNITS += ["m**", "m**9**9", "/", "()", "µm", "°", "H2O"]
-WORDS = [
-    "flow",
-    "uniform",
-    "true",
-    "storage",
-    "CR",
-    "ruled",
-    "smooth",
-    "steel",
-    "",
-    "nan",
-    "inf",
-    "é",
-    "x" * 500,
-    "../..",
-    ".",
-]
+WORDS = ["flow", "uniform", "true", "storage", "CR", "ruled", "smooth", "steel", "", "nan", "inf", "é", "x" * 500]
+WORDS += ["../..", "."]
 NUMBERS = [
     0, 1, -1, 2, 7, 10**9, 10**400, -(10**30), 0.0, -0.0, 1e-300, 5e-324, 1e300, 1.7e308, 1e-9, 0.1, 0.5, 3.14, 1e6,
 ]  # fmt: skip
@@ -146,11 +131,11 @@ def fuzz(seeds: range, path, one_sentence) -> None:
     assert read > len(seeds) / 100, f"{read} of {len(seeds)} were read"
 
 
-def test_three_hundred_damaged_files(tmp_path, one_sentence):
-    fuzz(range(300), tmp_path / "case.toml", one_sentence)
+def test_a_hundred_damaged_files(tmp_path, one_sentence):
+    fuzz(range(100), tmp_path / "case.toml", one_sentence)
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("first", range(300, 10_000, 970))
+@pytest.mark.parametrize("first", range(100, 10_000, 990))
 def test_ten_thousand_damaged_files(tmp_path, one_sentence, first):
-    fuzz(range(first, first + 970), tmp_path / "case.toml", one_sentence)
+    fuzz(range(first, first + 990), tmp_path / "case.toml", one_sentence)

@@ -7,7 +7,7 @@ import pytest
 from dbvfiv.studies.case import load_case, require_consistent
 from dbvfiv.studies.session import Session
 
-#: What was given, and a word that the sentence must hold.
+#: What was given, and a word that the sentence must hold; tests/case/bad_cases.txt has what a single key says wrong.
 CARELESS = [
     (["drive.pressure=0"], "drive.pressure"),
     (["downstream.pressure=30 kPa"], "nothing flows"),
@@ -23,29 +23,10 @@ CARELESS = [
         ],
         "sliver",
     ),
-    (["drive.pressure=3 furlongs"], "not a pressure"),
-    (["drive.pressure=2 mm"], "not a pressure"),
-    (["fluid.density=1000 kPa"], "not a density"),
-    (["fluid.density=0"], "fluid.density"),
-    (["valve.lip_half_width=0"], "lip_half_width"),
-    (["valve.duckbill_length=-10 mm"], "duckbill_length"),
-    (["valve.lenght=1 m"], "length"),
-    (["downstream.pipe_diameter=100 mm"], "pipe_diameter"),
-    (["downstream.pipe_diameter=270 mm"], "a bill that is 274.4 mm wide"),
-    (["layers.0.thickness=12 in"], "no wall has such a layer"),
-    (["outside.fluid=same", "outside.pipe_diameter=200 mm"], "pipe_diameter"),
-    (["layers.0.material=rubber"], "rubber"),
-    (["damping.model=structural"], "damping.model"),
-    (["materials.strain_level=200 %"], "strain_level"),
     (["materials.CR.hardness=120 Shore A"], "CR.hardness is 120 Shore A; a modulus follows from 20 to 80"),
     (["materials.CR.hardness=60 Shore D"], "60 Shore D"),
-    (["mesh.around=0"], "mesh.around"),
-    (["upstream.length=-1 m"], "upstream.length"),
-    (["upstream.length=30 m", "upstream.wave_speed=1000 m/s", "fluid.unsteady=false"], "wave_speed"),
     (["fluid.sound_speed=343 m/s", "fluid.continuity=storage", "fluid.unsteady=false"], "sound_speed"),
-    (["sweep.over=density=10:1:5"], "start is not below"),
     (["onset.over=pressure=1 kPa:2 kPa"], "not of that form"),
-    (["steady.pressures=[]"], "steady.pressures"),
     (["drive.pressure=2"], "a number alone is in Pa"),
     (["closure.rated_pressure=5"], "a number alone is in Pa"),
     (["drive.pressure=3 m", "downstream.pressure=2 m", "report.heads=1 m:3 m:3"], "report.heads begin at 1 m"),
@@ -114,17 +95,6 @@ def test_a_run_warns_of_what_is_seldom_meant(command_line):
     keys = [f"--set={key}" for key in ("mesh.around=6", "mesh.along=8", "drive.kind=uniform", "drive.pressure=100 Pa")]
     outcome = command_line("modes", "--set=valve.scale=12", "--set=modes.in_vacuo=true", *keys)
     assert "a bore of 3.34 m" in outcome.err and "key: valve.scale" in outcome.err, outcome
-
-
-def test_a_rubber_by_its_hardness():
-    keys = [
-        'layers=[{material="tube", thickness=0.01}]',
-        "materials.tube.density=1200",
-        "materials.tube.loss_factor=0.1",
-    ]
-    cards = [load_case(None, [*keys, f"materials.tube.hardness={given}"]) for given in ("60", "60 Shore A")]
-    cards += [load_case(None, [*keys, "materials.tube.kind=neo-hookean", 'materials.tube.shear_modulus="60 Shore A"'])]
-    assert cards[0] == cards[1] == cards[2]
 
 
 def test_a_case_that_fits(command_line):

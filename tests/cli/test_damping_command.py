@@ -11,7 +11,7 @@ from dbvfiv.studies.case import thesis_case
 from tests.small_valves import THESIS_SET
 
 LOSS = ("--set", "damping.model=loss factor")
-COARSE = (*THESIS_SET, "--set", "mesh.around=6", "--set", "mesh.along=10")
+COARSE = (*THESIS_SET, "--set", "mesh.around=6", "--set", "mesh.along=8")
 
 
 def test_loss_factors_of_the_12_inch_valve(command_line):

@@ -1,13 +1,10 @@
 """``dbvfiv modes`` and ``dbvfiv sweep``."""
 
 import json
-import os
-import signal
 
 import pytest
 
 import dbvfiv
-from tests.child import start
 from tests.small_valves import THESIS_SET, settings
 
 COARSE = (*THESIS_SET, "--set", "mesh.around=8", "--set", "mesh.along=16", "--set", "damping.alpha=0")
@@ -91,14 +88,3 @@ def test_sweep_table_and_figures(command_line, tmp_path):
     assert outcome.status == 0, outcome.err
     assert "becomes stable near pressure" in outcome.out and "Certified" in outcome.out
     assert {path.name for path in tmp_path.iterdir()} == {"sweep.png", "root-locus.png"}
-
-
-def test_ctrl_c_keeps_what_is_done(tmp_path):
-    path = tmp_path / "s.h5"
-    run = start("sweep", *COARSE, "--density", 10, "--over", "pressure=1 kPa:50 kPa:60", "-n", 2, "-o", path)
-    shown = [run.stdout.readline() for _ in range(5)][2:]
-    os.kill(run.pid, signal.SIGINT)
-    _, err = run.communicate(timeout=60)
-    assert run.returncode == 130 and "Traceback" not in err
-    kept = dbvfiv.load_result(path)
-    assert not kept.complete and len(kept.values) >= len(shown) and kept.summary()["interrupted"]

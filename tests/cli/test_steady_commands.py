@@ -14,26 +14,15 @@ from tests.child import start
 from tests.small_valves import THESIS_SET
 
 COARSE = (*THESIS_SET, "--set", "mesh.around=8", "--set", "mesh.along=16")
-KEYS = {
-    "pressure",
-    "mass_flow",
-    "outlet_area",
-    "outlet_velocity",
-    "max_displacement",
-    "max_displacement_position",
-    "lip_opening",
-    "lip_displacement",
-    "head",
-    "volume_flow",
-    "converged",
-    "iterations",
-    "residual",
-}
+KEYS = set(
+    "pressure mass_flow outlet_area outlet_velocity max_displacement max_displacement_position lip_opening "
+    "lip_displacement head volume_flow converged iterations residual".split()
+)
 
 
 def test_json(command_line):
     outcome = command_line("steady", "cases/dbv12.toml", *COARSE, "--pressure", "6 kPa", "-p", "18e3 Pa", "--json")
-    assert outcome.status == 0
+    assert outcome.status == 0 and "\r" not in outcome.err and "%|" not in outcome.err  # no bar without a terminal
     document = json.loads(outcome.out)
     points = document["points"]
     assert [point["pressure"] for point in points] == [6e3, 18e3]
@@ -45,23 +34,19 @@ def test_json(command_line):
 
 
 def test_table_and_file(command_line, tmp_path):
-    outcome = command_line("steady", *COARSE, "-p", "6 kPa", "-o", tmp_path / "r.h5", "--plots", tmp_path / "figures")
+    outcome = command_line("steady", *COARSE, "-p", "6 kPa", "-o", tmp_path / "r.h5")
     assert outcome.status == 0
     assert "mass flow" in outcome.out and "kg/s" in outcome.out and "r.h5" in outcome.out
     assert outcome.err.startswith("Warning: ")  # the folded side edge of the reference valve
     result = dbvfiv.load_result(tmp_path / "r.h5")
     assert f"{result.states[0].mass_flow:.3f}" in outcome.out
     assert result.header.case.steady.pressures == (6e3,) and result.complete
-    assert (tmp_path / "figures" / "head-discharge.png").exists()
 
 
 @pytest.mark.parametrize(
     "toml, arguments, expected",
     [
-        ("", ["--set", "drive.pressure=3 kPa"], [3e3]),
-        ("[drive]\npressure = 4e3", [], [4e3]),
         ("[drive]\npressure = 4e3\n[steady]\npressures = [1e3, 2e3]", [], [1e3, 2e3]),
-        ("[steady]\npressures = [1e3, 2e3]", ["--set", "drive.pressure=3 kPa"], [3e3]),
         ("[steady]\npressures = [1e3, 2e3]", ["--set", "drive.pressure=3 kPa", "-p", "5 kPa"], [5e3]),
         ("", ["-p", "1 kPa:3 kPa:3", "-p", "4000 Pa"], [1e3, 2e3, 3e3, 4e3]),
         ("[fluid]\ndensity = 800", ["-p", "2 m", "-p", "1 mH2O:2 mH2O:2"], [15690.64, 9806.65, 19613.3]),
@@ -122,12 +107,7 @@ def test_files_that_are_no_results(misused, tmp_path, command):
 
 
 @pytest.mark.parametrize(
-    "kill, status",
-    [
-        (signal.SIGINT, 130),
-        pytest.param(signal.SIGTERM, 143, marks=pytest.mark.slow),
-        pytest.param(signal.SIGKILL, -signal.SIGKILL, marks=pytest.mark.slow),
-    ],
+    "kill, status", [(signal.SIGINT, 130), pytest.param(signal.SIGTERM, 143, marks=pytest.mark.slow)]
 )
 def test_stopped_from_outside(tmp_path, one_sentence, kill, status):
     path = tmp_path / "r.h5"
@@ -135,18 +115,18 @@ def test_stopped_from_outside(tmp_path, one_sentence, kill, status):
     shown = [run.stdout.readline() for _ in range(5)][2:]  # head of the table, then three states
     os.kill(run.pid, kill)
     rest, err = run.communicate(timeout=60)
-    rows = rest.splitlines()[: -1 if status > 0 else None]
+    rows = rest.splitlines()[:-1]
     # what is read off the states follows them
     shown += rows[: next((i for i, line in enumerate(rows) if "total head" in line), None)]
     assert run.returncode == status
-    if status > 0:
-        assert one_sentence(err.strip().splitlines()[-1]) and "has been kept" in err
+    assert one_sentence(err.strip().splitlines()[-1]) and "has been kept" in err
     assert "Traceback" not in err and "MPI" not in err and "PETSC ERROR" not in err
     kept = dbvfiv.load_result(path)
     assert len(kept.states) >= 3 and not kept.complete
     assert len(kept.states) >= len([line for line in shown if line.strip()])  # what was shown has been kept
 
 
+@pytest.mark.slow
 def test_a_reader_that_leaves(tmp_path):
     arguments = ["steady", *COARSE, "-p", "1 kPa:50 kPa:500"]
     run = subprocess.Popen(
@@ -156,15 +136,3 @@ def test_a_reader_that_leaves(tmp_path):
     run.stdout.close()
     run.wait(timeout=60)
     assert run.returncode == 1 and "MPI" not in run.stderr.read()
-
-
-def test_no_bar_without_a_terminal(command_line):
-    outcome = command_line("steady", *COARSE, "-p", "500 Pa", "--json")
-    assert "\r" not in outcome.err and "%|" not in outcome.err
-
-
-def test_heads_are_pressures_of_the_fluid(command_line):
-    options = ("steady", *COARSE, "--set", "fluid.density=1025", "--json")
-    documents = [json.loads(command_line(*options, "-p", given).out) for given in ("0.3048 m", "1 ft")]
-    pressures = [document["points"][0]["pressure"] for document in documents]
-    assert pressures == pytest.approx(2 * [0.3048 * 9.80665 * 1025], rel=1e-9)

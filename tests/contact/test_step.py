@@ -5,14 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from dbvfiv.contact import (
-    ContactLaw,
-    ContactStep,
-    PlaneContact,
-    Rebound,
-    mean_pressure,
-    tributary_area,
-)
+from dbvfiv.contact import ContactLaw, ContactStep, PlaneContact, Rebound, mean_pressure, tributary_area
 from dbvfiv.shell.mesh import nodal_thickness
 from tests.contact.test_contact import _shell, _state
 

@@ -19,7 +19,7 @@ def mesh_of(**valve):
     return case.valve, valve_mesh(case.valve, case.mesh)
 
 
-@settings(max_examples=30)
+@settings(max_examples=12)
 @given(
     half_width=st.floats(0.01, 2.0),
     radius=st.floats(1e-3, 0.1),

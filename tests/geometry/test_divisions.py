@@ -9,15 +9,7 @@ from hypothesis import strategies as st
 
 from dbvfiv.case.model import Case
 from dbvfiv.geometry import surface_of, valve_mesh
-from dbvfiv.geometry.divisions import (
-    bend_of_lip,
-    column_division,
-    divide,
-    grading,
-    inverse_grading,
-    kinks,
-    row_division,
-)
+from dbvfiv.geometry.divisions import bend_of_lip, column_division, divide, kinks, row_division
 from dbvfiv.model import ValveModel
 from dbvfiv.model.equilibria import model_warnings
 
@@ -129,11 +121,6 @@ def test_columns_close_up_in_the_bend():
     mesh = Case().replace({"mesh.around": 960}).mesh
     steps = np.diff(column_division(mesh, SURFACE, (25 / 28,)).positions)
     assert steps[-1] / steps[0] == pytest.approx(1 / 3, rel=0.05)
-
-
-def test_inverse_of_the_grading():
-    for ratio in (0.25, 1.0, 1.7):
-        assert inverse_grading(float(grading(np.array([0.3]), ratio)[0]), ratio) == pytest.approx(0.3)
 
 
 @given(

@@ -80,7 +80,7 @@ def test_the_command_says_which_keys_give_the_valve_back(tmp_path, command_line)
 
 def test_a_wide_bill_by_points_and_by_parameters_is_one_valve(tmp_path):
     """Flow, opening and modes of a bill 1.86 times as wide as its pipe agree to 1e-10."""
-    case = thesis_case(WIDE | {"steady.tolerance": 1e-12})
+    case = thesis_case(WIDE | {"mesh.around": 8, "steady.tolerance": 1e-12})
     again = by_points(case, tmp_path, 65)
     states = [dbvfiv.Valve(c).steady(pressure=5e3) for c in (case, again)]
     one, two = states

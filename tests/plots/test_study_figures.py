@@ -7,10 +7,8 @@ import numpy as np
 import pytest
 from matplotlib.colors import BoundaryNorm
 
-from dbvfiv.case.units import Units
-from dbvfiv.drawing.style import new_figure, put_in_units
+from dbvfiv.drawing.style import new_figure
 from dbvfiv.studies.case import thesis_case
-from dbvfiv.studies.cycle.figures import _mark_special
 from dbvfiv.studies.map import figures as map_figures
 from dbvfiv.studies.map.column import MapColumn, MapPlan
 from dbvfiv.studies.map.curves import OnsetCurve
@@ -30,13 +28,6 @@ def texts(figure):
         found += [axes.get_title(where) for where in ("left", "right", "center")] + [t.get_text() for t in axes.texts]
         found += [axes.get_xlabel(), axes.get_ylabel()]
     return [text for text in found if text]
-
-
-def test_special_points_of_cycles_have_the_unit_of_the_axis():
-    figure, special = new_figure(), {"kind": "lips touch", "value": 6.2e3, "amplitude": 2e-3}
-    _mark_special(SimpleNamespace(parameter="pressure", special_points=[special]), figure.add_subplot())
-    assert texts(figure) == ["lips touch\n6.2 kPa"]
-    assert texts(put_in_units(figure, Units("m", 1000.0))) == ["lips touch\n0.632 m"]
 
 
 # -- modes and sweeps

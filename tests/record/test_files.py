@@ -3,8 +3,6 @@
 import json
 import os
 import shutil
-import subprocess
-import sys
 from dataclasses import replace
 from pathlib import Path
 
@@ -18,11 +16,11 @@ from dbvfiv.errors import CaseError
 from dbvfiv.geometry import key_point_table
 from dbvfiv.materials.shipped import published_rubber
 from dbvfiv.model.equilibria import LoadPath
-from dbvfiv.observer import Observer
 from dbvfiv.record.files import Attachment, Header, kind_of, read_header, refuse_foreign, write_header
 from dbvfiv.record.record import Journal
 from dbvfiv.shell.recovery import layer_fields
 from dbvfiv.studies.case import Case
+from tests.observers import Stop
 
 
 @pytest.fixture(scope="module")
@@ -210,44 +208,27 @@ def test_texts_of_earlier_versions_are_read(tmp_path):
     assert _read(tmp_path).attachments[0].data == "1,0.1 \u00b5".encode()
 
 
-def test_a_stopped_run_keeps_what_it_found(tmp_path, coarse_valve):
-    path, seen = tmp_path / "stopped.h5", []
-    code = f"import dbvfiv; r = dbvfiv.load_result({str(path)!r}); print([s.pressure for s in r.states], r.complete)"
-
-    class Stop(Observer):
-        def item(self, result):
-            if result.pressure == 6e3:  # another program may look at a run that goes on
-                seen.append(subprocess.run([sys.executable, "-c", code], capture_output=True, text=True))
-                raise KeyboardInterrupt
-
-    coarse_valve.steady([2e3, 6e3, 18e3], output=path, observer=Stop())
-    assert seen[0].stdout.strip() == "[2000.0, 6000.0] False", seen[0].stderr
-    kept = dbvfiv.load_result(path)
-    assert not kept.complete and kept.summary()["interrupted"]
-    assert [state.pressure for state in kept.states] == [2e3, 6e3]
-    assert kept.states[1].layers.von_mises.shape == (128, 5)
-    again = dbvfiv.resume(path)
-    whole = coarse_valve.steady([2e3, 6e3, 18e3])
-    assert again.complete and dbvfiv.load_result(path).summary() == again.summary() == whole.summary()
-
-
-def test_a_killed_run_leaves_a_readable_file(tmp_path, coarse_valve, coarse_run):
-    """What lies on the disk after each state, without the file ever being closed."""
+def test_a_stopped_run_keeps_what_it_found(tmp_path, coarse_valve, coarse_run):
+    """And a killed one, by what lies on the disk after each state, without the file ever being closed."""
     path, copy = tmp_path / "running.h5", tmp_path / "killed.h5"
 
-    class Look(Observer):
-        number = 0
-
+    class Look(Stop):
         def item(self, state):
-            self.number += 1
             shutil.copy(path, copy)
             left = dbvfiv.load_result(copy)
-            assert len(left.states) == self.number and not left.complete
-            assert np.array_equal(left.states[-1].layers.stress, coarse_run.states[self.number - 1].layers.stress)
+            assert len(left.states) == len(self.seen) + 1 and not left.complete
+            assert np.array_equal(left.states[-1].layers.stress, coarse_run.states[len(self.seen)].layers.stress)
+            super().item(state)
 
-    look = Look()
+    look = Look(2)
     coarse_valve.steady([6e3, 18e3, 36e3], output=path, observer=look)
-    assert look.number == 3
+    assert len(look.seen) == 2 and look.ended
+    kept = dbvfiv.load_result(path)
+    assert not kept.complete and kept.summary()["interrupted"]
+    assert [state.pressure for state in kept.states] == [6e3, 18e3]
+    assert kept.states[1].layers.von_mises.shape == (128, 5)
+    again = dbvfiv.resume(path)
+    assert again.complete and dbvfiv.load_result(path).summary() == again.summary() == coarse_run.summary()
 
 
 def test_failures_are_kept_apart_from_warnings(tmp_path, coarse_valve):

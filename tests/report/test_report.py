@@ -75,13 +75,11 @@ def text_of(page):
 def test_verdicts_are_those_of_modes(made):
     found, _ = made
     assert list(found.modes) == [2e3, 6e3]
-    for pressure, result in found.modes.items():
-        alone = Valve(load_case(None, [*KEYS, "modes.symmetry=all"])).modes(pressure).verdict
-        own = result.verdict
-        assert (own.outcome, own.certain) == (alone.outcome, alone.certain)
-        for name in ("growth_rate", "frequency", "damping_ratio", "critical_damping_factor"):
-            assert getattr(own, name) == pytest.approx(getattr(alone, name), rel=1e-6, nan_ok=True)
-    assert [v.verdict.outcome for v in found.modes.values()][-1] == "flutters"
+    alone = Valve(load_case(None, [*KEYS, "modes.symmetry=all"])).modes(6e3).verdict
+    own = found.modes[6e3].verdict
+    assert (own.outcome, own.certain) == (alone.outcome, alone.certain) and own.outcome == "flutters"
+    for name in ("growth_rate", "frequency", "damping_ratio", "critical_damping_factor"):
+        assert getattr(own, name) == pytest.approx(getattr(alone, name), rel=1e-6, nan_ok=True)
 
 
 def test_page_one_answers_the_four_questions(made):
@@ -327,14 +325,11 @@ def test_nothing_asked_is_missing(made):
     for name in {"answers", "steady", "heads", "onset", "closure", "strains", "layers", "law", "case"} - {*LEFT_OUT}:
         assert f'<section id="{name}"' in page.read_text(), name
     assert set(found.missing) <= {*LEFT_OUT}
+    assert "mesh: not examined (It was left out.)" in text_of(page)
     assert not found.failed
     pressures = [state.pressure for state in found.get("closure").states]
     assert max(pressures) == pytest.approx(1.5 * 10e3)
     assert {2e3, 6e3} <= {state.pressure for state in found.get("steady").states}
-
-
-def test_uncertainty_that_was_left_out_is_said(made):
-    assert "mesh: not examined (It was left out.)" in text_of(made[1])
 
 
 def test_the_case_on_the_page_is_the_case(made, tmp_path):
@@ -436,16 +431,18 @@ def test_a_stable_cycle_is_said_to_be_so_in_the_class_of_the_model(monkeypatch):
     assert said.startswith("A stable limit cycle of 3 mm") and limit.startswith("Stable means: against perturbations")
 
 
-@pytest.mark.parametrize(("name", "count"), [("SS", 1), ("SA", 0)])
-def test_cycles_are_followed_from_onsets_that_open_and_close_the_lips(name, count):
+def test_cycles_are_followed_from_onsets_that_open_and_close_the_lips():
+    """Not from a nearer one at which the lips sway."""
     case = load_case(None, ["drive.pressure=6 kPa"])
-    point = {"edge": True, "value": 5e3, "gains": True, "frequency": 30.0, "symmetry": name}
-    results = {"onset": SimpleNamespace(points=(point,))}
-    found = SimpleNamespace(case=case, get=results.get, modes={6e3: SimpleNamespace(stable=False)})
-    runs = [*cycle_run(found)]
-    assert len(runs) == count
-    own = case.replace({"cycle.start": "file", "cycle.start_file": __file__})
-    assert all(own.replace(run.changes).cycle.start_file is None for run in runs)
+    opens = {"edge": True, "value": 5e3, "gains": True, "frequency": 30.0, "symmetry": "SS"}
+    sways = opens | {"value": 5.5e3, "symmetry": "SA"}
+    onset = SimpleNamespace(points=(sways,))
+    found = SimpleNamespace(case=case, get={"onset": onset}.get, modes={6e3: SimpleNamespace(stable=False)})
+    assert not [*cycle_run(found)]
+    onset.points = (sways, opens)
+    (run,) = cycle_run(found)
+    own = case.replace({"cycle.start": "file", "cycle.start_file": __file__}).replace(run.changes).cycle
+    assert own.start_file is None and own.axis.values[0] == pytest.approx(4.9e3)  # a little before the onset
 
 
 def test_a_second_report_computes_nothing(made):
@@ -479,7 +476,7 @@ def test_a_study_over_which_workers_died_is_named_on_page_one(monkeypatch, tmp_p
             return ((task, Lost) for task in tasks)
 
     monkeypatch.setattr(sys.modules[gather.__module__], "Workers", Dying)
-    without = (*LEFT_OUT, "closure", "law")
+    without = (*LEFT_OUT, "closure", "law", "steady")
     found = gather(load_case(None, KEYS), "valve", tmp_path / "runs", without, workers=2, quiet=True)
     assert set(found.failed) == {"heads-1", "heads-2"}
     assert "The study heads-2 failed: 3 workers died" in text_of(write_page(found, tmp_path / "page.html"))
@@ -683,6 +680,8 @@ def test_a_report_of_several_processes_ends_when_it_is_told_to_and_goes_on(tmp_p
         (os.killpg if whole_group else os.kill)(child.pid, signal.SIGINT if whole_group else signal.SIGTERM)
         child.communicate(timeout=60)
         assert child.returncode not in (0, None)
+    if not whole_group:
+        return  # it goes on in the same way
     with start(*command, *left_out) as child:
         _, said = child.communicate(timeout=600)
         assert child.returncode == 0, said

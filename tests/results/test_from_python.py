@@ -7,10 +7,11 @@ import numpy as np
 import pytest
 
 import dbvfiv
-from dbvfiv.errors import CaseError
+from dbvfiv.errors import CaseError, SolveError
 from dbvfiv.studies.case import thesis_case
+from tests.small_valves import SMALL
 
-COARSE = {"mesh.around": 4, "mesh.along": 6, "drive.pressure": 2e3, "fluid.density": 10}
+COARSE = SMALL | {"drive.pressure": 2e3, "fluid.density": 10}
 
 
 @pytest.fixture(scope="module")
@@ -47,6 +48,9 @@ def test_results_can_be_copied(tmp_path, valve, kind):
         copy.save(tmp_path / "again.h5")
         assert dbvfiv.load_result(tmp_path / "again.h5").lines() == result.lines()
     assert f"{type(result).__name__} of 'dbv12', complete: " in repr(result)
+    if kind == "closure":
+        (pressed,) = result.states
+        assert pickle.loads(pickle.dumps(pressed)).summary() == pressed.summary()
 
 
 def test_states_and_modes_can_be_copied(valve):
@@ -60,23 +64,39 @@ def test_states_and_modes_can_be_copied(valve):
     again = pickle.loads(pickle.dumps(mode))
     assert again.eigenvalue == mode.eigenvalue and np.array_equal(again.shape, mode.shape)
     assert "2 kPa" in repr(state) and "Hz" in repr(mode) and len(repr(mode)) < 80
-    pressed = valve.closure("1 kPa").states[0]
-    assert pickle.loads(pickle.dumps(pressed)).summary() == pressed.summary()
 
 
 def test_a_valve_can_be_copied_and_says_what_it_is(valve):
     valve.model
     copy = pickle.loads(pickle.dumps(valve))
     assert copy.case == valve.case and copy.name == valve.name and copy.model.size == valve.model.size
-    assert repr(valve) == "<Valve 'dbv12': 4 x 6 elements, 5 layers, 2 kPa, 10 kg/m3>"
+    assert repr(valve) == "<Valve 'dbv12': 6 x 8 elements, 5 layers, 2 kPa, 10 kg/m3>"
 
 
 def test_arrays_and_single_texts(valve):
     found = valve.steady(np.linspace(1e3, 2e3, 3))
-    assert [state.pressure for state in found.states] == [1000, 1500, 2000]
+    assert [state.pressure for state in found.states] == [1000, 1500, 2000] and found.nearest(1600).pressure == 1500
     assert [state.pressure for state in valve.steady(np.array(["1 kPa"])).states] == [1000]
-    assert [state.pressure for state in valve.closure("1 kPa").states] == [1000]
+    assert [state.pressure for state in valve.steady(["500 Pa", 1000]).states] == [500, 1000]
     assert [state.pressure for state in valve.closure(np.linspace(500, 1000, 2)).states] == [500, 1000]
+    assert [state.pressure for state in valve.steady().states] == [2e3]  # as the command does: that of the drive
+
+
+def test_one_pressure_gives_a_state(coarse_valve, coarse_run):
+    state = coarse_valve.steady(pressure="18 kPa")
+    assert state.pressure == 18e3 and state.mass_flow == pytest.approx(coarse_run.states[1].mass_flow, rel=1e-6)
+    assert state.model is coarse_valve.model
+    assert coarse_valve.steady(pressure=np.float64(500)).pressure == 500
+
+
+def test_failures_are_raised(coarse_valve, refused):
+    with pytest.raises(SolveError, match="No equilibrium"):
+        coarse_valve.replace({"steady.max_iterations": 2, "steady.min_step": 0.3}).steady(pressure=100)
+    for pressure in (-1, float("nan"), "3 mm", [], True, None.__class__):
+        with pytest.raises(CaseError):
+            coarse_valve.steady(pressure=pressure)
+    with refused(CaseError):
+        dbvfiv.load(thesis_case(), {"shell.metric": "true"})
 
 
 def test_what_the_package_offers():
@@ -87,6 +107,8 @@ def test_what_the_package_offers():
     public |= {f"{name}Result" for name in results.split()}
     assert public <= set(dir(dbvfiv)) and public == set(dbvfiv.__all__)
     assert isinstance(dbvfiv.load(thesis_case(), COARSE), dbvfiv.Valve) and issubclass(dbvfiv.CaseError, ValueError)
+    with pytest.raises(AttributeError):
+        dbvfiv.laod
 
 
 @pytest.mark.parametrize(
@@ -106,7 +128,9 @@ def test_what_the_package_offers():
 )
 def test_changes_as_people_write_them(tmp_path, changes, key, value):
     (tmp_path / "a.toml").write_text("")
-    for valve in (dbvfiv.load(tmp_path / "a.toml", changes), dbvfiv.load(thesis_case()).replace(changes)):
+    own = dbvfiv.load(tmp_path / "a.toml", changes)
+    assert own.name == "a"
+    for valve in (own, dbvfiv.load(thesis_case()).replace(changes)):
         found = valve.case
         for part in key.split("."):
             found = getattr(found, part)

@@ -26,10 +26,7 @@ def bogdanov_takens() -> JaxSystem:
 
     Fold: b2^2 = 4 b1; Hopf (s = -1): b1 = 0, b2 < 0, omega^2 = -b2; both meet at the origin.
     """
-    return JaxSystem(
-        lambda u, mu: jnp.stack([u[1], mu["b1"] + mu["b2"] * u[0] + u[0] ** 2 + mu["s"] * u[0] * u[1]]),
-        2,
-    )
+    return JaxSystem(lambda u, mu: jnp.stack([u[1], mu["b1"] + mu["b2"] * u[0] + u[0] ** 2 + mu["s"] * u[0] * u[1]]), 2)
 
 
 def bautin() -> JaxSystem:

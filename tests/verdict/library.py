@@ -269,8 +269,7 @@ def _opening(rng):
     """The valve opens within some periods and rings about the new level."""
     ratio = np.exp(rng.uniform(*np.log((0.01, 0.1))))
     b = _until(
-        lambda: Bench(rng, (0.005, 0.05), 20),
-        lambda b: 4 < ratio * b.w * b.duration < 30 and b.rate > 10 * b.frequency,
+        lambda: Bench(rng, (0.005, 0.05), 20), lambda b: 4 < ratio * b.w * b.duration < 30 and b.rate > 10 * b.frequency
     )
     ramp = rng.uniform(0.3, 1.5) / b.frequency
     u = np.clip(b.t / ramp, 0, 1)

@@ -7,49 +7,10 @@ import pytest
 
 pytestmark = pytest.mark.filterwarnings("error::RuntimeWarning")  # numpy's would be printed beside the verdict
 
-HEADS = (
-    "time,p",
-    "t [ms];p [kPa]",
-    "sample,p",
-    "Zeitstempel;Druck [bar]",
-    "time [furlong],p",
-    "",
-    "p",
-    "# time p",
-    '"time,p',
-    "time,p,q",
-    "t/s x\ns Pa",
-    "Zeit\tDruck",
-    "é,ü",
-    "[s]",
-)
-CELLS = (
-    "",
-    "NaN",
-    "inf",
-    "-",
-    "1e400",
-    "1e-320",
-    "abc",
-    "1,5",
-    "0x10",
-    "12:00:00",
-    "2026-13-45 25:61",
-    "--5",
-    "1e99",
-    "½",
-    '"',
-)
-
-
-INJURIES = (
-    *(word.encode() for word in "nan inf - ,, ;; 1e308 1e99 # text 1_0".split()),
-    b'"',
-    b"\xb5",
-    b"\0",
-    b"\r",
-    b" ",
-)
+HEADS = ("time,p", "t [ms];p [kPa]", "sample,p", "Zeitstempel;Druck [bar]", "time [furlong],p", "", "p", "# time p")
+HEADS += ('"time,p', "time,p,q", "t/s x\ns Pa", "Zeit\tDruck", "é,ü", "[s]")
+CELLS = ("", *'NaN inf - 1e400 1e-320 abc 1,5 0x10 12:00:00 --5 1e99 ½ "'.split(), "2026-13-45 25:61")
+INJURIES = (*(word.encode() for word in 'nan inf - ,, ;; 1e308 1e99 # text 1_0 "'.split()), b"\xb5", b"\0", b"\r", b" ")
 
 
 def rows(rng):
@@ -128,9 +89,9 @@ def check(command_line, folder, one_sentence, seeds):
 
 
 def test_bad_files_are_answered_by_sentences(command_line, tmp_path, one_sentence):
-    check(command_line, tmp_path, one_sentence, range(80))
+    check(command_line, tmp_path, one_sentence, range(40))
 
 
 @pytest.mark.slow
 def test_no_bad_file_ends_in_a_traceback(command_line, tmp_path, one_sentence):
-    check(command_line, tmp_path, one_sentence, range(80, 4000))
+    check(command_line, tmp_path, one_sentence, range(40, 4000))

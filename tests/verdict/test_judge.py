@@ -1,5 +1,7 @@
 """The verdict on series whose answer is known, among them those that mislead simpler rules."""
 
+from functools import cache
+
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
@@ -151,32 +153,36 @@ def test_cycles_under_noise(name):
 MOVING = {"growing": GROWING, "decaying": DECAYING, "irregular": IRREGULAR}
 
 
+@cache
+def judged(name, series):
+    """Of every fourth sample: motions as slow as these need no more."""
+    return judge(T[::4], MOVING[name][series][::4])
+
+
 @pytest.mark.parametrize("name, series", [(name, series) for name, known in MOVING.items() for series in known])
 def test_growing_decaying_and_irregular(name, series):
-    verdict = judge(T, MOVING[name][series])
+    verdict = judged(name, series)
     assert verdict.name == name, verdict.reason
+    assert verdict.decided or series not in ("growing", "decaying")
 
 
 @pytest.mark.parametrize("name", UNDECIDED)
 def test_not_decided_too_early(name):
     verdict = judge(T, UNDECIDED[name])
     assert not verdict.decided and verdict.name in ("undecided", "growing"), verdict.reason
-
-
-def test_a_period_that_becomes_shorter_changes_by_less_than_nothing():
-    assert "period still changes by -0.03" in judge(T, UNDECIDED["period that creeps"]).reason
+    if name == "period that creeps":  # it becomes shorter
+        assert "period still changes by -0.03" in verdict.reason
 
 
 @pytest.mark.parametrize("rate, start, name", [(0.3, 0.05, "growing"), (0.1, 2.0, "decaying")])
 def test_slow_ways_to_a_cycle_are_not_certain_growth_or_decay(rate, start, name):
     verdict = judge(T, relaxing(rate, start))
     assert (verdict.name, verdict.decided) == (name, False) and "less and less" in verdict.reason
-    assert judge(T, GROWING["growing"]).decided and judge(T, DECAYING["decaying"]).decided
 
 
 def test_rates_of_growth_a_cycle():
-    assert judge(T, GROWING["0.1 % a cycle"]).amplitude_trend == pytest.approx(1e-3, rel=0.01)
-    assert judge(T, GROWING["growing"]).amplitude_trend == pytest.approx(np.expm1(0.5 / 3), rel=0.01)
+    assert judged("growing", "0.1 % a cycle").amplitude_trend == pytest.approx(1e-3, rel=0.01)
+    assert judged("growing", "growing").amplitude_trend == pytest.approx(np.expm1(0.5 / 3), rel=0.01)
     doubling = judge(T, 2.0 ** (3 * T) * np.sin(W * T))
     assert doubling.amplitude_trend == pytest.approx(1.0, rel=0.01) and "changes by +100 %" in doubling.reason
 
@@ -199,11 +205,6 @@ def test_sampling_at_the_period_is_not_steady_while_the_system_moves():
     verdict = judge(T, strobed, residual=0.5)
     assert verdict.name == "undecided" and "sampled at its own period" in verdict.reason
     assert judge(T, 0 * T + 3, residual=1e-6).name == "steady"
-
-
-def test_two_incommensurate_lines_are_no_cycle():
-    t = np.linspace(0, 60, 30001)
-    assert judge(t, np.sin(W * t) + 0.5 * np.sin(1.6180339887 * W * t)).name == "irregular"
 
 
 @pytest.mark.slow
@@ -249,49 +250,36 @@ def test_harmonics():
     assert found[:3, 1] == pytest.approx([-np.pi / 2, 1 - np.pi / 2, 0], abs=1e-5)
 
 
-def test_uneven_samples():
-    t = np.sort(np.concatenate([np.linspace(0, 10, 3000), np.random.default_rng(5).uniform(0, 10, 2000)]))
-    verdict = judge(t, 2 + np.sin(W * t))
-    assert verdict.name == "limit cycle" and verdict.period == pytest.approx(1 / 3, rel=1e-6)
-
-
 def test_units_and_offset_of_time_do_not_matter():
     for name in ("reached fast", "doubled period"):
-        values = CYCLES[name][0]
-        one, other = judge(T, values), judge(1e3 + 1e-3 * T, 1e-6 * values)
+        t, values = T[::4], CYCLES[name][0][::4]
+        one, other = judge(t, values), judge(1e3 + 1e-3 * t, 1e-6 * values)
         assert other.name == one.name
         assert other.period == pytest.approx(1e-3 * one.period, rel=1e-5)
         assert other.amplitude == pytest.approx(1e-6 * one.amplitude, rel=1e-6)
 
 
-# period and amplitude of van der Pol's oscillator, computed to the digits given
-@pytest.mark.parametrize("mu, period, amplitude", [(0.5, 6.380676, 2.002488), (1.0, 6.663287, 2.008620)])
-def test_van_der_pol(mu, period, amplitude):
-    t = np.linspace(0, 200, 8001)
-    run = solve_ivp(
-        lambda _, y: [y[1], mu * (1 - y[0] ** 2) * y[1] - y[0]],
-        (0, 200),
-        [0.1, 0],
-        t_eval=t,
-        rtol=1e-11,
-        atol=1e-12,
-        method="DOP853",
-    )
+def _van_der_pol(_, y):
+    return [y[1], (1 - y[0] ** 2) * y[1] - y[0]]
+
+
+def test_van_der_pol():
+    """With mu = 1; period and amplitude to the digits given."""
+    t, tolerances = np.linspace(0, 200, 8001), {"rtol": 1e-11, "atol": 1e-12}
+    run = solve_ivp(_van_der_pol, (0, 200), [0.1, 0], "DOP853", t, **tolerances)
     verdict = judge(t, run.y[0])
     assert verdict.name == "limit cycle" and verdict.decided
-    assert verdict.period == pytest.approx(period, abs=6e-7)
-    assert verdict.amplitude == pytest.approx(amplitude, abs=6e-7)
+    assert verdict.period == pytest.approx(6.663287, abs=6e-7)
+    assert verdict.amplitude == pytest.approx(2.008620, abs=6e-7)
     early = judge(t[:400], run.y[0][:400])
     assert early.name in ("growing", "undecided")
 
 
-@pytest.mark.parametrize(
-    "system, span, component", [(rossler, (100, 400), 0), (lorenz, (10, 60), 0), (lorenz, (10, 60), 2)]
-)
-def test_chaos_is_irregular(system, span, component):
-    t = np.linspace(*span, 10001)
-    values = solve_ivp(system, (0, span[1]), [1, 1, 1], t_eval=t, rtol=1e-9).y[component]
-    assert judge(t, values).name == "irregular"
+@pytest.mark.parametrize("system, span, components", [(rossler, (100, 400), [0]), (lorenz, (10, 60), [0, 2])])
+def test_chaos_is_irregular(system, span, components):
+    t = np.linspace(*span, 5001)
+    motion = solve_ivp(system, (0, span[1]), [1, 1, 1], t_eval=t, rtol=1e-7).y[components]
+    assert [judge(t, values).name for values in motion] == ["irregular"] * len(components)
 
 
 @pytest.mark.parametrize(

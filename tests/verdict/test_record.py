@@ -49,11 +49,9 @@ HEADERS = {
 
 
 @pytest.mark.parametrize("header", HEADERS)
-def test_units_of_time_in_the_header(command_line, tmp_path, header):
-    factor = HEADERS[header]
-    file = record(tmp_path, text_of(np.column_stack([T / factor, SINE]), header))
-    (found,) = judged(command_line, file)
-    assert found["verdict"] == "limit cycle" and found["frequency"] == pytest.approx(3.0, rel=1e-5)
+def test_units_of_time_in_the_header(tmp_path, header):
+    table = read_table(record(tmp_path, text_of(np.column_stack([T / HEADERS[header], SINE])[:20], header)))
+    assert table.seconds(0) * table.values[:, 0] == pytest.approx(T[:20]) and len(table.names) == 2
 
 
 def test_a_unit_may_be_given(command_line, tmp_path):
@@ -68,12 +66,11 @@ def test_units_that_are_none_of_time_are_refused(misused, tmp_path, header):
 
 @pytest.mark.parametrize("separator", [";", "\t", " "])
 @pytest.mark.parametrize("encoding", ["utf-8-sig", "latin-1", "utf-16"])
-def test_decimal_commas_and_encodings(command_line, tmp_path, separator, encoding):
-    header = separator.join(["Zeit", "Öffnung"])
-    text = text_of(np.column_stack([T, SINE]), header, separator, ",").replace("\n", "\r\n")
-    (found,) = judged(command_line, record(tmp_path, text, encoding))
-    assert found["name"] == "Öffnung" and found["frequency"] == pytest.approx(3.0, rel=1e-5)
-    assert found["mean"] == pytest.approx(2.0, rel=1e-3)
+def test_decimal_commas_and_encodings(tmp_path, separator, encoding):
+    header, rows = separator.join(["Zeit", "Öffnung"]), np.column_stack([T, SINE])[:20]
+    text = text_of(rows, header, separator, ",").replace("\n", "\r\n")
+    table = read_table(record(tmp_path, text, encoding))
+    assert table.names == ("Zeit", "Öffnung") and table.values == pytest.approx(rows)
 
 
 def test_blank_lines_and_separators_at_the_end(command_line, tmp_path):
@@ -153,9 +150,10 @@ def test_a_gap_in_the_middle_of_many_leaves_too_few(command_line):
 
 
 def test_uneven_samples_are_said_to_be_interpolated():
-    t = np.sort(np.random.default_rng(5).uniform(0, 10, 3000))
+    t = np.sort(np.concatenate([np.linspace(0, 10, 3000), np.random.default_rng(5).uniform(0, 10, 2000)]))
     verdict = judge(t, 2 + np.sin(6 * np.pi * t))
-    assert verdict.name == "limit cycle" and "uneven" in verdict.notes[0]
+    assert verdict.name == "limit cycle" and verdict.period == pytest.approx(1 / 3, rel=1e-6)
+    assert "uneven" in verdict.notes[0]
     assert judge(np.round(T, 4), SINE).notes == ()
 
 
