@@ -129,9 +129,8 @@ def plot(
 
     only, films = only or (), animate or ()
     if file.suffix.lower() == ".toml":
-        for name, value in {"--pressure": pressure, "--mode": mode, "--animate": films or None}.items():
-            if value is not None:
-                raise CaseError(f"{name} goes with a result file; the picture of {str(file)!r} is that of its valve.")
+        why = f"goes with a result file; the picture of {str(file)!r} is that of its valve"
+        refuse_beside({"--pressure": pressure, "--mode": mode, "--animate": films}, why)
         print_written(load(file, list(overrides or ())).plot(folder, format.value, only=only), as_json)
         return
     if overrides:
@@ -184,7 +183,7 @@ def compare(
     within: Annotated[
         float,
         typer.Option("--within", metavar="%", help="Of a record: half the 95 % interval of computed frequencies."),
-    ] = 10.0,
+    ] = _WITHIN,
     as_json: AsJson = False,
 ) -> None:
     """Compare transient runs: their histories in one figure, their verdicts in one table; or steady runs: their head
@@ -206,6 +205,8 @@ def compare(
         path = save_figure(found.draw, output)
         print_answer(found.document() | {"figure": str(path)}, lambda: [*found.lines(), f"Wrote {path}."], as_json)
         return
+    within_given = {"--column": columns, "--within": within if within != _WITHIN else None}
+    refuse_beside(within_given, "goes with a measured record, which is compared with one result")
     results = [load_result(file) for file in files]
     kind = results[0].kind
     for file, result in zip(files, results):
@@ -336,10 +337,12 @@ def export(
     from ..studies.session import load_result
 
     if format is not Format.vtkhdf:
+        refuse_beside({"--mode": mode, "--deformed": deformed}, "goes with fields for ParaView, --format vtkhdf")
         folder = file.parent if output is None else output
         state = _choose_state(file, pressure)
         print_written(state.export_shapes(folder, format.value, shape or (), quarter), as_json)
         return
+    refuse_beside({"--shape": shape, "--state": pressure}, "goes with --format stl or step")
     result = load_result(file)
     choices = {} if mode is None else {"mode": mode}
     beside = file.with_suffix(".vtkhdf") if mode is None else file.with_name(f"{file.stem}-mode{mode}.vtkhdf")
@@ -528,8 +531,13 @@ def verdict(
     reading = Reading(columns or (), time or "", rate, time_unit, skip_bad, since, until, detrend)
     if not 0 < steady < 1:
         raise CaseError(f"--steady is {steady:g}; it must be greater than 0 and less than 1.")
+    if closed_below is not None and not math.isfinite(closed_below):
+        raise CaseError(f"--closed-below is {closed_below:g}; it must be finite.")
     options = JudgeOptions(steady=steady)
+    refuse_beside({"--time": time, "--time-unit": time_unit} if rate else {}, "says what --rate says too")
     if file.is_file() and h5py.is_hdf5(file):
+        of_table = {"--time": time, "--rate": rate, "--time-unit": time_unit, "--skip-bad": skip_bad}
+        refuse_beside(of_table | {"--no-detrend": not detrend}, "goes with a measured record")
         judged = _judged_run(file, reading, options, closed_below)
     else:
         judged = judge_file(file, reading, options, closed_below)

@@ -79,6 +79,19 @@ def in_units(units: Units) -> Iterator[None]:
         raise
 
 
+def refuse_beside(given: Mapping[str, object], why: str) -> None:
+    """Refuse options, by name, that mean nothing beside others.
+
+    Raises
+    ------
+    CaseError
+        For the first one that is given, with why.
+    """
+    for name, value in given.items():
+        if value not in (None, False, (), []):
+            raise CaseError(f"{name} {why}.")
+
+
 def print_json(document: Any) -> None:
     """Print one JSON document; arrays become lists, numbers that are not finite become null."""
     json.dump(json_value(document), sys.stdout, indent=1, allow_nan=False)

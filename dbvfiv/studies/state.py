@@ -15,7 +15,7 @@ from eigen.operator import CoupledPencil
 
 from ..case.axis import write_axis
 from ..case.parameters import Mu
-from ..errors import SolveError
+from ..errors import CaseError, SolveError
 from ..model.dynamics import linearise
 from ..model.equilibria import LoadPath, SteadyOptions, require_equilibrium
 from ..model.state import SteadyState
@@ -27,7 +27,7 @@ from ..record.vtkhdf import Step, layer_field_names, motion
 from ..shell.recovery import LayerFields
 from .case import Case
 from .result import StudyResult
-from .session import find_study, named_changes
+from .session import Session, find_study, named_changes
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,11 +81,13 @@ class State(SteadyState):
     def pencil(self, **changes: Any) -> CoupledPencil:
         """Operator of small motions about this state: M, C, K, G and J as sparse matrices, the fluid's parts dense.
 
-        Fluid and damping may differ from those it was found with, see `modes`. Rows of M, C and K are the unknowns of
+        Fluid and damping may differ from those it was found with, the pressure may not. Rows of M, C and K are the unknowns of
         ``q``, those of ``model.shell.dofs``.
 
         Raises
         ------
+        CaseError
+            If another pressure is asked for.
         SolveError
             If it is no steady state of that fluid.
 
@@ -93,10 +95,10 @@ class State(SteadyState):
         --------
         >>> state.pencil(density=1.2, alpha=0).K     # doctest: +SKIP
         """
-        given, model = {"drive.pressure": self.pressure} | named_changes(changes), self.model
-        session = self.results.session.replace(given)
+        session, model = self._session(named_changes(changes)), self.model
         point, own = Mu.of(session.case), Mu.of(model.case)
-        if any(point.get(name) != own.get(name) for name in ("density", "pipe_length")):  # which may move the state
+        moves = any(point.get(name) != own.get(name) for name in ("density", "pipe_length"))
+        if moves or session.case.has_waves != model.case.has_waves:
             model = session.model
             require_equilibrium(model, self)
         return linearise(model, self.q, self.pressure).pencil(point)
@@ -138,9 +140,18 @@ class State(SteadyState):
         """
         return self._ask("sensitivity", sensitivity_keys(of, mode), changes, output, observer)
 
+    def _of_state(self, changes: dict[str, Any]) -> dict[str, Any]:
+        """Changes of the case that leave the state what it is."""
+        if "drive.pressure" in changes:
+            raise CaseError("A state has the pressure it was found at; ask the valve for another.", "drive.pressure")
+        return changes
+
+    def _session(self, changes: dict[str, Any]) -> Session:
+        """The session at the pressure of this state, changed otherwise."""
+        return self.results.session.replace({"drive.pressure": self.pressure} | self._of_state(changes))
+
     def _ask(self, kind: str, keys: dict[str, Any], given: dict[str, Any], output: Any, observer: Any) -> Any:
-        session = self.results.session.replace({"drive.pressure": self.pressure})
-        session = session.prepared(kind, keys | named_changes(given, kind))
+        session = self._session({}).prepared(kind, keys | self._of_state(named_changes(given, kind)))
         session.start = self.solution()
         return session.perform(kind, output, observer)
 

@@ -36,8 +36,8 @@ def test_a_killed_run_loses_nothing_and_ends_with_the_same_numbers(tmp_path, ask
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", KINDS)
 def test_many_kills_and_reads(tmp_path, ask, kind):
-    """At least 100 kills and 500 reads in all."""
-    kills = 100 // len(KINDS) + 1
+    """At least 200 kills and 500 reads in all."""
+    kills = 200 // len(KINDS) + 1
     found = ask(kind=kind, folder=str(tmp_path), kills=kills, in_a_row=3, seed=100 + KINDS.index(kind))
     assert not found["wrong"] and found["kills"] >= kills, found
     reads = found["reads"]
