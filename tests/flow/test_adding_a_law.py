@@ -14,7 +14,7 @@ from types import ModuleType, SimpleNamespace
 import numpy as np
 import pytest
 
-from dbvfiv.flow import Channel, FlowMotion, Stream
+from dbvfiv.flow import Channel, Stream
 from tests.flow.test_channel import FLOOR, passage
 
 ROOT = Path(__file__).parents[2]
@@ -77,58 +77,6 @@ def test_a_pipe_adds_its_inertance_to_every_pressure():
     assert ours.B1[1:] == pytest.approx(theirs.B1[1:] - 850.0 * 4.0)
     assert ours.S1 == pytest.approx(theirs.S1 - 850.0 * 4.0)
     assert ours.A2 == pytest.approx(theirs.A2) and ours.B0 == pytest.approx(theirs.B0)
-
-
-@pytest.mark.parametrize("velocity", [1.7, -0.8])
-@pytest.mark.parametrize("term", [LipLoss(0.6), Pipe(4.0, 2.5)], ids=["lips", "pipe"])
-def test_jacobians_against_complex_steps(term, velocity):
-    """The whole law's derivative by one direction in all arguments, by the step that has no rounding.
-
-    |U| is written as sign(U) U, which agrees and is analytic.
-    """
-    z, area = passage()
-    given = {"inlet": 18e3, "density": 850.0}
-    m, generator = len(z), np.random.default_rng(4)
-    law = Channel(z, FLOOR, 0.8, terms=[term])
-    motion = FlowMotion(
-        area, 0.02 * generator.standard_normal(m), generator.standard_normal(m), np.array([velocity]), np.array([3.0])
-    )
-    direction = FlowMotion(*(np.abs(x) * generator.standard_normal(x.shape) for x in motion))
-    found = law.linearise(motion, given)
-    upper = sum(getattr(found, name) @ d for name, d in zip(("A0", "A1", "A2", "B0", "B1"), direction))
-    lower = sum(getattr(found, name) @ d for name, d in zip(("R0", "R1", "R2", "S0", "S1"), direction))
-    step = 1e-30
-    moved = [x + 1j * step * d for x, d in zip(motion, direction)]
-    p = by_hand(law, term, *moved, **given)
-    value, outlet = law.evaluate(motion, given)
-    assert p.real[1:] == pytest.approx(value[1:], rel=1e-11) and p.real[0] == pytest.approx(outlet[0], rel=1e-11)
-    assert upper[1:] == pytest.approx(p.imag[1:] / step, rel=1e-10, abs=1e-10 * np.abs(upper).max())
-    assert lower[0] == pytest.approx(p.imag[0] / step, rel=1e-10)
-
-
-def by_hand(law, term, area, rate, acceleration, inner, inner_rate, inlet, density):
-    """Pressures in numpy with complex numbers, rates of the speeds by the product rule."""
-    x = area / law.floor - 1.0
-    grown = np.exp(-x)
-    slope = 1.0 / (1.0 + grown)
-    open_ = law.floor * (1.0 + x + np.log(1.0 + grown))
-    opened, opened_rate = slope * rate, slope * acceleration + slope * (1.0 - slope) / law.floor * rate**2
-
-    def upstream(values):
-        pieces = 0.5 * law.step * (values[1:] + values[:-1])
-        return np.append(np.cumsum(pieces[::-1])[::-1], 0.0)
-
-    discharge = open_[-1] * inner[0] - law.storage * upstream(opened)
-    discharge_rate = opened[-1] * inner[0] + open_[-1] * inner_rate[0] - law.storage * upstream(opened_rate)
-    speed = discharge / open_
-    inertia = upstream(discharge_rate / open_ - speed * opened / open_)
-    head = 0.5 * (speed**2 - inner[0] ** 2)
-    if isinstance(term, LipLoss):
-        head[0] += 0.5 * term.coefficient * np.sign(speed[0].real) * speed[0] ** 2
-    else:
-        head += 0.5 * term.loss * np.sign(inner[0].real) * inner[0] ** 2
-        inertia = inertia + term.length * inner_rate[0]
-    return inlet - density * (head + inertia)
 
 
 def test_the_key_is_understood_and_makes_the_term():

@@ -20,8 +20,8 @@ DENSITY, SUPPLY = 998.0, 18e3
 QUARTER = 0.012
 
 
-def line_of(length=20.0, speed=1000.0, elements=6, **keys) -> ElasticLine:
-    return ElasticLine(Line(length, keys.pop("diameter", None), **keys), speed, elements)
+def line_of(length=20.0, speed=1000.0, elements=3, **keys) -> ElasticLine:
+    return ElasticLine(Line(length, keys.pop("diameter", 0.2), **keys), speed, elements)
 
 
 def behind(line: ElasticLine, storage=0.0) -> LineChannel:
@@ -41,13 +41,12 @@ def test_organ_pipe():
     """
     exact = 0.5 * np.pi * 1000.0 / 20.0 * (2 * np.arange(40) + 1)
     errors = []
-    for elements in (2, 4, 8):
+    for elements in (4, 8):
         line = line_of(elements=elements, diameter=0.3)
         found = shut_frequencies(line)
         assert len(found) == 4 * elements  # no mode too many
         errors.append(found[:4] / exact[:4] - 1)
-    assert np.log2(errors[0][1:] / errors[1][1:]) == pytest.approx(8.0, abs=1.0)
-    assert np.log2(errors[1][1:] / errors[2][1:]) == pytest.approx(8.0, abs=0.3)
+    assert np.log2(errors[0][1:] / errors[1][1:]) == pytest.approx(8.0, abs=0.3)
     inside = 2 * np.pi * behind(line).resolved({}) >= exact
     assert inside.sum() == 8 and np.abs(found[:8] / exact[:8] - 1).max() < 2e-4
 
@@ -60,10 +59,11 @@ def test_as_many_elements_as_resolve_two_hundred_hertz():
 @pytest.mark.parametrize("storage", [0.0, 1.0])
 def test_the_rigid_column_is_the_limit_of_a_fast_line(storage):
     """Eliminated at a frequency, the line's own unknowns leave the rigid column's operators but for (s/c)^2."""
-    keys = {"friction": 0.02, "loss": 1.5, "diameter": 0.2, "reservoir": False}
+    keys = {"friction": 0.02, "loss": 1.5, "reservoir": False}
     z, area = passage()
     given, s = {"inlet": SUPPLY, "density": DENSITY}, 20.0 + 250.0j
-    rigid = Channel(z, FLOOR, storage, terms=[Line(7.0, **keys)]).linearise_still(area, given)
+    column = Channel(z, FLOOR, storage, terms=[Line(7.0, 0.2, **keys)])
+    rigid = column.linearise_still(area, given)
     expected = np.array([rigid.S0 + s * rigid.S1, rigid.B0[5:6] + s * rigid.B1[5:6]]).ravel()
     gaps = []
     for speed in (1e4, 1e5, 1e6):
@@ -73,10 +73,7 @@ def test_the_rigid_column_is_the_limit_of_a_fast_line(storage):
         own = la.solve(S[1:, 1:], -S[1:, :1])
         got = np.array([S[0, 0] + S[:1, 1:] @ own[:, 0], B[5, 0] + B[5:6, 1:] @ own[:, 0]]).ravel()
         gaps.append(np.abs(got / expected - 1).max())
-        assert law.steady_pressure(area, SUPPLY) == pytest.approx(
-            Channel(z, FLOOR, storage, terms=[Line(7.0, **keys)]).steady_pressure(area, SUPPLY), rel=1e-13
-        )
-    print(gaps)
+        assert law.steady_pressure(area, SUPPLY) == pytest.approx(column.steady_pressure(area, SUPPLY), rel=1e-13)
     assert gaps[0] / gaps[1] == pytest.approx(100, rel=0.05) and gaps[1] / gaps[2] == pytest.approx(100, rel=0.2)
     assert gaps[2] < 0.5 * (abs(s) * 7.0 / 1e6) ** 2  # tanh(x)/x = 1 - x^2/3 + ...
 
@@ -84,7 +81,7 @@ def test_the_rigid_column_is_the_limit_of_a_fast_line(storage):
 def test_steady_flow_meets_the_equations():
     z, area = passage()
     for reservoir in (True, False):
-        law = behind(line_of(7.0, 800.0, friction=0.02, loss=3.0, diameter=0.2, reservoir=reservoir), 1.0)
+        law = behind(line_of(7.0, 800.0, friction=0.02, loss=3.0, reservoir=reservoir), 1.0)
         given = {"inlet": SUPPLY, "density": DENSITY}
         inner = law.steady_inner(area, given)
         pressure, rest = law.evaluate(FlowMotion.still(area, inner), given)
@@ -95,11 +92,11 @@ def test_steady_flow_meets_the_equations():
 
 def test_a_line_without_a_flow_has_the_pressure_behind_the_valve():
     z, area = passage()
-    line = line_of(7.0, 800.0)
+    line, narrow = line_of(7.0, 800.0), 16 * area[-1] / (np.pi * 0.2**2)  # the inlet's area over the line's
     law = LineChannel(Channel(z, FLOOR, back=1e4), Channel(z, FLOOR, back=1e4, terms=[line.line]), line)
     inner = MovingFluid(law, DENSITY).steady_inner(area, 0.0)
     velocity, pressure = np.split(inner, [-(line.size // 2)])
-    assert not velocity.any() and DENSITY * 800.0 * pressure == pytest.approx(np.full(line.size // 2, 1e4))
+    assert not velocity.any() and DENSITY * 800.0 * narrow * pressure == pytest.approx(np.full(line.size // 2, 1e4))
 
 
 @pytest.mark.slow
@@ -109,7 +106,7 @@ def test_water_hammer():
     """
     length, speed, velocity = 20.0, 1000.0, 0.5
     stop, step = 0.4 * length / speed, length / speed / 200
-    waves = MovingFluid(Waves(line_of(length, speed, 24), QUARTER), DENSITY)
+    waves = MovingFluid(Waves(line_of(length, speed, 24, diameter=None), QUARTER), DENSITY)
     flange = lambda t: 0.5 * velocity * (1.0 + np.cos(np.pi * min(1.0, t / stop)))  # noqa: E731
     pressure, states = march(waves, flange, step, 1600, SUPPLY)
     rise = (pressure - SUPPLY) / (DENSITY * speed * velocity)  # the velocity head is a part of 4000
@@ -124,7 +121,7 @@ def test_water_hammer():
 
 @pytest.mark.parametrize("theta, rate", [(0.6, 1.1), (1.0, 1.0), (1.0, 1.5)])
 def test_what_damped_steps_take_is_in_the_books(theta, rate):
-    line = line_of(20.0, 1000.0, 6, friction=0.02, loss=2.0, diameter=0.2)
+    line = line_of(friction=0.02, loss=2.0)
     waves = MovingFluid(Waves(line, QUARTER), DENSITY)
     flange = lambda t: 0.5 + 0.3 * np.sin(40.0 * t)  # noqa: E731
     _, states = march(waves, flange, 2e-3, 100, SUPPLY, theta=theta, rate=rate)
@@ -163,7 +160,7 @@ def test_friction_wears_a_blow_down_as_by_characteristics():
     """A line that loses much: mean pressures over each half period at the shut flange within 0.1 % of the blow."""
     length, speed, velocity, loss = 20.0, 1000.0, 1.0, 400.0
     expected, dt = characteristics(length, speed, loss, velocity, SUPPLY / DENSITY, 801, 6400)
-    line = line_of(length, speed, 24, loss=loss, reservoir=False)
+    line = line_of(length, speed, 24, diameter=None, loss=loss, reservoir=False)
     head = lambda velocity, source, area, parameters, steady=False: source  # noqa: E731
     line.far_head = head  # a total pressure, as the other solution has it
     waves = MovingFluid(Waves(line, QUARTER), DENSITY)
@@ -175,7 +172,6 @@ def test_friction_wears_a_blow_down_as_by_characteristics():
     half = 2 * length / speed
     mean = lambda x, d, i: x[int(round((i + 0.05) * half / d)) : int(round((i + 0.95) * half / d))].mean()  # noqa: E731
     steps = [(mean(ours, step, i), mean(theirs, dt, i)) for i in range(4)]
-    print(steps)
     for found, other in steps:
         assert found == pytest.approx(other, abs=0.001 * speed * velocity)
     worn = abs(steps[3][1] - SUPPLY / DENSITY) / abs(steps[0][1] - SUPPLY / DENSITY)
@@ -206,15 +202,16 @@ def check_step(line: ElasticLine, inlet: float):
     assert flow.slopes(0.0)[0] == pytest.approx((ahead - behind) / (2 * d), rel=1e-6)
 
 
-@pytest.mark.parametrize("reservoir", [True, False])
+@pytest.mark.parametrize("reservoir", [True, pytest.param(False, marks=pytest.mark.slow)])
 def test_what_a_step_solves_is_the_law(reservoir):
     _, area = passage()
-    check_step(line_of(7.0, 800.0, 3, friction=0.03, loss=2.0, diameter=0.2, reservoir=reservoir), area[-1])
+    check_step(line_of(7.0, 800.0, friction=0.03, loss=2.0, reservoir=reservoir), area[-1])
 
 
 def test_a_rigid_column_of_its_length_where_the_step_is_long():
     """Over a step that is long against L/c the impedance is that of the rigid column."""
-    fluid = MovingFluid(Waves(line_of(7.0, 1e5, 2), QUARTER), DENSITY)
+    own = np.sqrt(16 * QUARTER / np.pi)
+    fluid = MovingFluid(Waves(line_of(7.0, 1e5, diameter=own), QUARTER), DENSITY)
     still, moved = ((np.array([x]), np.zeros(1)) for x in (0.0, 0.1))
     state = fluid.moving(still, np.zeros(1), np.zeros(fluid.law.inner), 0.0)
     flow = fluid.step(state, still, 1e-2, 0.5, 1.0, 0.0).at((0.5 * moved[0], still[1]), moved)
@@ -232,11 +229,15 @@ def test_friction_damps_all_waves_alike():
     """Around a uniform flow friction is 2 |w| times the mass, on the quickest wave of an element too, which is 0 at the
     points of the pressure.
     """
-    line, parameters = line_of(elements=3, friction=0.02), {"pipe_length": 20.0, "wave_speed": 1000.0}
-    flow = np.full(DEGREE * 3 + 1, 1.7)
-    slope = jax.jacfwd(lambda w: line.friction(w, 0.05, parameters))(flow)
-    mass = jax.jacfwd(lambda w: line.held(w, np.zeros(DEGREE * 3), 0.05, parameters)[0])(flow)
-    lost = line.segments(0.05, parameters).lost.sum()
-    ratio = line.segments(0.05, parameters).ratio[0]
+    line, parameters = line_of(friction=0.02), {"pipe_length": 20.0, "wave_speed": 1000.0}
+
+    @jax.jit
+    def parts(flow):
+        friction = jax.jacfwd(lambda w: line.friction(w, 0.05, parameters))(flow)
+        momentum = jax.jacfwd(lambda w: line.held(w, np.zeros(DEGREE * 3), 0.05, parameters)[0])(flow)
+        return friction, momentum, line.segments(0.05, parameters)
+
+    slope, mass, segments = parts(np.full(DEGREE * 3 + 1, 1.7))
+    lost, ratio = segments.lost.sum(), segments.ratio[0]
     assert lost > 0
     np.testing.assert_allclose(slope, 2 * 1.7 * lost / (ratio * 20.0) * mass, atol=1e-12 * np.abs(slope).max())

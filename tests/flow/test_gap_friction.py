@@ -147,10 +147,9 @@ def test_wide_openings_lose_little_and_gaps_nearly_all():
     assert thin[1] == pytest.approx(plain[1], rel=1e-3)
 
 
-@pytest.mark.parametrize("law", [pytest.param("quasi-steady", marks=pytest.mark.slow), "storage"])
-def test_cells_of_a_column_are_those_of_the_full_pencil(law):
+def test_cells_of_a_column_are_those_of_the_full_pencil():
     """Columns know fluids of unit density only. The density moves the steady state, so no study keeps it for others."""
-    case = thesis_case(COARSE | {"fluid.viscosity": "water", "fluid.continuity": law, "drive.pressure": 600.0})
+    case = thesis_case(COARSE | {"fluid.viscosity": "water", "fluid.continuity": "storage", "drive.pressure": 600.0})
     assert not is_surrounding(case, "density") and is_surrounding(thesis_case(), "density")
     walk, place = StabilityWalk(case), Mu.of(case).at(density=900.0)
     betas = (1e-3, 2e-3, 3e-3, 5e-3)

@@ -37,19 +37,17 @@ def at_rest(law, area: np.ndarray):
 
 
 def test_organ_pipe():
-    """c/(4 L) (2 n + 1) with an open and a shut end; the box scheme is too high by (k h)^2/12, which is what `resolved`
-    goes by.
+    """An odd number of quarter waves with an open and a shut end: a cell of the box scheme holds 2 atan(w h/(2 c)), so
+    that frequencies are too high by (k h)^2/12, which is what `resolved` goes by.
     """
-    length, step, errors = 0.56, 1e-6, []
-    exact = 0.5 * np.pi * SOUND / length * (2 * np.arange(3) + 1)
-    for cells in (7, 14):
-        z = np.concatenate([[0.0], step + np.linspace(0.0, length, cells + 1)])
-        area = np.concatenate([[SHUT], np.full(cells + 1, 5e-3)])
-        law = gas_of(z, TINY)
-        errors.append(frequencies(at_rest(law, area))[:3] / exact - 1)
-        assert errors[-1][0] == pytest.approx((exact[0] / SOUND * length / cells) ** 2 / 12, rel=0.02)
-    assert np.log2(errors[0] / errors[1]) == pytest.approx(2.0, abs=0.25)
-    assert (2 * np.pi * law.resolved({}) / SOUND * length / cells) ** 2 / 12 == pytest.approx(0.01, rel=1e-6)
+    length, step, cells = 0.56, 1e-6, 7
+    z = np.concatenate([[0.0], step + np.linspace(0.0, length, cells + 1)])
+    law, h = gas_of(z, TINY), length / cells / SOUND
+    found = frequencies(at_rest(law, np.concatenate([[SHUT], np.full(cells + 1, 5e-3)])))[:3]
+    phase = 0.5 * np.pi * (2 * np.arange(3) + 1)
+    assert 2 * cells * np.arctan(0.5 * found * h) == pytest.approx(phase, rel=1e-4)
+    assert found[0] * length / SOUND / phase[0] - 1 == pytest.approx((phase[0] / cells) ** 2 / 12, rel=0.02)
+    assert (2 * np.pi * law.resolved({}) * h) ** 2 / 12 == pytest.approx(0.01, rel=1e-6)
 
 
 def test_helmholtz_resonator():
@@ -144,15 +142,6 @@ def test_incompressible_limit():
 
 
 @pytest.mark.slow
-def test_derivatives_of_the_steady_flow():
-    z, area = passage()
-    law, generator = gas_of(z), np.random.default_rng(1)
-    a = area * generator.uniform(-1.0, 1.0, len(z))
-    expected = difference(lambda x: law.steady_pressure(x, 40e3), area, a, 1e-3)
-    assert np.abs(law.steady_operator(area, 40e3)[1] @ a - expected).max() < 1e-7 * np.abs(expected).max()
-
-
-@pytest.mark.slow
 def test_pressures_at_rest_rise_as_those_of_a_slow_flow():
     """Equilibria of a wall begin there; without the derivative their curve turned at its first step."""
     z, area = passage()
@@ -229,7 +218,7 @@ def test_order_and_energy_in_time(rate, order):
         return area * (1 + 0.5 * shape * (1 - np.cos(x))), area * np.pi / period * shape * np.sin(x)
 
     found = []
-    for count in (50, 100, 200, 400):
+    for count in (25, 50, 100, 200):
         fluid, state, _ = march(law, area_at, inner, 6e3, 0.5 * period / count, count, rate)
         gained = energy(fluid, area_at(0.5 * period)[0], state.inner) - energy(fluid, area, inner)
         supply, *gone = state.books
@@ -371,29 +360,3 @@ def test_column_separation():
     assert volume.max() == pytest.approx(away * section * turn, rel=0.03)
     closed = time[np.flatnonzero(volume > 0.01 * volume.max())[-1]]
     assert closed - 0.5 * stop == pytest.approx(2 * turn + away / back * turn, rel=0.03)
-
-
-@pytest.mark.slow
-def test_columns_that_part_in_the_middle():
-    """Both halves of the fluid in a pipe run outwards, against the same pressure at both ends: a cavity grows between
-    them, and each column of length l, from its end to the cavity, turns back under a = -p_v/(rho l).
-    """
-    cells, length, section, velocity, step = 21, 2.0, 5e-3, 1.0, 1e-4
-    z, area = np.linspace(0.0, length, cells + 1), np.full(cells + 1, section)
-    law, middle = liquid_of(z), cells // 2
-    outward = np.where(np.arange(cells + 1) <= middle, velocity, -velocity)
-    fluid, still = MovingFluid(law, LIQUID), (area, 0 * area)
-    state = fluid.moving(still, 0 * area, np.concatenate([outward[-1:], outward[:-1], np.zeros(cells)]), 0.0)
-    full, before, volume, least = state.held[2 * law.count :], energy(fluid, area, state.inner), [], []
-    time = step * np.arange(1, 171)
-    for _ in time:
-        flow = fluid.step(state, None, step, 1.0, 1.0, 0.0).at(still, still)
-        state = flow.state()
-        volume.append(np.sum(full - state.held[2 * law.count :]))
-        least.append(flow.pressure.min())
-    slowing = -BOILS / (LIQUID * middle * length / cells)
-    expected = 2.0 * section * (velocity * time - 0.5 * slowing * time**2)
-    assert np.abs(volume - expected).max() < 0.03 * expected.max()
-    assert BOILS - LIQUID * (VAPOUR * WAVES) ** 2 < min(least) < BOILS + 1e3
-    supply, *gone = state.books
-    assert energy(fluid, area, state.inner) - before == pytest.approx(supply - sum(gone), abs=1e-9 * before)

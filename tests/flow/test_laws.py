@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 import jax
 import numpy as np
 import pytest
 
 from dbvfiv.flow import Channel, FlowMotion, FlowParameter, FlowTerm, UniformLoad
 from dbvfiv.flow import law as laws
-from dbvfiv.flow.law import along, solve_steady
+from dbvfiv.flow.law import solve_steady
 from tests.differences import difference
 from tests.flow.test_channel import FLOOR, passage
 from tests.flow.vessel import Vessel
@@ -20,23 +22,32 @@ def vessel():
     return Vessel(Channel(passage()[0], FLOOR, 0.7), capacity=3e-7, resistance=1.5)
 
 
+class Searched(Channel):
+    """A channel whose steady flow is found by Newton's method."""
+
+    steady = solve_steady
+
+
 def test_closed_form_of_the_channel_is_the_root_of_its_equations():
     """Pressures, velocity and their derivatives up to the third by Newton's method on the definition alone."""
     z, area = passage()
     channel = Channel(z, FLOOR)
-    parameters = channel.values(GIVEN)
-
-    class Searched(Channel):
-        steady = solve_steady
-
     searched = Searched(z, FLOOR)
     assert searched.steady_inner(area, GIVEN) == pytest.approx(channel.steady_inner(area, GIVEN), rel=1e-13)
     directions = tuple(0.3 * area * np.random.default_rng(1).standard_normal((3, len(z))))
-    for order in range(4):
-        ours, closed = (
-            np.asarray(jax.jit(along(lambda x, law=law: law.steady(x, parameters)[0], *directions[:order]))(area))
-            for law in (searched, channel)
-        )
+    parameters = channel.values(GIVEN)
+
+    def further(known, way, x):
+        values, slopes = jax.jvp(known, (x,), (way,))
+        return *values, slopes[-1]
+
+    def with_derivatives(law):
+        found = lambda x: (law.steady(x, parameters)[0],)  # noqa: E731
+        for direction in directions:
+            found = partial(further, found, direction)
+        return jax.jit(found)(area)
+
+    for order, (ours, closed) in enumerate(zip(*map(with_derivatives, (searched, channel)), strict=True)):
         assert np.abs(ours - closed).max() <= 1e-12 * np.abs(closed).max(), order
     nearly_shut = np.concatenate([[-3 * FLOOR], area[1:]])
     assert searched.steady_pressure(nearly_shut, 1.0) == pytest.approx(channel.steady_pressure(nearly_shut, 1.0))
@@ -59,10 +70,6 @@ def test_steady_flow_through_a_vessel():
 
 def test_where_there_is_no_steady_flow_none_is_returned():
     """Lips wider than the inlet: an ideal fluid would run ever faster."""
-
-    class Searched(Channel):
-        steady = solve_steady
-
     z, area = passage()
     law = Searched(z, FLOOR)
     assert np.isnan(law.steady_inner(area[::-1], GIVEN)).all()

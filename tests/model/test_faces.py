@@ -163,6 +163,7 @@ def test_higher_derivatives_against_differences(model, pressed_state):
     assert np.linalg.norm(found - expected) < 1e-6 * np.linalg.norm(expected)
 
 
+@pytest.mark.slow
 def test_a_valve_under_outside_pressure_is_the_pressed_shell(make_model):
     """The equilibrium by load steps of the coupled model is one of the shell pressed on a plane."""
     model = make_model(**FACES, drive__kind="uniform", drive__side="outside")

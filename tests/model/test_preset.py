@@ -152,7 +152,7 @@ def test_sealed_below_cracking_and_open_above_whatever_the_order(model, path):
     pressures = (0.6 * PRESSURE, 3.0 * PRESSURE, 2.0 * PRESSURE)
     rising = {p: path.go_to(p) for p in sorted(pressures)}
     other = LoadPath(ValveModel(model.case), SteadyOptions.of(model.case))
-    for pressure in (pressures[1], pressures[0], pressures[2]):
+    for pressure in (pressures[2], pressures[0]):
         found = other.go_to(pressure)
         assert found.q == pytest.approx(rising[pressure].q, abs=1e-7)
     sealed, most, part = (rising[p] for p in pressures)
@@ -220,7 +220,7 @@ def test_what_is_told_of_a_curve_does_not_depend_on_how_far_it_is_known():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("head", [0.09, 0.2, 0.35])
+@pytest.mark.parametrize("head", [0.09, 0.35])
 def test_cracking_head_that_is_asked_for_is_found(model, head):
     """Heads, m, of the range of the trade. The wall presses no harder than 2.6 kPa, which the search for the largest
     one meets.
@@ -321,22 +321,22 @@ def test_a_fluid_that_hardly_yields_is_one_that_does_not_in_front_of_a_seal():
 
 def test_still_fluid_behind_a_seal_is_the_mass_of_what_the_wall_displaces():
     """Sections that widen alike by dA/dt from the seal s on: -rho/(2 a) [(l - s)^2 - (z - s)^2] per acceleration, with
-    an energy of rho (l - s)^3/(6 a) (dA/dt)^2; symmetric, so that it feeds no motion.
+    an energy of rho (l - s)^3/(6 a) (dA/dt)^2 but for the square of a cell; symmetric, so that it feeds no motion.
     """
-    errors = []
-    for count in (20, 40):
-        acceleration, z, lengths = shut_channel(count)
-        widening = np.where(z > 0.1 - 1e-9, 1.0, 0.0)
-        wanted = -900.0 / (2 * 2e-3) * (0.4**2 - (z - 0.1) ** 2)
-        work = lengths[:, None] * acceleration
-        assert work == pytest.approx(work.T, abs=1e-12 * np.abs(work).max())
-        assert np.linalg.eigvalsh(work)[-1] <= 1e-12 * np.abs(work).max()
-        inside = slice(count // 5 + 1, -1)
-        assert (acceleration @ widening)[inside] == pytest.approx(wanted[inside], rel=2.0 / count, abs=1e-2)
-        errors.append(-0.5 * widening @ work @ widening / (900.0 * 0.4**3 / (6 * 2e-3)) - 1.0)
-    assert abs(errors[0]) < 5e-3 and errors[0] / errors[1] == pytest.approx(4.0, rel=0.05)
+    count = 20
+    acceleration, z, lengths = shut_channel(count)
+    widening = np.where(z > 0.1 - 1e-9, 1.0, 0.0)
+    wanted = -900.0 / (2 * 2e-3) * (0.4**2 - (z - 0.1) ** 2)
+    work = lengths[:, None] * acceleration
+    assert work == pytest.approx(work.T, abs=1e-12 * np.abs(work).max())
+    assert np.linalg.eigvalsh(work)[-1] <= 1e-12 * np.abs(work).max()
+    inside = slice(count // 5 + 1, -1)
+    assert (acceleration @ widening)[inside] == pytest.approx(wanted[inside], rel=2.0 / count, abs=1e-2)
+    error = -0.5 * widening @ work @ widening / (900.0 * 0.4**3 / (6 * 2e-3)) - 1.0
+    assert abs(error) == pytest.approx(0.5 / (0.8 * count) ** 2, rel=0.05)
 
 
+@pytest.mark.slow
 def test_motions_of_a_lightly_pressed_bill_begin_at_rest():
     """Pressures that are small against the wall's stiffness leave more to rounding than a run's start would ask for."""
     case = thesis_case({"mesh.around": 12, "mesh.along": 20, "valve.sealing_pressure": 120.0})
@@ -346,6 +346,7 @@ def test_motions_of_a_lightly_pressed_bill_begin_at_rest():
     assert unbalanced[1] <= min(unbalanced[0], 1.001 * model.rounding(q, model.tangent(q, pressure)))
 
 
+@pytest.mark.slow
 def test_a_curve_of_small_loads_takes_no_shorter_steps_for_rounding():
     """The load's thousandth, which residuals are measured against, is near what rounding leaves on this mesh."""
     keys = {"mesh.around": 12, "mesh.along": 20, "valve.sealing_pressure": 0.02, "fluid.density": 3.0}
@@ -356,7 +357,7 @@ def test_a_curve_of_small_loads_takes_no_shorter_steps_for_rounding():
     assert np.linalg.norm(model.residual(state.q, pressure)) < 1e-8 * model.force_scale(state.q, pressure)
 
 
-@pytest.mark.parametrize("sound_speed", [None, 343.0])
+@pytest.mark.parametrize("sound_speed", [None, pytest.param(343.0, marks=pytest.mark.slow)])
 def test_a_curve_begins_at_any_pressure_downstream(model, sound_speed):
     """Also at one greater than the thousandth of the load that residuals are measured against."""
     keys = {"valve.sealing_pressure": 10.0, "downstream.pressure": 14.0, "fluid.density": 1.2}
@@ -439,7 +440,7 @@ HEADS, CRACKING = np.geomspace(0.02, 5.0, 14), (0.1, 0.5)
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("size", [4, 6, 12, 18, 36])
+@pytest.mark.parametrize("size", [4, 12, 36])
 def test_cases_of_the_trade_seal_at_rest_and_crack_in_its_range(size):
     """Over heads from 2 cm to 5 m: sealed, then a flow that rises with the head and nowhere faster than its sixth power
     between two open states, which is how fast lips part.
@@ -501,6 +502,7 @@ def test_back_pressure_starts_from_the_faces_that_press_on_each_other():
     assert state.closed and state.energy_balance < 1e-3
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("size", [6, 18])
 def test_faces_of_few_elements_press_on_each_other_before_the_back_pressure(size):
     """Contact as hard as the back pressure asks for is not met from the drawn shape on most such meshes."""
@@ -620,7 +622,13 @@ def test_a_bill_opens_by_a_slow_and_a_sudden_head_and_is_closed_after_it(tmp_pat
     assert np.abs(h["balance"]).max() < 2e-4 * h["pressure_work"].max()
 
 
-@pytest.mark.parametrize("law", [{"fluid.continuity": "quasi-steady"}, {}, {"fluid.unsteady": False}])
+@pytest.mark.parametrize(
+    "law",
+    [
+        {"fluid.continuity": "quasi-steady"},
+        *(pytest.param(x, marks=pytest.mark.slow) for x in ({}, {"fluid.unsteady": False})),
+    ],
+)
 def test_a_sealed_bill_is_closed_in_time_and_moves_no_further(law):
     """At 0.6 of the sealing pressure; the film that rough faces leave burst it open within 8 ms when it carried a flow,
     quasi-steady.

@@ -1,6 +1,4 @@
-"""Forms of the coupled residual for motions that grow at given rates against differences of its value, under flow laws
-of none, one and three unknowns and with terms.
-"""
+"""Forms of the coupled residual for motions that grow at given rates against differences of its value."""
 
 from __future__ import annotations
 
@@ -18,9 +16,7 @@ from .test_flow_laws import LAWS, MU, with_law
 STEPS = {1: 1e-3, 2: 1e-3, 3: 1e-2}
 
 
-@pytest.fixture(
-    scope="module", params=[law if law == "terms" else pytest.param(law, marks=pytest.mark.slow) for law in LAWS]
-)
+@pytest.fixture(scope="module", params=LAWS)
 def forms(request, make_model):
     """Away from an equilibrium, open wide, so that no stop is near; lips of even walls."""
     model = with_law(make_model, request.param)
@@ -67,7 +63,7 @@ def check(forms, found, expected, tolerance):
         assert np.abs(found[block] - expected[block]).max(initial=0.0) <= tolerance * scale
 
 
-@pytest.mark.parametrize("number", [1, 2, pytest.param(3, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("number", [1, *(pytest.param(number, marks=pytest.mark.slow) for number in (2, 3))])
 def test_forms_are_derivatives(forms, number):
     directions = list(motions(forms, number))
     first = lambda motion: forms.pencil(motion.rate).matvec(motion.vector)  # noqa: E731

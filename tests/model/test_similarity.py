@@ -11,15 +11,14 @@ import pytest
 import dbvfiv
 from dbvfiv.studies.case import thesis_case
 
-MESH = {"mesh.around": 8, "mesh.along": 14, "damping.alpha": 4.0, "damping.beta": 2e-3, "steady.tolerance": 1e-11}
+MESH = {"mesh.around": 6, "mesh.along": 8, "damping.alpha": 4.0, "damping.beta": 2e-3, "steady.tolerance": 1e-11}
+MESH |= {"fluid.continuity": "storage"}
 TWICE = {"valve.scale": 2, "supports.lip_stop_stiffness": 2e8, "damping.alpha": 2.0, "damping.beta": 4e-3}
 
 
-@pytest.mark.parametrize("continuity", ["quasi-steady", "storage"])
-def test_twice_the_size_is_half_the_frequency(continuity):
-    changes = MESH | {"fluid.continuity": continuity}
-    one = dbvfiv.load(thesis_case(), changes).steady(pressure=6e3)
-    two = dbvfiv.load(thesis_case(), changes | TWICE).steady(pressure=6e3)
+def test_twice_the_size_is_half_the_frequency():
+    one = dbvfiv.load(thesis_case(), MESH).steady(pressure=6e3)
+    two = dbvfiv.load(thesis_case(), MESH | TWICE).steady(pressure=6e3)
     size = np.abs(one.nodal[:, :3]).max()
     assert two.nodal[:, :3] / 2 == pytest.approx(one.nodal[:, :3], abs=1e-8 * size)
     assert two.nodal[:, 3:] == pytest.approx(one.nodal[:, 3:], abs=1e-8)

@@ -38,7 +38,7 @@ def run(changes):
 
 
 def test_energies_balance_on_a_smooth_run():
-    found = run({"transient.kick_opening": 1e-4, "transient.step": 1e-4, "transient.duration": 0.05})
+    found = run({"transient.kick_opening": 1e-4, "transient.step": 1e-4, "transient.duration": 0.02})
     h = found.history
     turned_over = np.abs(np.diff(h["pressure_work"])).sum()
     assert np.abs(h["balance"]).max() < 1e-6 * turned_over
@@ -96,7 +96,7 @@ def test_accelerations_carry_the_fluid():
     assert np.linalg.norm(left) < 1e-7 * np.linalg.norm(load.force)
 
 
-@pytest.mark.parametrize("adaptive", [False, True])
+@pytest.mark.parametrize("adaptive", [pytest.param(False, marks=pytest.mark.slow), True])
 def test_a_resumed_run_gives_the_same_numbers(tmp_path, adaptive, monkeypatch):
     monkeypatch.setattr("dbvfiv.studies.transient.history.RESTART_SHARE", float("inf"))
     changes = WATER | SMOOTH | {"transient.start": "rest", "transient.restart_every": 7, "transient.duration": 0.02}

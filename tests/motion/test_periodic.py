@@ -50,7 +50,7 @@ def valve_of(name):
     return model, mu, PeriodicValve(lambda _: model, mu)
 
 
-@pytest.mark.parametrize("name", LAWS)
+@pytest.mark.parametrize("name", [pytest.param(x, marks=pytest.mark.slow) if x == "loss factors" else x for x in LAWS])
 def test_linearisation_is_the_derivative_of_the_residual(name):
     model, mu, system = valve_of(name)
     motion = motion_of(model, mu)

@@ -64,20 +64,16 @@ def steps_of(motion, state, pressure, count: int, h: float, rule=scheme("general
 
 
 @pytest.mark.parametrize("rule", [("generalised-alpha", 0.0), ("generalised-alpha", 0.2), ("hht", 0.1)], ids=str)
-@pytest.mark.parametrize("beta", [0.0, 5e-4])
-@pytest.mark.parametrize(
-    "series", [pytest.param(ONE, marks=pytest.mark.slow), THREE], ids=["one branch", "three branches"]
-)
-def test_free_decay(series, beta, rule):
-    bar, size, end = Bar(series, beta=beta), 1e-7, 8e-3
-    exact = expm(end * first_order(bar, series, beta)) @ np.concatenate([[1.0], np.zeros(1 + len(series.times))])
+def test_free_decay(rule):
+    beta, size, end = 5e-4, 1e-7, 8e-3
+    bar = Bar(THREE, beta=beta)
+    exact = expm(end * first_order(bar, THREE, beta)) @ np.array([1.0, 0.0, 0.0, 0.0, 0.0])
     errors = []
     for count in (40, 80, 160):
         first = consistent_state(bar, 0.0, np.full(2, size), np.zeros(2), 0.0)
         last = steps_of(bar, first, lambda t: 0.0, count, end / count, scheme(*rule))[-1].state
         speed = np.sqrt(bar.stiffness / bar.mass)
         errors.append(np.hypot(last.q[0] / size - exact[0], (last.v[0] / size - exact[1]) / speed))
-    print(errors, observed_order(errors))
     assert errors[-1] < 2e-3
     assert min(observed_order(errors)) > 1.9
 
@@ -98,7 +94,6 @@ def test_forced_response(series):
         first = consistent_state(bar, 0.0, np.zeros(2), np.zeros(2), 0.0)
         last = steps_of(bar, first, lambda t: push * np.sin(omega * t), n, end / n)[-1].state
         errors.append(np.hypot(last.q[0] - exact[0], (last.v[0] - exact[1]) / speed) / size)
-    print(errors, observed_order(errors))
     assert errors[-1] < 2e-3
     assert min(observed_order(errors)) > 1.9
 
@@ -120,7 +115,7 @@ def test_a_motion_on_a_mode_stays_on_it(series):
 def test_long_after_a_step_the_slow_law_holds():
     bar, push = Bar(THREE), 4e-3
     first = consistent_state(bar, 0.0, np.zeros(2), np.zeros(2), push)
-    last = steps_of(bar, first, lambda t: push, 2000, 2.5e-4)[-1].state
+    last = steps_of(bar, first, lambda t: push, 500, 1e-3)[-1].state
     assert last.q[0] == pytest.approx(push / bar.stiffness, rel=1e-4)
     memory = last.memory
     assert np.abs(memory.branches).max() < 1e-6 * np.abs(memory.slow).max()
@@ -145,7 +140,7 @@ def test_linear_branches_store_and_lose_what_springs_and_dashpots_do():
     bar, end = Bar(THREE), 5e-3
     matrix = first_order(bar, THREE)
     first = consistent_state(bar, 0.0, np.full(2, 1e-7), np.zeros(2), 0.0)
-    count = 2000
+    count = 500
     last = steps_of(bar, first, lambda t: 0.0, count, end / count)[-1].state
     propagate = expm(end / count * matrix)
     u, lost = np.concatenate([[1e-7], np.zeros(4)]), 0.0

@@ -72,25 +72,18 @@ def test_work_and_damping_account_for_the_energy(valve):
 
 def test_a_free_swing_keeps_its_energy(valve, open_state):
     start = steady_positions(valve(), 2e3)
-    model = valve(
-        {
-            "drive.kind": "uniform",
-            "drive.pressure": 0.0,
-            "supports.lip_stop": False,
-            "damping.alpha": 0.0,
-            "damping.beta": 0.0,
-        }
-    )
+    free = {"drive.kind": "uniform", "drive.pressure": 0.0, "supports.lip_stop": False}
+    model = valve(free | {"damping.alpha": 0.0, "damping.beta": 0.0})
     motion = ValveMotion(model)
     state = consistent_state(motion, 0.0, start, 0 * start, 0.0)
     energy = sum(motion.energies(state.q, state.v))
     swings = []
-    for _ in range(4):
+    for _ in range(2):
         state, results, *_ = advance(motion, state, 5e-4, 50, 0.0)
         swings.append(sum(motion.energies(state.q, state.v)) / energy - 1.0)
         assert sum(r.work for r in results) == 0.0
     assert np.abs(swings).max() < 1e-3
-    damped, *_ = advance(motion, consistent_state(motion, 0.0, start, 0 * start, 0.0), 2e-3, 100, 0.0, nd=0.3)
+    damped, *_ = advance(motion, consistent_state(motion, 0.0, start, 0 * start, 0.0), 2e-3, 50, 0.0, nd=0.3)
     assert sum(motion.energies(damped.q, damped.v)) < 0.97 * energy
 
 
@@ -105,42 +98,6 @@ def test_slamming_lips_are_survived(valve):
     assert max(touching) > 0
     assert min(r.load.speed[-1] for r in results) > 0, "the flow must not reverse"
     assert np.abs(state.q).max() < 1.0
-
-
-def _kinds(motion, state, h, steps, pressure):
-    """Whether each step was robust, and whether fluid was drawn in during it."""
-    kinds = []
-
-    class Watched(Stepper):
-        def _iterate(self, trial):
-            kinds.append(trial.weights.theta == 1.0)
-            super()._iterate(trial)
-
-    stepper, found = Watched(motion, scheme("generalised-alpha"), pressure, StepOptions()), []
-    control = FixedSteps(stepper, ControlOptions(h))
-    for _ in range(steps):
-        result = control.advance(state, 1e9)
-        found.append((kinds[-1], bool(result.load.speed.min() < 0)))
-        state = result.state
-    return np.array(found)
-
-
-def test_steps_are_robust_while_fluid_is_drawn_in_and_of_second_order_after(valve):
-    motion = ValveMotion(valve({"fluid.continuity": "storage"}))
-    rest = np.zeros(motion.size)
-    robust, inward = _kinds(motion, consistent_state(motion, 0.0, rest, rest, 18e3), 1e-3, 150, lambda t: 18e3).T
-    last = np.flatnonzero(inward).max()
-    assert inward.sum() > 20 and last < 120
-    assert robust[inward].all() and robust[: last + 1].mean() > 0.9
-    assert robust[last + 1 :].sum() < 8 and not robust[last + 20 :].any()
-
-
-def test_steps_of_a_smooth_cycle_are_of_second_order(valve, open_state):
-    """Large outward oscillations of a light fluid, flow changing by a tenth in a step."""
-    motion = ValveMotion(valve({"fluid.density": 50.0, "damping.alpha": 0.0}))
-    state = flowing(motion, open_state, 1.15 * open_state)
-    robust, inward = _kinds(motion, state, 5e-4, 100, lambda t: 12e3).T
-    assert not robust.any() and not inward.any()
 
 
 def test_factors_are_kept(valve, open_state):

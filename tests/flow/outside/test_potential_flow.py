@@ -43,7 +43,7 @@ def heaving(n: int, symmetry: str, axis: int) -> float:
     return 4.0 * float(flux @ (PotentialFlow(symmetry=symmetry, closed=BODY).impedance(panels) @ flux))
 
 
-@pytest.mark.parametrize("symmetry, axis", [pytest.param("SS", 2, marks=pytest.mark.slow), ("AS", 0), ("SA", 1)])
+@pytest.mark.parametrize("symmetry, axis", [("AS", 0), ("SA", 1)])
 def test_a_heaving_sphere_carries_half_the_fluid_it_displaces(symmetry, axis):
     errors = [heaving(n, symmetry, axis) / (2.0 * np.pi / 3.0) - 1.0 for n in (3, 6, 12)]
     assert abs(errors[-1]) < 0.001  # 864 panels
@@ -93,10 +93,10 @@ def wave_in_a_pipe(around: int, radius: float, mode: int, length: float) -> floa
     return float((wave * tube.areas) @ potential / ((wave * tube.areas) @ wave)) / annulus(mode, k, radius)
 
 
-@pytest.mark.parametrize("radius", [1.2, 1.5, 2.0])
+@pytest.mark.parametrize("radius", [1.2, 2.0])
 def test_waves_on_a_tube_in_a_pipe(radius):
     """Eight panels around a quarter; the modes are those of a column, of sway and of two to four waves around."""
-    lengths, modes = (1.5, 3.0, 6.0, 12.0, 25.0), range(5)
+    lengths, modes = (1.5, 6.0, 25.0), range(5)
     errors = np.array([[wave_in_a_pipe(8, radius, mode, length) - 1.0 for mode in modes] for length in lengths])
     assert np.abs(errors).max() < 0.0085, errors  # with strengths that do not vary over a panel: 0.054
     for mode in (1, 2, 3, 4):  # the closed form has the limit of long waves
