@@ -63,10 +63,12 @@ class Desk:
     def describe(self, case: str) -> dict[str, Any]:
         """Drawing, sizes and warnings of a case file."""
         model = load(case).session.described
+        units = model.case.units
         with style():
-            put_in_units(valve_figure(model), model.case.units).savefig(drawn := io.BytesIO(), format="png", dpi=90)
+            put_in_units(valve_figure(model), units).savefig(drawn := io.BytesIO(), format="png", dpi=90)
         picture = base64.b64encode(drawn.getvalue()).decode()
-        return {"picture": picture, "sizes": ValveSizes.of(model).lines(), "notes": list(model_warnings(model))}
+        sizes, notes = (list(map(units.say, told)) for told in (ValveSizes.of(model).lines(), model_warnings(model)))
+        return {"picture": picture, "sizes": sizes, "notes": notes}
 
     def header(self, path: str, inside: bool = False) -> dict[str, str]:
         """Kind of a result file, and its case as TOML; one that has to stay inside its folder names no other files."""

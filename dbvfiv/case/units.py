@@ -168,7 +168,7 @@ class Units:
             def convert(found: re.Match, name: str = name, ratio: float = ratio) -> str:
                 return re.sub(_NUMBER, lambda one: _shorter(one[0], ratio), found[1]) + f" {name}"
 
-            sentence = re.sub(rf"({_NUMBERS}) {re.escape(unit)}(?![\w/])", convert, sentence)
+            sentence = re.sub(rf"({_NUMBERS}) {re.escape(unit)}(?![\w/^]| s\b)", convert, sentence)
         return sentence
 
 

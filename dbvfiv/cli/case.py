@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from pathlib import Path
 from typing import Annotated
 
@@ -47,7 +48,7 @@ def case(
     dbvfiv case my.toml --key-points my.csv  write its shape as key points, to edit
     """
     from ..case.write import case_toml
-    from ..studies.case import load_case
+    from ..studies.case import contradictions, load_case
 
     if explain + new + uncertain + (key_points is not None) > 1:
         raise CaseError("Only one of --explain, --new, --uncertain and --key-points can be given at a time.")
@@ -59,10 +60,11 @@ def case(
         _write_key_points(load_case(target, overrides or ()).valve, key_points, points, profiles, as_json)
     elif uncertain:
         _print_inputs(load_case(target, overrides or ()), as_json)
-    elif as_json:
-        print_json(load_case(target, overrides or ()).to_dict())
-    elif every:
-        print(case_toml(load_case(target, overrides or ()), comments=False), end="")
+    elif as_json or every:
+        case = load_case(target, overrides or ())
+        for sentence in contradictions(case):  # beside the keys, which are what was asked for
+            print(f"Warning: {sentence}", file=sys.stderr)
+        print_json(case.to_dict()) if as_json else print(case_toml(case, comments=False), end="")
     else:
         _check(load_case(target, overrides or ()), target or "The 12-inch valve")
 
@@ -96,9 +98,9 @@ def _check(case, name: str) -> None:
         model = Session(case).described
     print(f"{name} fits.")
     lines = [*ValveSizes.of(model).lines(), *_conditions(case)]
-    print("\n".join(f"  {line}" for line in lines))
+    print("\n".join(f"  {case.units.say(line)}" for line in lines))
     for sentence in (*oddities(case), *model_warnings(model)):
-        print(f"Note: {sentence}")
+        print(f"Note: {case.units.say(sentence)}")
     print("`dbvfiv case FILE --all` prints every key.")
 
 

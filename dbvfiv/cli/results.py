@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Callable, Sequence
 from enum import StrEnum
 from pathlib import Path
@@ -22,6 +23,7 @@ from .terminal import (
     print_either,
     print_json,
     print_written,
+    refuse_beside,
     save_figures,
 )
 
@@ -38,6 +40,8 @@ Format = StrEnum("Format", ["vtkhdf", "stl", "step"])
 Shape = StrEnum("Shape", ["inner", "middle", "outer", "wall", "fluid"])
 #: Kinds of results that can be compared.
 _COMPARED = ("transient", "steady", "closure")
+#: Half the 95 % interval of computed frequencies, %.
+_WITHIN = 10.0
 
 
 def info(
@@ -202,7 +206,7 @@ def compare(
 
     if files[0].is_file() and not is_hdf5(files[0]):
         found = _recognise(files, columns or (), within)
-        path = save_figure(found.draw, output)
+        path = save_figure(found.draw, output, found.result.case.units)
         print_answer(found.document() | {"figure": str(path)}, lambda: [*found.lines(), f"Wrote {path}."], as_json)
         return
     within_given = {"--column": columns, "--within": within if within != _WITHIN else None}
@@ -221,7 +225,7 @@ def compare(
                 f"{kind!r}; runs of one kind can be compared."
             )
     found = find_study(kind).compare(results)
-    path = save_figure(found.draw, output)
+    path = save_figure(found.draw, output, results[0].case.units)
     if as_json:  # summaries read whole files
         runs = [{"file": str(f), "label": n} | r.summary() for f, n, r in zip(files, found.labels, results)]
         print_json({"runs": runs, **found.document(), "figure": str(path)})

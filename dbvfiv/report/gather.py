@@ -305,8 +305,10 @@ def gather(
     bar, started = Bar(case.units.say, quiet), _processor_time()
     if case.meets_pump("modes"):
         path = folder / f"{name}-operating-point.h5"
-        point = kept_run("steady", session, path, bar.of("operating point")).states[0].pressure
-        session = session.replace({"drive.pressure": point})
+        found = kept_run("steady", session, path, bar.of("operating point"))
+        if not found.states:
+            raise SolveError(f"The operating point of the pump was not found: {found.failures[0]}")
+        session = session.replace({"drive.pressure": found.states[0].pressure})
     bar.expect(list(planned(session.case)))
     if case.seeks_levels or case.valve.cracking_head:
         bar.expect([Run("settled", "levels", "strain levels" if case.seeks_levels else "cracking head", {}, 12)])
@@ -508,7 +510,7 @@ class _Part(Observer):
         self._bar, self._name, self._total, self._items = bar, name, None, 0
 
     def begin(self, study: str, total: int | None) -> None:
-        self._total, self._items = self._total or total, self._items
+        self._total = self._total or total
 
     def item(self, result: object) -> None:
         self._items += 1

@@ -167,7 +167,7 @@ def thesis_case(changes: Mapping[str, Any] | Iterable[str] = ()) -> Case:
 # ----
 
 #: Studies that need a flow at drive.pressure, unless a parameter that they vary is the pressure.
-_AT_DRIVE = ("modes", "sweep", "onset", "map", "cycle", "sensitivity")
+_AT_DRIVE = ("modes", "sweep", "onset", "map", "cycle", "sensitivity", "response")
 
 
 def contradictions(case: Case, kind: str | None = None) -> Iterator[str]:
@@ -205,10 +205,11 @@ def _nothing_flows(case: Case, kind: str | None) -> Iterator[str]:
     """Drive that is not above what the valve discharges into."""
     given, drive = case.downstream.pressure, case.drive.pressure
     # a level that opposes the flow is that of one density, and a study may vary it
-    back = min(given, case.rest_pressure)
+    back = case.rest_pressure if kind is None else min(given, case.rest_pressure)
     behind = f"downstream.pressure = {_pascal(given)}" if given else "0, the pressure downstream"
-    if back < given:
-        behind = f"{_pascal(back)}, {behind} less the level of the lips below the inlet"
+    if back != given:
+        level = "less the level of the lips below" if back < given else "and the level of the lips above"
+        behind = f"{_pascal(back)}, {behind} {level} the inlet"
     if drive <= back and (kind is None or (kind in _AT_DRIVE and not _varies_pressure(case, kind))):
         if not (kind == "modes" and case.modes.in_vacuo):
             yield (
@@ -232,7 +233,8 @@ def _nothing_flows(case: Case, kind: str | None) -> Iterator[str]:
 def _varies_pressure(case: Case, kind: str) -> bool:
     if kind == "map":
         return "pressure" in (axis.parameter for axis in case.map.axes)
-    return kind in ("sweep", "onset", "cycle") and getattr(case, kind).axis.parameter == "pressure"
+    axis = getattr(case, kind).axis if kind in ("sweep", "onset", "cycle", "response") else None
+    return axis is not None and axis.parameter == "pressure"
 
 
 def _slivers(case: Case) -> Iterator[str]:

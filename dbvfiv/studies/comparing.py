@@ -12,7 +12,8 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from ..drawing.style import COMPUTED, kilopascals, new_figure, pressure_colours, some_of, style
+from ..case.units import Units
+from ..drawing.style import COMPUTED, kilopascals, new_figure, pressure_colours, put_in_units, some_of, style
 from ..drawing.views import closed_section
 from ..errors import CaseError
 from ..texts import json_value
@@ -22,11 +23,12 @@ from .result import StudyResult
 
 def labels(results: Sequence[StudyResult], quiet: Sequence[str] = ()) -> list[str]:
     """Legend entries that say what tells the runs apart: by three keys of their cases, by more where those do not; keys
-    that only steer a run (`quiet`) are left out.
+    that only steer a run (`quiet`) or say how results are shown are left out.
     """
     flat = [_flat(result.case.to_dict()) for result in results]
     every = dict.fromkeys(key for case in flat for key in case)
-    keys = [key for key in every if key not in quiet and any(case.get(key) != flat[0].get(key) for case in flat)]
+    told = [key for key in every if key not in quiet and not key.startswith(("project.", "report."))]
+    keys = [key for key in told if any(case.get(key) != flat[0].get(key) for case in flat)]
     if not keys:
         return [result.path.stem if result.path else result.header.name for result in results]
     last = [key.split(".")[-1] for key in keys]
@@ -160,20 +162,26 @@ class Comparison:
         for quantity in self.quantities:
             if quantity.unit:
                 lines += self._table(quantity)
-        return [*lines, *([self.remark] if self.remark else []), *self.notes]
+        return [*lines, *map(self.results[0].case.units.say, [*([self.remark] if self.remark else []), *self.notes])]
 
     def _table(self, quantity: Compared) -> Iterator[str]:
         runs, share = range(len(self.labels)), quantity.share
-        unit = "" if quantity.title else f", {quantity.unit}"
-        width, form, scale = (9, "+.3f", 100.0) if share else (12, "+.5g", quantity.factor)
+        (pressure, of_pressure), (shown, ratio) = map(self._shown, ("kPa", quantity.unit))
+        unit, factor = "" if quantity.title else f", {shown}", quantity.factor * ratio
+        width, form, scale = (9, "+.3f", 100.0) if share else (12, "+.5g", factor)
         if quantity.title:
-            yield from ("", f"{quantity.title}, {quantity.unit}")
+            yield from ("", f"{quantity.title}, {shown}")
         less = "%" if share else "less 1"
-        yield f"{'kPa':>10}" + "".join(f"{f'{i + 1}{unit}':>12}" + (f"{less:>{width}}" if i else "") for i in runs)
-        values, off = quantity.factor * self.values[quantity.column], scale * self.difference(quantity)
-        for k, pressure in enumerate(self.pressure):
+        yield f"{pressure:>10}" + "".join(f"{f'{i + 1}{unit}':>12}" + (f"{less:>{width}}" if i else "") for i in runs)
+        values, off = factor * self.values[quantity.column], scale * self.difference(quantity)
+        for k, at in enumerate(self.pressure * of_pressure / 1e3):
             cells = (cell(values[i, k], 12, ".5g") + (cell(off[i, k], width, form) if i else "") for i in runs)
-            yield f"{pressure / 1e3:10.6g}{''.join(cells)}"
+            yield f"{at:10.6g}{''.join(cells)}"
+
+    def _shown(self, unit: str) -> tuple[str, float]:
+        """Unit of tables as the first run shows it, and the factor on numbers in it."""
+        label, ratio = self.results[0].case.units.label(f"Values, {unit}")
+        return label.rpartition(", ")[2], ratio
 
     def draw(self) -> Figure:
         """Figure of the runs."""
@@ -359,8 +367,8 @@ def _centre_line(shapes: MeasuredShapes) -> Figure:
     return figure
 
 
-def save_figure(draw: Callable[[], Figure], path: Path) -> Path:
-    """Draw into a file.
+def save_figure(draw: Callable[[], Figure], path: Path, units: Units) -> Path:
+    """Draw into a file, in the units of a case.
 
     Raises
     ------
@@ -370,7 +378,7 @@ def save_figure(draw: Callable[[], Figure], path: Path) -> Path:
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         with style():
-            draw().savefig(path)
+            put_in_units(draw(), units).savefig(path)
     except (OSError, ValueError) as error:
         raise CaseError(f"{str(path)!r} cannot be written ({error}).") from error
     return path

@@ -178,12 +178,19 @@ class StudyResult:
         return import_module(beside if find_spec(beside) else module)
 
     def drawers(self, **choices: Any) -> dict[str, Callable[[], Any]]:
-        """Functions that draw figures, by name; choices such as ``pressure`` go to studies that take them."""
+        """Functions that draw figures, by name, with choices such as ``pressure`` where the study takes them.
+
+        Raises
+        ------
+        CaseError
+            For a choice that it does not take.
+        """
         draw = getattr(self.drawing, "draw", None)
         if draw is None:
             return {}
-        taken = inspect.signature(draw).parameters
-        return dict(draw(self, **{name: value for name, value in choices.items() if name in taken}))
+        if unknown := choices.keys() - inspect.signature(draw).parameters.keys():
+            raise CaseError(f"Figures of a {self.kind} result are those of no one {min(unknown)}; leave it out.")
+        return dict(draw(self, **choices))
 
     def figures(self, only: Sequence[str] = (), **choices: Any) -> dict[str, Any]:
         """Figures by name.

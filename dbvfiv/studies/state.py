@@ -81,8 +81,8 @@ class State(SteadyState):
     def pencil(self, **changes: Any) -> CoupledPencil:
         """Operator of small motions about this state: M, C, K, G and J as sparse matrices, the fluid's parts dense.
 
-        Fluid and damping may differ from those it was found with, the pressure may not. Rows of M, C and K are the unknowns of
-        ``q``, those of ``model.shell.dofs``.
+        Fluid and damping may differ from those it was found with, the pressure may not. Rows of M, C and K are the
+        unknowns of ``q``, those of ``model.shell.dofs``.
 
         Raises
         ------
