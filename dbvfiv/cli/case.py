@@ -99,8 +99,8 @@ def _check(case, name: str) -> None:
     print(f"{name} fits.")
     lines = [*ValveSizes.of(model).lines(), *_conditions(case)]
     print("\n".join(f"  {case.units.say(line)}" for line in lines))
-    for sentence in (*oddities(case), *model_warnings(model)):
-        print(f"Note: {case.units.say(sentence)}")
+    for sentence in (*oddities(case), *map(case.units.say, model_warnings(model))):  # those speak of keys as given
+        print(f"Note: {sentence}")
     print("`dbvfiv case FILE --all` prints every key.")
 
 

@@ -35,7 +35,7 @@ def test_values_are_those_of_their_probability(text, own, expected):
 
 def test_units_are_read():
     found = Distribution.parse("normal(2 mm, 0.1 mm)", LENGTH)
-    assert found.numbers == (2e-3, 1e-4) and found.words(LENGTH) == "normal(0.002 m, 0.0001 m)"
+    assert found.numbers == (2e-3, 1e-4) and found.words(LENGTH) == "normal(2 mm, 0.1 mm)"
 
 
 @pytest.mark.parametrize(

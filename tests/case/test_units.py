@@ -21,6 +21,8 @@ def test_pressures_are_read_in_the_unit_they_were_given_in():
     assert case.units.say("Settled at 20.1036 kPa, between 10.05 to 20.1 kPa, 3.2 mm.") == (
         "Settled at 2 m, between 1 to 2 m, 3.2 mm."
     )
+    for other in ("1.3 MPa", "0.0012 Pa s", "12 Pa^2/Hz", "4 kPa/m"):  # none a pressure that is a head
+        assert case.units.say(other) == other
     assert load_case(None, ["drive.pressure=10 psi"]).units.pressure(6894.757) == "1 psi"
     assert load_case(None, ["drive.head=6 ft"]).project.units == "ft"
     assert load_case(None, ["drive.head=2"]).project.units == load_case(None, ["drive.head=2 m"]).project.units == "m"

@@ -13,6 +13,7 @@ CARELESS = [
     (["downstream.pressure=30 kPa"], "nothing flows"),
     (["drive.pressure=2 m", "downstream.pressure=2 m"], "nothing flows"),
     (["outside.fluid=same", "downstream.pressure=5 m"], "nothing flows"),
+    (["gravity.direction=+z", "drive.pressure=3 kPa"], "level of the lips above the inlet"),
     (["drive.pressure=20 kPa", "downstream.pressure=12 kPa", "steady.pressures=[2 kPa, 12 kPa]"], "steady.pressures"),
     (["closure.rated_pressure=60 kPa", "closure.pressures=[20 kPa]"], "closure.pressures"),
     (["closure.rated_pressure=10 m", "closure.pressures=[1 m, 2 m]"], "closure.pressures"),

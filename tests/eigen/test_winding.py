@@ -240,3 +240,11 @@ def test_a_relaxing_part_that_is_not_positive_is_counted_without_other_damping()
         count = unstable_count(pencil)
         assert count.certain, count.notes
         assert count.number == int(np.sum(dense_eigenvalues(pencil).real > 0))
+
+
+@pytest.mark.parametrize("damping, stiffness", [(1000.0, 1.0), (1000.0, 1e-2), (40.0, 1.0)])
+def test_two_motions_that_grow_slowly_are_counted(damping, stiffness):
+    """Far below typical frequencies their phases turn back and forth within what once was the first interval."""
+    K = np.diag([-stiffness, -1.5 * stiffness, 90.0, 100.0, 120.0, 150.0])
+    count = unstable_count(CoupledPencil(M=np.eye(6), C=damping * np.eye(6), K=K))
+    assert (count.number, count.certain) == (2, True)

@@ -303,6 +303,9 @@ def test_bad_questions_are_refused(tmp_path, treloar):
     plain.write_text("stretch [-],nominal_stress [Pa]\n1.1,2\n")
     with pytest.raises(MaterialError, match="at least 2 different strains"):
         fit_rubber(loading_tests(read_tests(plain)), form_of("neo-hookean"))
+    plain.write_text("stretch [-],nominal_stress [Pa]\n1.1,2\n1.2,0\n1.3,0\n")
+    with pytest.raises(MaterialError, match="at least 2 different strains other than zero, with stress"):
+        fit_rubber(loading_tests(read_tests(plain)), form_of("neo-hookean"), error="relative")
     with pytest.raises(MaterialError, match="No fit finds a positive stiffness"):
         describe_fits(loaded(tmp_path))
 

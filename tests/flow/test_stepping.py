@@ -64,3 +64,16 @@ def test_steady_flow_of_a_long_step_is_that_of_the_law(terms):
     flow = fluid.step(state, still, 1e9, 1.0, 1.0, INLET).at(still, still)
     assert flow.inner[0] == pytest.approx(fluid.law.inlet_velocity(area, INLET, DENSITY), rel=1e-8)
     assert flow.pressure == pytest.approx(fluid.law.steady_pressure(area, INLET), rel=1e-7, abs=1e-5)
+
+
+def test_a_state_keeps_its_law_whatever_the_next_inlet_pressure():
+    """A flow that is more than a film at its own pressure, and less at the next; a seal took it for a flow for good."""
+    z, area = np.linspace(0.0, 0.6, 7), np.array([4e-6, 4e-6, 4e-6, 1e-3, 5e-3, 1e-2, 1.35e-2])
+    fluid, still = MovingFluid(Channel(z, 3e-6, 1.0), 1e3, lambda _: 2), np.zeros(7)
+    state = fluid.moving((area, still), still, 1.002 * fluid.steady_inner(area, 5e3), 5e3)
+    for _ in range(3):
+        step = fluid.step(state, (area, still), 1e-3, 0.5, 1.0, 5050.0)
+        flow = step.at((area, still), (area, still))
+        assert 0 <= flow.pressure.min() and flow.pressure.max() == pytest.approx(5050.0, rel=1e-6)
+        state = step.state(flow)
+    assert state.velocity == 0.0 and fluid.facing(state.area, state.speed).law.sealed

@@ -58,6 +58,9 @@ def test_states_and_modes_can_be_copied(valve):
     copy = pickle.loads(pickle.dumps(state))
     assert copy.summary() == state.summary() and np.array_equal(copy.layers.stress, state.layers.stress)
     assert copy.modes(count=1).modes[0].growth_rate == pytest.approx(state.modes(count=1).modes[0].growth_rate)
+    for ask in (state.pencil, state.modes):
+        with pytest.raises(CaseError, match="the pressure it was found at"):
+            ask(pressure="3 kPa")
     alone = pickle.loads(pickle.dumps(state.solution()))
     assert np.array_equal(alone.q, state.q)
     mode = state.modes(count=1).modes[0]

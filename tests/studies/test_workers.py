@@ -7,17 +7,18 @@ import os
 import signal
 import threading
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+from types import SimpleNamespace
 
 import pytest
 
 from dbvfiv import api
-from dbvfiv.errors import CaseError
+from dbvfiv.errors import CaseError, SolveError
 from dbvfiv.runtime import mpi_size
 from dbvfiv.studies import KINDS
 from dbvfiv.studies import workers as module
 from dbvfiv.studies.case import Case
 from dbvfiv.studies.session import find_study
-from dbvfiv.studies.workers import Lost, Work, Workers, read_workers, require_answer
+from dbvfiv.studies.workers import Lost, Work, Workers, read_workers, require_answer, share_all
 from tests.studies.work import TASKS, dies, expected, root_of, run_under_mpi, start
 
 
@@ -78,6 +79,14 @@ def test_processes_killed_between_two_calls_are_started_again():
 def test_a_task_that_kills_every_worker_is_given_up(monkeypatch):
     monkeypatch.setattr(module, "TRIES", 2)
     assert shared(1, dies, (2, 1, 3)) == {2: Lost, 1: expected()[1], 3: expected()[3]}
+
+
+def test_what_is_lost_ends_a_study_after_all_else_so_that_it_can_be_resumed(monkeypatch):
+    found = {1: "one", 2: Lost, 3: "three"}
+    team, known = SimpleNamespace(share=lambda tasks, ask: ((task, found[task]) for task in tasks)), []
+    with pytest.raises(SolveError, match=r"Column 2 could not be computed: \d+ workers died"):
+        known += [*known, *map(known.append, share_all(team, found, None, lambda task: f"Column {task}"))]
+    assert known == [(1, "one"), (3, "three")]
 
 
 def test_contexts_that_are_over_leave_nothing_behind():

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from dbvfiv.verdict import Series, judge, spectrum
+from dbvfiv.verdict.motion import judge_record
 from dbvfiv.verdict.table import read_table
 
 T = np.linspace(0.0, 10.0, 2001)
@@ -207,3 +208,26 @@ def test_motion_under_noise_is_not_steady(values):
 
 def test_a_system_that_moves_is_not_steady_within_noise():
     assert judge(T, 5 + 0.01 * NOISE, residual=0.5).name != "steady"
+
+
+@pytest.mark.parametrize("frequency, duration, noise", [(3000.0, 4e-3, 0.01), (3000.0, 4e-3, 0.0), (250.0, 0.06, 0.01)])
+def test_a_record_that_the_mains_are_too_slow_for_has_none(frequency, duration, noise):
+    """Short of five cycles of the mains every line lay within their reach, and was called so."""
+    t = np.linspace(0.0, duration, 400)
+    found = judge_record(t, np.sin(2 * np.pi * frequency * t) + noise * np.random.default_rng(2).standard_normal(400))
+    assert (found.name, found.decided) == ("limit cycle", True)
+    assert found.frequency == pytest.approx(frequency, rel=1e-3)
+
+
+@pytest.mark.parametrize("detrend", [True, False])
+@pytest.mark.parametrize("values, certain", [(np.exp, True), (lambda t: 3 * t + 1, False), (lambda t: t * t, False)])
+def test_what_grows_without_oscillating_grows(values, certain, detrend):
+    """What a polynomial leaves of itself is rounding, and no motion."""
+    t = np.linspace(0.0, 10.0, 2000)
+    found = judge_record(t, values(t), detrend=detrend)
+    assert (found.name, found.decided) == ("growing", certain)
+
+
+def test_few_samples_have_their_size():
+    found = judge_record(np.arange(8.0), np.arange(8.0) % 2)
+    assert (found.name, found.mean, found.amplitude, found.rms) == ("undecided", 0.5, 0.5, 0.5)

@@ -337,6 +337,19 @@ def test_the_range_of_other_samples_takes_no_input_away():
     assert [one.name for one in inputs_of(known)] == [*MORE]
 
 
+def test_inputs_that_a_place_takes_stay_as_uncertain_as_they_were():
+    """They are in no record's samples, and uncertain in whatever is asked of the valve afterwards."""
+    case = load_small(KEYS, {"identify.over": "thickness=0.9,1.1"}).case.replace({"uncertainty.inputs": {}})
+    found = object.__new__(IdentifyResult)
+    shipped = {one.name: one for one in inputs_of(case)}
+    scores = np.random.default_rng(1).standard_normal((400, len(shipped) + 2))
+    vars(found).update(record=SimpleNamespace(header=SimpleNamespace(case=case)), samples=scores)
+    assert "thickness" in shipped and "thickness" not in [one.name for one in found.plan.inputs]
+    known = {one.name: one for one in inputs_of(found.posterior_case())}
+    assert known.keys() == shipped.keys()
+    assert known["thickness"].distribution.numbers == pytest.approx(shipped["thickness"].distribution.numbers, rel=1e-3)
+
+
 def test_a_range_over_what_has_no_one_value_is_refused(refused):
     valve = load(**{"identify.over": "angle=30,60", "layers.2.angle": 30.0})
     with refused(CaseError, match="identify.over moves angle, of which .* no one value"):

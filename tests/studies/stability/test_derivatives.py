@@ -202,3 +202,15 @@ def test_an_ogden_rubber_is_differentiated_by_what_it_has_one_of(refused):
     assert known == ["layer 1 thickness", "layer 1 angle", "layer 1 density"]
     with refused(CaseError, match="'layer 1 mu', by which nothing of this valve can be differentiated"):
         require_number(model, "layer 1 mu")
+
+
+def test_a_constant_that_is_zero_is_stepped_by_a_share_of_the_modulus():
+    """A step of 2e-5 Pa beside moduli of 1 MPa gave rounding."""
+    card = {"kind": "softening", "mu_inf": 3e5, "mu_0": 1e6, "x_0": 0.01, "c": 1e6, "density": 1300.0}
+    flows = []
+    for own in ({}, {"c_3": 1e3}):
+        case = {"materials.CR": card | own, "mesh.around": 6, "mesh.along": 8}
+        flows.append(beside(case, RAYLEIGH, NEAR_RAYLEIGH).slope("layer 1 c_3"))
+    for name in ("flow", "loss_coefficient"):
+        assert flows[0].performance[name] == pytest.approx(flows[1].performance[name], rel=0.02)
+    assert flows[0].eigenvalues == pytest.approx(flows[1].eigenvalues, rel=0.02)

@@ -395,6 +395,10 @@ MALFORMED = [
         "layers.2.angle, which angle sets",
     ),
     (
+        'inputs.thickness = "normal(2 %)"\ninputs."valve.thickness_factor" = "normal(2 %)"',
+        "valve.thickness_factor, which thickness sets",
+    ),
+    (
         'inputs."materials.strain_level" = "normal(20 %, 2 %)"\nover = "strain=0.1,0.2"',
         "strain_level, which strain sets",
     ),
