@@ -50,22 +50,25 @@ def test_a_small_push_grows_at_the_eigenvalues_rate(law, pressure, density, step
 
 
 #: Continuity law, pressure (Pa), bracket of densities (kg/m3) around the onset at which stability is lost or regained;
-#: on even rows. The thesis's constants at 6 kPa, stable ones above, where these have lost material stability.
+#: on even rows; end of the band, Hz. The thesis's constants at 6 kPa, stable ones above, where these have lost material
+#: stability. The first is that of a mode at 215 Hz, beyond the usual band of 125 Hz; there, at 970 kg/m3, one of 100 Hz
+#: ceases to grow, which is no onset while the other does.
 ONSETS = [
-    (QUASI, 6e3, (800.0, 1200.0)),
-    (QUASI, 25e3, (120.0, 240.0)),
-    (STORAGE, 6e3, (200.0, 260.0)),
-    (STORAGE, 12e3, (5.0, 10.0)),
+    (QUASI, 6e3, (1000.0, 1200.0), 250.0),
+    (QUASI, 25e3, (120.0, 240.0), None),
+    (STORAGE, 6e3, (200.0, 260.0), None),
+    (STORAGE, 12e3, (5.0, 10.0), None),
 ]
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("law, pressure, bracket", ONSETS)
-def test_the_onset_lies_where_the_sign_changes_in_time(law, pressure, bracket):
+@pytest.mark.parametrize("law, pressure, bracket, band", ONSETS)
+def test_the_onset_lies_where_the_sign_changes_in_time(law, pressure, bracket, band):
     """A little below and above the onset a push decays on one side and grows on the other, at rates that vanish where
     the eigenvalue's does.
     """
     valve = dict(FORMER) | ({"materials.constants": "stable"} if pressure > 6e3 else {})
+    valve |= {"modes.max_frequency": band}
     changes = valve | MESH | {"fluid.continuity": law, "drive.pressure": pressure, "damping.model": "loss factor"}
     changes |= {"onset.normal_form": False, "onset.coarse_mesh": 0.0}
     found = dbvfiv.load(thesis_case(), changes).onset(f"density={bracket[0]}:{bracket[1]}:5").summary()["points"]
