@@ -6,6 +6,7 @@ are first imported, and never overwrites what the user has set.
 
 from __future__ import annotations
 
+import ctypes
 import hashlib
 import importlib.util
 import os
@@ -145,12 +146,17 @@ def _processor() -> str:
         return ""
 
 
-def free_programs() -> None:
-    """Drop the programs that JAX holds where they fill half the memory maps that Linux grants a process.
+def free_memory() -> None:
+    """Free what other valves have left in this process, on Linux.
 
-    A valve of another structure compiles programs of its own, of some hundreds of maps; where no map is left, the
-    process ends without a word.
+    Memory that is free goes back to the system: glibc keeps what large factorisations leave between smaller arrays, 20
+    GB after thirty studies of some thousand elements. The programs that JAX holds are dropped where they fill half the
+    memory maps that a process is granted: a valve of another structure compiles programs of its own, of some hundreds
+    of maps; where no map is left, the process ends without a word.
     """
+    trim = getattr(ctypes.CDLL(None), "malloc_trim", None) if sys.platform == "linux" else None
+    if trim is not None:
+        trim(0)
     try:
         granted = int(Path("/proc/sys/vm/max_map_count").read_text(encoding="ascii"))
         held = Path("/proc/self/maps").read_bytes().count(b"\n")

@@ -30,7 +30,7 @@ from ..record.files import Header, check_folder, check_writable, kind_of, refuse
 from ..record.mesh import MeshData
 from ..record.record import GrowingRecord, Record, StoredRecord
 from ..record.table import Column, TableSpec, printed_head, printed_row
-from ..runtime import free_programs
+from ..runtime import free_memory
 from . import KINDS
 from .case import Case, oddities, require_consistent
 
@@ -210,7 +210,7 @@ class Session:
         CaseError
             If the case gives no model, or asks for a pressure that no wall like it bears.
         """
-        free_programs()
+        free_memory()
         model = attempt(lambda: ValveModel(self.case))
         behind = self.case.rest_pressure - self.case.level_pressure, 0.0  # what is around the wall bears it too
         names = "drive.pressure", "closure.rated_pressure"

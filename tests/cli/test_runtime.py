@@ -46,16 +46,16 @@ def test_what_the_user_has_set_stays():
 MAPS = """
 import mmap
 import jax
-from dbvfiv.runtime import free_programs
+from dbvfiv.runtime import free_memory
 
 double = jax.jit(lambda x: 2 * x)
 double(1.0)
-free_programs()
+free_memory()
 kept = double._cache_size()
 granted = int(open("/proc/sys/vm/max_map_count").read())
 # neighbours of other rights are maps of their own
 pages = [mmap.mmap(-1, 4096, prot=mmap.PROT_READ | mmap.PROT_WRITE * (i % 2)) for i in range(granted // 2)]
-free_programs()
+free_memory()
 print(kept, double._cache_size(), float(double(2.0)))
 """
 
