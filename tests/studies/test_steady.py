@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
@@ -199,7 +201,8 @@ def test_runs_are_compared_with_a_first_one_that_is_sealed():
     quantity = Compared("flow", share=True, unit="m3/s")
     values = {"flow": np.array([[0.0, 2.0], [1.0, 3.0]])}
     with np.errstate(all="raise"):
-        found = Comparison((), ["sealed", "open"], (quantity,), None, np.array([1e3, 2e3]), values)
+        runs = (SimpleNamespace(case=Case()),)
+        found = Comparison(runs, ["sealed", "open"], (quantity,), None, np.array([1e3, 2e3]), values)
         assert found.lines()[-2].split() == ["1", "0", "1", "-"] and found.lines()[-1].split()[-1] == "+50.000"
 
 

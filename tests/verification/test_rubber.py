@@ -31,7 +31,8 @@ LAWS = {
 
 
 def _strain(first, second):
-    return jnp.array([(first**2 - 1) / 2, (second**2 - 1) / 2, 0.0, 0.0, 0.0])
+    none = 0.0 * first
+    return jnp.stack([(first**2 - 1) / 2, (second**2 - 1) / 2, none, none, none])
 
 
 #: One program for all laws: second Piola-Kirchhoff stresses (k, 5) of parameters (n,) at strains (k, 5).
