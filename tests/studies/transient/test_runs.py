@@ -189,7 +189,8 @@ def test_a_valve_whose_drive_turns_around_closes_and_without_one_stands_at_its_g
     table = tmp_path / "drive.csv"
     table.write_text("0, 6000\n0.05, 6000\n0.15, 0\n")
     changes = {"transient.drive_table": str(table), "downstream.pressure": back, "transient.start": "steady"}
-    changes |= {"fluid.density": 10.0, "damping.alpha": 400.0, "transient.duration": 0.4, "transient.step": 2e-3}
+    changes |= {"fluid.density": 10.0, "damping.alpha": 400.0, "transient.duration": 0.4}
+    changes |= {} if back else {"transient.step": 2e-3}
     run = Runner(valve(changes | {"transient.numerical_damping": 0.1})).start()
     assert run.history["inlet_pressure"] == pytest.approx([run.drive(time) for time in run.history["time"]], abs=1e-6)
     assert run.history["smallest_area"][0] > 20 * lip_gap(run.model)
