@@ -68,7 +68,7 @@ class Instant:
     @cached_property
     def _facing(self) -> MovingFluid:
         """The fluid that the passage has, still where faces shut it."""
-        return self.motion.fluid.facing(self.load.area, self.load.speed)
+        return self.motion.fluid.facing(self.state.fluid.area, self.state.fluid.speed)
 
     @cached_property
     def flows(self) -> tuple[float, float, float]:

@@ -24,8 +24,7 @@ def test_a_steady_start_stays(valve):
     assert run.history["mass_flow"][0] == pytest.approx(run.history["inlet_mass_flow"][0], rel=1e-9)
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("fluid", ["air", "water behind an elastic line"])
+@pytest.mark.parametrize("fluid", ["air", pytest.param("water behind an elastic line", marks=pytest.mark.slow)])
 def test_energies_close_where_faces_shut_and_part(valve, tmp_path, fluid):
     """A blow parts the faces of a bill that is moulded shut; before and after it they let nothing pass."""
     keys, names, held = (AIR, GAS_BOOKS, ("gas_energy",)) if fluid == "air" else (LINE, LINE_BOOKS, LINE_ENERGIES)
