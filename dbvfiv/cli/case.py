@@ -61,10 +61,13 @@ def case(
     elif uncertain:
         _print_inputs(load_case(target, overrides or ()), as_json)
     elif as_json or every:
-        case = load_case(target, overrides or ())
-        for sentence in contradictions(case):  # beside the keys, which are what was asked for
+        found = load_case(target, overrides or ())
+        for sentence in contradictions(found):  # beside the keys, which are what was asked for
             print(f"Warning: {sentence}", file=sys.stderr)
-        print_json(case.to_dict()) if as_json else print(case_toml(case, comments=False), end="")
+        if as_json:
+            print_json(found.to_dict())
+        else:
+            print(case_toml(found, comments=False), end="")
     else:
         _check(load_case(target, overrides or ()), target or "The 12-inch valve")
 

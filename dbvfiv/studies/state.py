@@ -27,7 +27,7 @@ from ..record.vtkhdf import Step, layer_field_names, motion
 from ..shell.recovery import LayerFields
 from .case import Case
 from .result import StudyResult
-from .session import Session, find_study, named_changes
+from .session import find_study, named_changes
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,7 +95,8 @@ class State(SteadyState):
         --------
         >>> state.pencil(density=1.2, alpha=0).K     # doctest: +SKIP
         """
-        session, model = self._session(named_changes(changes)), self.model
+        given, model = {"drive.pressure": self.pressure} | self._changes(changes), self.model
+        session = self.results.session.replace(given)
         point, own = Mu.of(session.case), Mu.of(model.case)
         moves = any(point.get(name) != own.get(name) for name in ("density", "pipe_length"))
         if moves or session.case.has_waves != model.case.has_waves:
@@ -140,18 +141,16 @@ class State(SteadyState):
         """
         return self._ask("sensitivity", sensitivity_keys(of, mode), changes, output, observer)
 
-    def _of_state(self, changes: dict[str, Any]) -> dict[str, Any]:
-        """Changes of the case that leave the state what it is."""
+    def _changes(self, given: dict[str, Any], kind: str = "") -> dict[str, Any]:
+        """Changes of the case from keyword arguments; the pressure is that of the state."""
+        changes = named_changes(given, kind)
         if "drive.pressure" in changes:
             raise CaseError("A state has the pressure it was found at; ask the valve for another.", "drive.pressure")
         return changes
 
-    def _session(self, changes: dict[str, Any]) -> Session:
-        """The session at the pressure of this state, changed otherwise."""
-        return self.results.session.replace({"drive.pressure": self.pressure} | self._of_state(changes))
-
     def _ask(self, kind: str, keys: dict[str, Any], given: dict[str, Any], output: Any, observer: Any) -> Any:
-        session = self._session({}).prepared(kind, keys | self._of_state(named_changes(given, kind)))
+        session = self.results.session.replace({"drive.pressure": self.pressure})
+        session = session.prepared(kind, keys | self._changes(given, kind))
         session.start = self.solution()
         return session.perform(kind, output, observer)
 

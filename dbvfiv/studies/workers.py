@@ -351,10 +351,7 @@ def share_samples(
     starts = range(0, len(numbers), size)
     asked = [k for k in starts if any(wanted(first + i) for i in range(k, min(k + size, len(numbers))))]
     blocks = {k: Work(work.function, (first + k, numbers[k : k + size], *work.arguments)) for k in asked}
-    for k, rows in team.share(asked, blocks.__getitem__):
-        if rows is Lost:
-            raise SolveError(f"{name} {first + k} and on could not be computed: {Lost.sentence}")
-        yield k, rows
+    yield from share_all(team, asked, blocks.__getitem__, lambda k: f"{name} {first + k} and on")
 
 
 def share_all(team: Workers, tasks: Iterable, ask: Callable[[Any], Any], told: Callable[[Any], str]) -> Iterator:

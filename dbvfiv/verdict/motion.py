@@ -343,7 +343,7 @@ def find_motion(series: Series, detrend: bool = True, mains: Sequence[float] = (
     base = fit(series, picked, level)
     picked = tuple(replace(line, called="mains") for line in base.lines)
     if np.abs(base.left).max() <= _ROUNDING * np.abs(series.values).max():
-        return _without_lines(base, series, picked)
+        return _without_lines(base, series, picked, nothing=True)
     frequency, margin, _, cell = strongest(base.left, series.step, 1.5 / series.duration)
     # slopes show what rings beside a level that moves
     steep, above, _, beside = strongest(np.diff(base.left), series.step, 1.5 / series.duration)
@@ -533,7 +533,8 @@ def _modulation(lines: Sequence[Line], resolution: float):
     return None
 
 
-def _without_lines(fitted: Fit, series: Series, mains: tuple[Line, ...]) -> Motion:
+def _without_lines(fitted: Fit, series: Series, mains: tuple[Line, ...], nothing: bool = False) -> Motion:
+    """Motion where no line is left, or nothing but rounding."""
     values = fitted.left
     power, floor = density(values, series.step)
     noise = float(values.std())
@@ -542,7 +543,6 @@ def _without_lines(fitted: Fit, series: Series, mains: tuple[Line, ...]) -> Moti
     bands = bands / bands.max() if bands.min() > 0 else bands  # squares of large values overflow
     filled = bands.mean() ** 2 / (bands**2).mean() if bands.min() > 0 else 0.0
     parts = np.array([part.std() for part in np.array_split(values, 4)])
-    nothing = np.abs(values).max() <= _ROUNDING * np.abs(series.values).max()
     even = filled >= FILLED and parts.max() <= 1.5 * parts.min()
     if mains and (even or nothing):
         return Motion("mains", "Nothing but the mains.", **facts)

@@ -128,7 +128,7 @@ def test_a_blow_at_a_change_of_section():
 
 
 def test_what_a_step_solves_is_the_law():
-    """What becomes of the energy is in the books, and a steady flow meets the law too."""
+    """The books hold what becomes of the energy, and a steady flow meets the law too."""
     _, area = passage()
     parts = [
         Line(2.0, 0.3, loss=0.7),

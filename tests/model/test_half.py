@@ -119,7 +119,7 @@ def test_matrices_fall_into_two_classes_of_the_quarter(quarter, half, state, nam
 
 @pytest.mark.slow
 def test_the_spectrum_is_the_union_of_two_classes_of_the_quarter(quarter, half):
-    """Of motions sideways with the fluid."""
+    """Motions sideways with the fluid."""
     q = find_open_state()
     h = half.shell.dofs.restrict(lifted(quarter, half, quarter.nodal(q)))
     conditions = Mu(density=10.0, alpha=0.0, beta=0.003)

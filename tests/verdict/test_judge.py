@@ -155,7 +155,7 @@ MOVING = {"growing": GROWING, "decaying": DECAYING, "irregular": IRREGULAR}
 
 @cache
 def judged(name, series):
-    """Of every fourth sample: motions as slow as these need no more."""
+    """Every fourth sample: motions as slow as these need no more."""
     return judge(T[::4], MOVING[name][series][::4])
 
 

@@ -222,7 +222,7 @@ def test_a_record_that_the_mains_are_too_slow_for_has_none(frequency, duration, 
 @pytest.mark.parametrize("detrend", [True, False])
 @pytest.mark.parametrize("values, certain", [(np.exp, True), (lambda t: 3 * t + 1, False), (lambda t: t * t, False)])
 def test_what_grows_without_oscillating_grows(values, certain, detrend):
-    """What a polynomial leaves of itself is rounding, and no motion."""
+    """Rounding, which a polynomial leaves of itself, is no motion."""
     t = np.linspace(0.0, 10.0, 2000)
     found = judge_record(t, values(t), detrend=detrend)
     assert (found.name, found.decided) == ("growing", certain)

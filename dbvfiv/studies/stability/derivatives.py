@@ -198,11 +198,11 @@ class Neighbourhood:
 
     def _usual_size(self, name: str) -> float:
         """Size of numbers that stand beside a parameter which is 0, SI: of a constant of a rubber its shear modulus."""
-        first, *rest = name.replace(".", " ").split()
-        if unit_of(self.model.case, name) != "Pa" or first not in ("layer", "materials"):
+        if unit_of(self.model.case, name) != "Pa" or not name.startswith(("layer ", "materials.")):
             return 1.0
-        layers = self.model.shell.section.layers
-        laws = [layers[int(rest[0]) - 1].law] if first == "layer" else [o.law for o in layers if o.name == rest[0]]
+        layers, by_name = self.model.shell.section.layers, not name.startswith("layer ")
+        its = [one for one in layers if one.name == name.split(".")[1]] if by_name else [layers[_layer(name)[0]]]
+        laws = [one.law for one in its]
         return max((law.small_strain_shear_modulus for law in laws if law.kind == MOONEY_RIVLIN), default=1.0)
 
     def _behind_pump(self, found: Sensitivity) -> Sensitivity:

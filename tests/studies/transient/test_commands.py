@@ -54,7 +54,7 @@ def write(path, t, *columns, header=""):
 
 
 def test_verdict_of_csv(command_line, tmp_path):
-    """Of two signals whose names look alike in files, of which each has its own."""
+    """Two signals whose names look alike in files have one each."""
     t = np.linspace(0, 10, 2001)
     file = write(
         tmp_path / "a.csv", t, 2 + np.sin(20 * t), np.exp(-0.5 * t) * np.cos(20 * t), header="t,lift (in),lift_in"
