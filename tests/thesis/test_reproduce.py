@@ -101,6 +101,7 @@ def test_the_flow_of_a_cycle_has_its_amplitude_and_only_that_of_a_cycle():
 
 
 @pytest.mark.slow
+@pytest.mark.long
 def test_the_whole_quick_set(command_line, tmp_path):
     outcome = command_line("reproduce", "--quick", "-o", tmp_path, "--json")
     document = json.loads(outcome.out)

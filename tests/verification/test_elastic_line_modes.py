@@ -145,6 +145,7 @@ def installations(number: int, seed: int, states: int = 3) -> list[str]:
 
 
 @pytest.mark.slow
-def test_three_hundred_random_lines():
+@pytest.mark.parametrize("number", [60, pytest.param(300, marks=pytest.mark.random)])
+def test_random_lines(number):
     """None fails, and spectrum and independent count agree, or it is said."""
-    assert len(installations(300, seed=21)) <= 3
+    assert len(installations(number, seed=21)) <= max(1, number // 100)

@@ -103,6 +103,7 @@ def test_back_pressure(capsys):
     assert 0.1 < meet - 0.02 < 0.2
 
 
+@pytest.mark.long
 def test_moulded_shut(capsys):
     follow("moulded-shut", folder="tutorials")
     told = capsys.readouterr().out
