@@ -39,7 +39,7 @@ def stability_map():
             "map.curve=false",
             "map.refine=0",
             "map.checks=0",
-        ],
+        ]
     )
     plan, walk = MapPlan(case), StabilityWalk(case)
     random = np.random.default_rng(1)
@@ -124,7 +124,7 @@ def maps_with_curves():
                 f"map.x=pressure=500:50000:{CELLS}",
                 f"map.y=density=1:1000:{CELLS}:log",
                 "map.continuity=both",
-            ],
+            ]
         )
         before = _processor()
         taken, result = seconds(lambda case=case: Session(case).perform("map", workers=WORKERS))

@@ -23,25 +23,15 @@ _TUNED, _ROUNDS = 5e-3, 4
 
 @dataclass(frozen=True, repr=False)
 class AmplitudeEquation:
-    """Cycles on the invariant manifold of one oscillating mode of a steady state, see `amplitude_equation`.
+    """Cycles on the invariant manifold of one oscillating mode of a steady state, see `amplitude_equation`."""
 
-    Attributes
-    ----------
-    omega : float
-        Frequency at which the coefficients are taken, near that of the cycle.
-    coefficients : (m,) complex array
-        ``g1, g3, g5, g7``.
-    observed : (2 m, 2 m) complex array
-        Harmonics, the second index, of the observed quantity that come with ``r``, ``r^2``, ...; of ``r`` the first one
-        is a half.
-    residual : float
-        Share of the amplitude of the cycle by which the residual of the equations would correct it, or the observed
-        motion, at first sight; infinite without a cycle.
-    """
-
-    omega: float
-    coefficients: np.ndarray
+    omega: float  #: Frequency at which the coefficients are taken, near that of the cycle.
+    coefficients: np.ndarray  #: (m,); ``g1, g3, g5, g7``.
+    #: (2 m, 2 m); harmonics, the second index, of the observed quantity that come with ``r``, ``r^2``, ...; of ``r``
+    #: the first one is a half.
     observed: np.ndarray
+    #: Share of the amplitude of the cycle by which the residual of the equations would correct it, or the observed
+    #: motion, at first sight; infinite without a cycle.
     residual: float = np.inf
 
     def __repr__(self) -> str:
@@ -79,7 +69,8 @@ class AmplitudeEquation:
 def amplitude_equation(
     forms, residual: Callable[[PeriodicMotion], np.ndarray], eigenvalue: complex, q, row, unit: float
 ) -> AmplitudeEquation:
-    """Cycles that a nearly neutral mode leads to, at the same parameters, to seventh order in their amplitude.
+    """Cycles that a nearly neutral mode leads to, at the same parameters, to seventh order in their amplitude. Raises
+    NotABifurcation: the mode does not oscillate, or does not move the observed quantity.
 
     The motion is a series in the amplitude ``r`` of its first harmonic,
 
@@ -106,11 +97,6 @@ def amplitude_equation(
         Observed quantity ``row . x``, moved by the mode.
     unit : float
         An amplitude of the observed quantity at which the system is far from linear.
-
-    Raises
-    ------
-    NotABifurcation
-        The mode does not oscillate, or does not move the observed quantity.
 
     Examples
     --------

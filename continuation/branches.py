@@ -41,14 +41,7 @@ def branch_tracer(system, mu, parameter, options, events=(), spectrum=None, obse
 
 
 def continue_branch(
-    system,
-    u,
-    mu,
-    parameter: str,
-    options: ContinuationOptions | None = None,
-    events=(),
-    spectrum=None,
-    observers=None,
+    system, u, mu, parameter: str, options: ContinuationOptions | None = None, events=(), spectrum=None, observers=None
 ) -> Branch:
     """Follow equilibria in one parameter.
 

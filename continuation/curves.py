@@ -167,10 +167,7 @@ class HopfCurveMonitor(Monitor):
 
 
 #: Kinds of points that curves start from.
-STARTS = {
-    "fold curve": ("fold", "bogdanov-takens", "cusp"),
-    "hopf curve": ("hopf", "generalised hopf", "zero-hopf"),
-}
+STARTS = {"fold curve": ("fold", "bogdanov-takens", "cusp"), "hopf curve": ("hopf", "generalised hopf", "zero-hopf")}
 
 
 def continue_fold(

@@ -57,8 +57,6 @@ class CycleTracer:
 
     Parameters
     ----------
-    solver : CycleSolver
-    parameter : str
     options : ContinuationOptions
         Used are the steps, ``max_points`` (of the whole branch), ``max_angle``, ``limits``, the scales and
         ``location_tolerance``.
@@ -107,7 +105,6 @@ class CycleTracer:
         self._weight = 1.0 / (np.asarray(solver.system.scales) * (options.state_scale or 1.0)) ** 2
 
     # -- the branch
-    # ----
 
     def extend(self, cycle: Cycle, origin: Cycle | None = None) -> None:
         """Take a cycle as the next point; two of them give the way to go.
@@ -215,10 +212,7 @@ class CycleTracer:
 
     def _checked(self, cycle: Cycle, expected: Cycle) -> Cycle:
         """The cycle itself, unless it lies so far from the one expected that it belongs to another part of the branch.
-
-        Raises
-        ------
-        NotConverged
+        Raises NotConverged.
         """
         missed, ahead = self._distance(expected, cycle), self._distance(self.points[-1].cycle, expected)
         if missed > max(0.5, np.tan(self.options.max_angle)) * ahead:
@@ -227,11 +221,7 @@ class CycleTracer:
 
     def _landed(self, cycle: Cycle) -> tuple[Cycle, float]:
         """The cycle, or the one on the limit that the branch crosses before it, and the angle of the branch there.
-
-        Raises
-        ------
-        NotConverged
-            The branch turns too far, or is lost at the limit.
+        Raises NotConverged: the branch turns too far, or is lost at the limit.
         """
         last, value = self.points[-1].cycle, cycle.mu[self.parameter]
         limit = float(np.clip(value, *self._limits))
@@ -331,7 +321,6 @@ class CycleTracer:
         return Condition(row / size, extra / size, float(np.vdot(row, motion.coefficients) + extra[-1] * value) / size)
 
     # -- points
-    # ----
 
     def _accept(self, cycle: Cycle) -> CyclePoint:
         """Take a cycle as the next point, with the phase of the one before."""
@@ -358,7 +347,6 @@ class CycleTracer:
         return float(np.sqrt(np.sum(change**2 * self._weight) + moved**2))
 
     # -- special points
-    # ----
 
     def _between(self, a: CyclePoint, b: CyclePoint) -> list[SpecialCycle]:
         found, turned = [], self._has_turned()

@@ -26,17 +26,10 @@ _STEP = 1e-6
 
 @dataclass(frozen=True, eq=False)
 class Condition:
-    """A linear condition <row, X> + extra . e = value on coefficients X and free unknowns e.
+    """A linear condition <row, X> + extra . e = value on coefficients X and free unknowns e."""
 
-    Attributes
-    ----------
-    row : (2 H + 1, n) array
-    extra : (k,) array
-    value : float
-    """
-
-    row: np.ndarray
-    extra: np.ndarray
+    row: np.ndarray  #: (2 H + 1, n).
+    extra: np.ndarray  #: (k,).
     value: float
 
     def miss(self, coefficients: np.ndarray, free: np.ndarray) -> float:
@@ -122,11 +115,7 @@ class CycleLinearisation:
 
     def prepare(self, free: Sequence[str], conditions: Sequence[Condition], force: np.ndarray) -> None:
         """Take free unknowns, as many conditions and the residual (2 H + 1, n) at the motion, and factor the projection
-        with them.
-
-        Raises
-        ------
-        SingularSystem
+        with them. Raises SingularSystem.
         """
         self.free, self.conditions = tuple(free), tuple(conditions)
         for name in self.free:
@@ -137,11 +126,8 @@ class CycleLinearisation:
         self.factor()
 
     def factor(self) -> None:
-        """Factor the projection with the unknowns and conditions it has, as after an extension of the basis.
-
-        Raises
-        ------
-        SingularSystem
+        """Factor the projection with the unknowns and conditions it has, as after an extension of the basis. Raises
+        SingularSystem.
         """
         v = self.scale[:, None] * self.basis
         matrix, free = self.reduced.matrix(), len(self.free)
@@ -226,7 +212,6 @@ class LeftProjection:
 
     Parameters
     ----------
-    operator : PeriodicOperator
     reduced : ReducedOperator
         Projection on the basis, with its rough rows.
     """

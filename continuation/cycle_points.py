@@ -22,27 +22,14 @@ FOLD, DOUBLING, TORUS, BRANCH_POINT = "fold", "period doubling", "torus", "branc
 
 @dataclass(frozen=True, eq=False)
 class CyclePoint:
-    """A cycle on a branch.
-
-    Attributes
-    ----------
-    cycle : Cycle
-    value : float
-        Of the parameter.
-    arclength : float
-    exponents : Exponents or None
-    asked : bool
-        True at a value that was asked for.
-    tests : dict
-        Values of the events' functions.
-    """
+    """A cycle on a branch."""
 
     cycle: Cycle
-    value: float
+    value: float  #: Of the parameter.
     arclength: float
     exponents: Exponents | None
-    asked: bool = False
-    tests: dict = field(default_factory=dict)
+    asked: bool = False  #: True at a value that was asked for.
+    tests: dict = field(default_factory=dict)  #: Values of the events' functions.
 
     @property
     def motion(self):
@@ -56,26 +43,13 @@ class CyclePoint:
 
 @dataclass(frozen=True, eq=False)
 class SpecialCycle:
-    """A special point.
-
-    Attributes
-    ----------
-    kind : str
-    point : CyclePoint
-        The cycle nearest to it that was computed.
-    value : float
-        Of the parameter, by interpolation.
-    frequency : float
-        Of the perturbation that becomes neutral, Hz; zero for a fold.
-    located : bool
-        True when it was found as closely as asked for.
-    """
+    """A special point."""
 
     kind: str
-    point: CyclePoint
-    value: float
-    frequency: float = 0.0
-    located: bool = True
+    point: CyclePoint  #: The cycle nearest to it that was computed.
+    value: float  #: Of the parameter, by interpolation.
+    frequency: float = 0.0  #: Of the perturbation that becomes neutral, Hz; zero for a fold.
+    located: bool = True  #: True when it was found as closely as asked for.
 
     @property
     def title(self) -> str:
@@ -188,7 +162,6 @@ def predict_by_parameter(
     Parameters
     ----------
     points : sequence of CyclePoint
-    value : float
     h : Harmonics
         Of the prediction.
     weight : (n,) array

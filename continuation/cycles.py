@@ -36,21 +36,12 @@ FROM_CORRECTIONS, FROM_PERTURBATIONS = 16, 24
 
 @dataclass(frozen=True, eq=False)
 class Cycle:
-    """A periodic motion that solves the equations.
-
-    Attributes
-    ----------
-    motion : PeriodicMotion
-    mu : dict
-    correction : float
-        Size of the last correction over that of the motion about its mean.
-    iterations, krylov : int
-        Corrections and Krylov iterations spent on it.
-    """
+    """A periodic motion that solves the equations."""
 
     motion: PeriodicMotion
     mu: dict
-    correction: float
+    correction: float  #: Size of the last correction over that of the motion about its mean.
+    #: iterations and krylov: corrections and Krylov iterations spent on it.
     iterations: int
     krylov: int
 
@@ -89,21 +80,15 @@ class CycleSolver:
         free: Sequence[str] = (),
         conditions: Sequence[Condition] = (),
     ) -> Cycle:
-        """Correct a guess.
+        """Correct a guess. Raises NotConverged.
 
         Parameters
         ----------
-        guess : PeriodicMotion
-        mu : mapping
         free : sequence of str
             Parameters that are unknown beside the motion, or `FREQUENCY` of a forced one; that of an autonomous one
             always is.
         conditions : sequence of Condition
             One for each of them, their `extra` in the order of `unknowns`.
-
-        Raises
-        ------
-        NotConverged
         """
         free = self.unknowns(free)
         if self.system.autonomous:
@@ -248,7 +233,7 @@ class CycleSolver:
 def cycles_beside_onset(
     solver: CycleSolver, small: PeriodicMotion, mu: Mapping[str, float], parameter: str, row: np.ndarray, ratio: float
 ) -> tuple[Cycle, Cycle, Cycle]:
-    """Equilibrium at a Hopf point as a cycle at rest, and two small cycles beside it.
+    """Equilibrium at a Hopf point as a cycle at rest, and two small cycles beside it. Raises NotConverged.
 
     To leading order parameter, frequency and mean change with the square of the amplitude, as the normal form has it,
     and harmonic k with its power k: the guess of the second cycle follows from the first.
@@ -265,10 +250,6 @@ def cycles_beside_onset(
         Functional of coefficients that measures the amplitude; zero for the mean.
     ratio : float
         Amplitude of the second cycle over that of the first.
-
-    Raises
-    ------
-    NotConverged
     """
     h, amplitude = small.harmonics, float(np.vdot(row, small.coefficients))
     free = np.zeros(len(solver.unknowns((parameter,))))

@@ -45,7 +45,8 @@ def special_at(tracer, kind, point, index, located, reason="", values=None, vect
 
 
 def solve_augmented(tracer, condition, z, frame, names=None, system=None, mu=None):
-    """Newton's method for a point of a curve that fulfils conditions besides.
+    """Newton's method for a point of a curve that fulfils conditions besides. Raises NotConverged: there is no solution
+    near the guess.
 
     Parameters
     ----------
@@ -59,11 +60,6 @@ def solve_augmented(tracer, condition, z, frame, names=None, system=None, mu=Non
         Rows that complete ``[F_u, F_p]``.
     names, system, mu : optional
         In place of the tracer's own.
-
-    Raises
-    ------
-    NotConverged
-        There is no solution near the guess.
     """
     problem, options = tracer.problem, tracer.options
     augmented = Problem(

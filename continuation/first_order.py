@@ -88,8 +88,6 @@ class DirectLinearisation:
 
     Parameters
     ----------
-    system : FirstOrderSystem
-    motion : PeriodicMotion
     mu : mapping of str to float
     """
 
@@ -172,12 +170,7 @@ class DirectLinearisation:
         return False
 
     def prepare(self, free: Sequence[str], conditions: Sequence[Condition], force: np.ndarray) -> None:
-        """Factor the equations with free unknowns and as many conditions.
-
-        Raises
-        ------
-        SingularSystem
-        """
+        """Factor the equations with free unknowns and as many conditions. Raises SingularSystem."""
         self.free = tuple(free)
         h, motion = self.motion.harmonics, self.motion
         slopes = (self.system.slope(motion, self.mu, name) for name in free)

@@ -103,7 +103,6 @@ class Rates:
 
     Parameters
     ----------
-    harmonics : Harmonics
     omega : float
         Angular frequency.
     shift : complex

@@ -47,28 +47,15 @@ _EDGE, _REAL, _APART = 1e-4, 1e-6, 1e-3
 
 @dataclass(frozen=True, eq=False)
 class Exponents:
-    """Leading Floquet exponents.
+    """Leading Floquet exponents."""
 
-    Attributes
-    ----------
-    values : (k,) complex array
-        1/s, sorted by growth rate, imaginary parts from 0 to omega / 2; that of the shift in time left out.
-    vectors : list of (2 H + 1, n) complex arrays
-        Coefficients of the perturbations.
-    errors : (k,) array
-        Share of each perturbation that it misses in the full equations.
-    trivial : float
-        Size of the exponent of the shift in time, 1/s; zero for a forced system.
-    omega : float
-    as_found : (k,) complex array
-        Exponents that go with the vectors: the values but for whole turns.
-    """
-
+    #: (k,); 1/s, sorted by growth rate, imaginary parts from 0 to omega / 2; that of the shift in time left out.
     values: np.ndarray
-    vectors: list[np.ndarray]
-    errors: np.ndarray
-    trivial: float
+    vectors: list[np.ndarray]  #: (2 H + 1, n); coefficients of the perturbations.
+    errors: np.ndarray  #: (k,); share of each perturbation that it misses in the full equations.
+    trivial: float  #: Size of the exponent of the shift in time, 1/s; zero for a forced system.
     omega: float
+    #: (k,); exponents that go with the vectors: the values but for whole turns.
     as_found: np.ndarray = field(default_factory=lambda: np.zeros(0, complex))
 
     @classmethod

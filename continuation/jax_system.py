@@ -46,13 +46,7 @@ class JaxSystem(System):
     array([-4.])
     """
 
-    def __init__(
-        self,
-        residual: Callable,
-        size: int,
-        mass=None,
-        sparsity: sp.spmatrix | None = None,
-    ):
+    def __init__(self, residual: Callable, size: int, mass=None, sparsity: sp.spmatrix | None = None):
         if not callable(residual):
             raise TypeError(f"The residual is a function of the state and the parameters, not {shown(residual)}.")
         self.size = int(number_of(size, "size"))

@@ -111,8 +111,7 @@ class SparseSolver(_Solver):
 def _parity(permutation) -> int:
     """+1 for an even permutation, -1 for an odd one."""
     count, _ = connected_components(
-        sp.csr_matrix((np.ones(permutation.size), (np.arange(permutation.size), permutation))),
-        directed=False,
+        sp.csr_matrix((np.ones(permutation.size), (np.arange(permutation.size), permutation))), directed=False
     )
     return -1 if (permutation.size - count) % 2 else 1
 
@@ -199,7 +198,8 @@ class MatrixLinearisation(_Solver):
 
 
 class Bordered:
-    """``[[A, b], [c', d]]`` with the interface of a solver (plain transposes, no conjugates).
+    """``[[A, b], [c', d]]`` with the interface of a solver (plain transposes, no conjugates). Raises SingularSystem:
+    the bordered matrix itself is singular, or a solve gave no finite numbers.
 
     Parameters
     ----------
@@ -209,11 +209,6 @@ class Bordered:
         ``b`` and ``c``.
     corner : complex
         ``d``.
-
-    Raises
-    ------
-    SingularSystem
-        The bordered matrix itself is singular, or a solve gave no finite numbers.
     """
 
     def __init__(self, inner, column, row, corner=0.0):

@@ -214,7 +214,8 @@ def hopf_normal_form(system, u, mu, omega: float, q, parameter: str | None = Non
 def hopf_normal_form_of(
     forms: SystemForms, omega: float, q: np.ndarray, parameter: str | None = None
 ) -> HopfNormalForm:
-    """First Lyapunov coefficient and the second-order motion from the residual of exponential motions.
+    """First Lyapunov coefficient and the second-order motion from the residual of exponential motions. Raises
+    NotABifurcation: ``i omega`` is not a simple eigenvalue, or the frequency is zero.
 
     Parameters
     ----------
@@ -228,11 +229,6 @@ def hopf_normal_form_of(
     HopfNormalForm
         ``q``, ``h20`` and ``h11`` as `SystemForms.state` gives them, with ``|q| = 1``; ``p`` is the left vector of the
         pencil, ``p* T'(i omega) q = 1``.
-
-    Raises
-    ------
-    NotABifurcation
-        ``i omega`` is not a simple eigenvalue, or the frequency is zero.
     """
     require_frequency(omega)
     s = 1j * omega

@@ -32,17 +32,10 @@ Filter = Callable[[np.ndarray], np.ndarray] | int
 
 @dataclass(frozen=True, eq=False)
 class PeriodicMotion:
-    """A periodic motion.
-
-    Attributes
-    ----------
-    harmonics : Harmonics
-    coefficients : (2 H + 1, n) array
-    omega : float
-    """
+    """A periodic motion."""
 
     harmonics: Harmonics
-    coefficients: np.ndarray
+    coefficients: np.ndarray  #: (2 H + 1, n).
     omega: float
 
     @classmethod
@@ -103,15 +96,9 @@ class PeriodicMotion:
 class Term:
     """One term of a linearisation; blocks are N matrices, a `SparseBlocks`, `DenseBlocks`, one stack (N, a, b), or None
     for the identity.
-
-    Attributes
-    ----------
-    middle : sequence of (filter, blocks)
-    left, right : blocks
-    outer : filter
     """
 
-    middle: Sequence[tuple[Filter, Any]]
+    middle: Sequence[tuple[Filter, Any]]  #: sequence of (filter, blocks).
     left: Any = None
     right: Any = None
     outer: Filter = 0
@@ -225,7 +212,6 @@ class PeriodicOperator:
 
     Parameters
     ----------
-    motion : PeriodicMotion
     terms : sequence of Term
     coarse : sequence of Term, optional
         Terms that stand for these in projections, where some have none or a dear one.

@@ -156,12 +156,8 @@ class Local:
         return np.concatenate([y, coefficients[k:]])
 
     def correction(self, normal=None, offset=0.0) -> np.ndarray:
-        """The Newton step; ``normal . dz = -offset`` closes the equations of a curve.
-
-        Raises
-        ------
-        SingularSystem
-            The conditions do not fix the remaining unknowns.
+        """The Newton step; ``normal . dz = -offset`` closes the equations of a curve. Raises SingularSystem: the
+        conditions do not fix the remaining unknowns.
         """
         n, k = self.problem.n, self.problem.k
         particular = self.solver.solve(np.concatenate([-self.residual, np.zeros(k)]))
@@ -203,24 +199,13 @@ DIVERGENCE = 1e6
 
 @dataclass(frozen=True, repr=False)
 class Correction:
-    """Outcome of Newton's method on a `Problem`.
+    """Outcome of Newton's method on a `Problem`."""
 
-    Attributes
-    ----------
-    z : ndarray
-    local : Local or None
-        The linearisation at ``z`` when converged.
-    reason : Said
-    iterations : int
-    residual : float
-        Norm of ``F``.
-    """
-
-    z: np.ndarray
-    local: Local | None
+    z: np.ndarray  #: ndarray.
+    local: Local | None  #: The linearisation at ``z`` when converged.
     reason: Said
     iterations: int
-    residual: float
+    residual: float  #: Norm of ``F``.
 
     def __repr__(self) -> str:
         return f"<Correction: {self.reason}, {self.iterations} iterations, residual {self.residual:.3g}>"

@@ -81,12 +81,8 @@ def dense_spectrum(linearisation, count=None, near=None) -> Spectrum:
 
 
 def shift_invert_spectrum(linearisation, count, near=0.0) -> Spectrum:
-    """``count`` eigenvalues nearest to ``near`` by ARPACK on ``(A - near B)^-1 B``.
-
-    Raises
-    ------
-    ValueError
-        ``count`` is too large for the iteration.
+    """``count`` eigenvalues nearest to ``near`` by ARPACK on ``(A - near B)^-1 B``. Raises ValueError: ``count`` is too
+    large for the iteration.
     """
     n = linearisation.size
     if count > n - 2:

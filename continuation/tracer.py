@@ -156,7 +156,6 @@ class Tracer:
 
     Parameters
     ----------
-    problem : Problem
     options : ContinuationOptions
     monitors : sequence of Monitor
     observers
@@ -238,12 +237,8 @@ class Tracer:
     # -- the run
 
     def start(self, z, direction, frame=None) -> CurvePoint:
-        """Correct the first point and choose the side to leave it on.
-
-        Raises
-        ------
-        NotConverged
-            The first point is not on the curve and Newton's method does not reach it.
+        """Correct the first point and choose the side to leave it on. Raises NotConverged: the first point is not on
+        the curve and Newton's method does not reach it.
         """
         n, k = self.problem.n, self.problem.k
         if frame is not None:

@@ -53,18 +53,11 @@ def tributary_area(shell: Shell) -> np.ndarray:
 
 @dataclass(frozen=True)
 class ContactLaw:
-    """t = penalty * ramp(-gap): the penalty form of g >= 0, t >= 0, t g = 0.
+    """t = penalty * ramp(-gap): the penalty form of g >= 0, t >= 0, t g = 0."""
 
-    Attributes
-    ----------
-    penalty : float, Pa/m
-        The contact pressure follows the penetration with this slope.
-    rounding : float, m
-        Half width over which the kink of the ramp is rounded by a parabola, so that the tangent is continuous; 0 keeps
-        the kink.
-    """
-
-    penalty: float
+    penalty: float  #: Pa/m; the contact pressure follows the penetration with this slope.
+    #: m; half width over which the kink of the ramp is rounded by a parabola, so that the tangent is continuous; 0
+    #: keeps the kink.
     rounding: float = 0.0
 
     def __post_init__(self):
@@ -98,20 +91,11 @@ class ContactLaw:
 
 @dataclass(frozen=True)
 class ContactState:
-    """Contact of one state, an entry for each contact node.
+    """Contact of one state, an entry for each contact node."""
 
-    Attributes
-    ----------
-    gap : (k,) array, m
-        Negative where the face penetrates the plane.
-    pressure : (k,) array, Pa
-        Per area of the mid-surface at rest.
-    force : (k,) array, N
-    """
-
-    gap: np.ndarray
-    pressure: np.ndarray
-    force: np.ndarray
+    gap: np.ndarray  #: (k,), m; negative where the face penetrates the plane.
+    pressure: np.ndarray  #: (k,), Pa; per area of the mid-surface at rest.
+    force: np.ndarray  #: (k,), N.
 
     @property
     def touching(self) -> np.ndarray:
@@ -134,14 +118,12 @@ class PlaneContact:
 
     Parameters
     ----------
-    shell : Shell
     nodes : (k,) int array
         Nodes without a free displacement across the plane take no part and are dropped.
     depth : (k,) array, m
         Distance of the touching point from the mid-surface, against the director.
     area : (k,) array, m2
         Share of the surface that each node stands for.
-    law : ContactLaw
     axis : int
         Normal of the plane: 0, 1 or 2.
     least_gap : float or (k,) array, m
@@ -351,18 +333,10 @@ _SMALL = 1e-5
 
 @dataclass(frozen=True)
 class Rebound:
-    """Energy that the contact gives back to parting faces.
+    """Energy that the contact gives back to parting faces."""
 
-    Attributes
-    ----------
-    share : float
-        Share of the stored energy that is given back, 0 to 1.
-    speed : float, m/s
-        Parting speed from which on the rest is lost.
-    """
-
-    share: float = 1.0
-    speed: float = CREEP
+    share: float = 1.0  #: Share of the stored energy that is given back, 0 to 1.
+    speed: float = CREEP  #: m/s; parting speed from which on the rest is lost.
 
     def factor(self, rate: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Factor on the pressure (k,) at rates of the gaps (k,), m/s, and its derivative, s/m."""
@@ -389,11 +363,9 @@ class ContactStep:
 
     Parameters
     ----------
-    contact : PlaneContact
     q : (n,) array
         Where the step starts.
     h : float, s
-    rebound : Rebound
     """
 
     def __init__(self, contact: PlaneContact, q: np.ndarray, h: float, rebound: Rebound = Rebound()):

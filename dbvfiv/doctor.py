@@ -24,19 +24,12 @@ _IN_SOURCES = (Path(__file__).parents[1] / "Makefile").exists()
 
 @dataclass(frozen=True)
 class Problem:
-    """Something that is missing or unfit.
+    """Something that is missing or unfit."""
 
-    Attributes
-    ----------
-    what, remedy : str
-        A sentence, and a command or an action.
-    fatal : bool
-        Whether the solvers cannot work because of it.
-    """
-
+    #: what and remedy: a sentence, and a command or an action.
     what: str
     remedy: str
-    fatal: bool = True
+    fatal: bool = True  #: Whether the solvers cannot work because of it.
 
 
 @dataclass(frozen=True)

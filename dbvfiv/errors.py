@@ -72,13 +72,7 @@ def attempt(work: Callable[[], Result]) -> Result:
 
 
 def as_path(given: Any, what: str) -> Path:
-    """Path of a file or folder.
-
-    Raises
-    ------
-    CaseError
-        For anything that is no name; `what` begins the sentence.
-    """
+    """Path of a file or folder. Raises CaseError for anything that is no name; `what` begins the sentence."""
     try:
         return Path(given)
     except TypeError:

@@ -47,33 +47,18 @@ HEADS = 6
 
 @dataclass(frozen=True)
 class Answer:
-    """Answer at a parameter point.
-
-    Attributes
-    ----------
-    place : Mu
-    state : SteadyState
-    verdict : Verdict
-    eigenvalues : (k,) complex array, 1/s
-        By falling growth rate.
-    bound : float
-        Estimated relative error of the leading eigenvalues; 0 of the full operator, NaN where it was not estimated.
-    confirmed : bool
-        True of the full operator with its independent count.
-    classes : dict of Verdict
-        Of a confirmed answer those of the classes of motion it joins, by their names.
-    warnings : tuple of str
-        Of a confirmed answer what is to be said of the rubber in its steady state.
-    """
+    """Answer at a parameter point."""
 
     place: Mu
     state: SteadyState
     verdict: Verdict
-    eigenvalues: np.ndarray = field(default_factory=lambda: np.zeros(0, complex))
+    eigenvalues: np.ndarray = field(default_factory=lambda: np.zeros(0, complex))  #: (k,), 1/s; by falling growth rate.
+    #: Estimated relative error of the leading eigenvalues; 0 of the full operator, NaN where it was not estimated.
     bound: float = np.nan
-    confirmed: bool = False
+    confirmed: bool = False  #: True of the full operator with its independent count.
+    #: Of a confirmed answer those of the classes of motion it joins, by their names.
     classes: Mapping[str, Verdict] = field(default_factory=dict)
-    warnings: tuple[str, ...] = ()
+    warnings: tuple[str, ...] = ()  #: Of a confirmed answer what is to be said of the rubber in its steady state.
 
     def summary(self) -> dict[str, Any]:
         """Plain SI numbers for JSON."""
@@ -90,11 +75,8 @@ class Answer:
 
 
 class Explorer:
-    """A valve asked at one parameter point after another.
-
-    Parameters
-    ----------
-    session : Session
+    """A valve asked at one parameter point after another. Raises CaseError, SolveError for a case without flow, or with
+    a pump, whose pressure is no choice.
 
     Attributes
     ----------
@@ -104,11 +86,6 @@ class Explorer:
         Parameters that can be moved, with the range that is offered.
     interrupted : callable
         Asked between the steps of `bounded`; where it says True the prediction is given without its bound.
-
-    Raises
-    ------
-    CaseError, SolveError
-        For a case without flow, or with a pump, whose pressure is no choice.
 
     Examples
     --------
@@ -152,13 +129,7 @@ class Explorer:
         return not is_surrounding(self.case, name)
 
     def place(self, values: Mapping[str, float]) -> Mu:
-        """Parameter point with some values changed.
-
-        Raises
-        ------
-        CaseError
-            For a name or a value that cannot be asked.
-        """
+        """Parameter point with some values changed. Raises CaseError for a name or a value that cannot be asked."""
         for name, value in values.items():
             if name not in self.ranges:
                 raise CaseError(f"{name!r} is given, which cannot be moved here; known are {', '.join(self.ranges)}.")
@@ -168,12 +139,7 @@ class Explorer:
         return self.base.at(**values)
 
     def state(self, place: Mu) -> SteadyState:
-        """Steady state of a point, its flow in the fluid of the point.
-
-        Raises
-        ------
-        SolveError
-        """
+        """Steady state of a point, its flow in the fluid of the point. Raises SolveError."""
         found = self.walk.state(place)
         if place.density == self.base.density or self.moves("density"):
             return found
@@ -184,11 +150,7 @@ class Explorer:
 
     def predict(self, **values: float) -> Answer:
         """Answer of the reduced operator, without its bound. Where the constants of a rubber are unstable the verdict
-        says so.
-
-        Raises
-        ------
-        CaseError, SolveError
+        says so. Raises CaseError, SolveError.
         """
         return self._asked(values, lambda place: np.nan)
 
@@ -208,11 +170,8 @@ class Explorer:
             self._space = reduction, reduction.fine(reduction.first([place]), [place], TAKEN), self._corners(place)
 
     def bounded(self, **values: float) -> Answer:
-        """Prediction with its bound, on a reduced operator that is enriched where this is too large.
-
-        Raises
-        ------
-        CaseError, SolveError
+        """Prediction with its bound, on a reduced operator that is enriched where this is too large. Raises CaseError,
+        SolveError.
         """
         return self._asked(values, self._enriched)
 
@@ -246,11 +205,7 @@ class Explorer:
 
     def confirm(self, **values: float) -> Answer:
         """Answer of the full operator with its independent count, as `dbvfiv modes` gives it: on the motions that are
-        predicted, and those of all classes that modes.symmetry asks for.
-
-        Raises
-        ------
-        CaseError, SolveError
+        predicted, and those of all classes that modes.symmetry asks for. Raises CaseError, SolveError.
         """
         place = self.place(values)
         state, refusal = self.state(place), self.walk.refusal(place)

@@ -133,10 +133,7 @@ def blas_core(processor: str) -> str | None:
 
 
 #: Kernels of OpenBLAS and the instructions that they are made of, the fastest first.
-_CORES = {
-    "SkylakeX": {"avx512f", "avx512bw", "avx512cd", "avx512dq", "avx512vl"},
-    "Haswell": {"avx2", "fma"},
-}
+_CORES = {"SkylakeX": {"avx512f", "avx512bw", "avx512cd", "avx512dq", "avx512vl"}, "Haswell": {"avx2", "fma"}}
 
 
 def _processor() -> str:

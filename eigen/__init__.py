@@ -1,13 +1,6 @@
 """Spectra of large sparse quadratic pencils with a low-rank, frequency-dependent coupling."""
 
-from .basis import (
-    LargestPairs,
-    NotConvergedError,
-    NotPositiveError,
-    TransferBasis,
-    largest_pairs,
-    lowest_frequencies,
-)
+from .basis import LargestPairs, NotConvergedError, NotPositiveError, TransferBasis, largest_pairs, lowest_frequencies
 from .certificate import Certificate, CertifiedSpectrum, certified_spectrum, listed_unstable
 from .columns import Cell, Column, ColumnSolver, ReducedColumn
 from .count import Count, unstable_count

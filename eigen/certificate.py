@@ -20,40 +20,21 @@ from .spectrum import SearchOptions, Spectrum, number_right_of
 
 @dataclass(frozen=True)
 class CertificateOptions:
-    """Sizes of a count on a basis, and how far it is trusted.
+    """Sizes of a count on a basis, and how far it is trusted."""
 
-    Attributes
-    ----------
-    dense : int
-        Unknowns beyond which a count is made on a basis: a dense factorisation of so many takes some 10 ms, a count
-        some hundred of them.
-    trusted : float
-        Largest error of log det on the basis; a count is wrong where it comes to pi.
-    checked : int
-        Frequencies at which a basis is compared with the full pencil.
-    finer : int
-        Finer bases tried at most where the first one leaves a count open.
-    distinct : float
-        Size, over the largest, below which directions of exact responses are left out of a finer basis.
-    points_beyond : int
-        Points of a count over all frequencies where one up to the end of a band can stand in for it.
-    distant : int
-        Oscillating pairs that a list lacks which are looked for at most, and real ones.
-    apart : float
-        Relative distance from which on an eigenvalue on a basis is none of the list.
-    steps : int
-        Newton steps for one of them, which is known roughly.
-    """
-
+    #: Unknowns beyond which a count is made on a basis: a dense factorisation of so many takes some 10 ms, a count some
+    #: hundred of them.
     dense: int = 400
-    trusted: float = 0.1
-    checked: int = 2
-    finer: int = 3
+    trusted: float = 0.1  #: Largest error of log det on the basis; a count is wrong where it comes to pi.
+    checked: int = 2  #: Frequencies at which a basis is compared with the full pencil.
+    finer: int = 3  #: Finer bases tried at most where the first one leaves a count open.
+    #: Size, over the largest, below which directions of exact responses are left out of a finer basis.
     distinct: float = 1e-4
+    #: Points of a count over all frequencies where one up to the end of a band can stand in for it.
     points_beyond: int = 1000
-    distant: int = 4
-    apart: float = 0.02
-    steps: int = 8
+    distant: int = 4  #: Oscillating pairs that a list lacks which are looked for at most, and real ones.
+    apart: float = 0.02  #: Relative distance from which on an eigenvalue on a basis is none of the list.
+    steps: int = 8  #: Newton steps for one of them, which is known roughly.
 
 
 OPTIONS = CertificateOptions()

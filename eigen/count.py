@@ -13,30 +13,15 @@ from .operator import CoupledPencil
 
 @dataclass(frozen=True)
 class CountOptions:
-    """Steps by which the phase of the determinant f is followed, found by trying on valves with few and many modes.
+    """Steps by which the phase of the determinant f is followed, found by trying on valves with few and many modes."""
 
-    Attributes
-    ----------
-    phase : float
-        Largest increment of the phase between neighbours, rad: far from pi, where it becomes ambiguous.
-    size : float
-        Largest increment of log |f|, which feels zeros beside the line.
-    predicted : float
-        Largest increment of log f that the slope at a neighbour may predict.
-    apart : float
-        Distance of two places beside zeros that relax, over the distance of the zero from the line.
-    beside : tuple of int
-        Places beside a hint, in its distances from the line.
-    points : int
-        Points at most.
-    """
-
+    #: Largest increment of the phase between neighbours, rad: far from pi, where it becomes ambiguous.
     phase: float = np.pi / 3
-    size: float = 1.0
-    predicted: float = 1.5
-    apart: float = 0.4
-    beside: tuple[int, ...] = (-10, -3, -1, 0, 1, 3, 10)
-    points: int = 4000
+    size: float = 1.0  #: Largest increment of log |f|, which feels zeros beside the line.
+    predicted: float = 1.5  #: Largest increment of log f that the slope at a neighbour may predict.
+    apart: float = 0.4  #: Distance of two places beside zeros that relax, over the distance of the zero from the line.
+    beside: tuple[int, ...] = (-10, -3, -1, 0, 1, 3, 10)  #: Places beside a hint, in its distances from the line.
+    points: int = 4000  #: Points at most.
 
 
 OPTIONS = CountOptions()

@@ -75,16 +75,12 @@ class Oscillators(NamedTuple):
 
     The modes are those of the stiffness that nothing has relaxed of; what couples them besides is left out. A mode that
     diverges or gains energy is replaced by one of its size that does neither.
-
-    Attributes
-    ----------
-    damping, slow : (k,) arrays, 1/s, 1/s2
-    relaxing : (g, k) array, 1/s2
     """
 
+    #: damping and slow: (k,), 1/s, 1/s2.
     damping: np.ndarray
     slow: np.ndarray
-    relaxing: np.ndarray
+    relaxing: np.ndarray  #: (g, k), 1/s2.
 
     @classmethod
     def of(cls, M, C, K, relaxing, relaxation: Relaxation | None) -> Oscillators:
@@ -133,6 +129,7 @@ LIGHT = 0.02
 
 class Structure:
     """det D(s) of a structure over that of stable oscillators, and J D(s)^-1 G, kept for every pencil of the structure.
+    Raises ValueError if M is not symmetric and positive definite, or the line lies left of the creep.
 
     Parameters
     ----------
@@ -140,11 +137,6 @@ class Structure:
         Its fluid does not matter; treated densely.
     line : float
         Growth rate right of which the oscillators have no zero.
-
-    Raises
-    ------
-    ValueError
-        If M is not symmetric and positive definite, or the line lies left of the creep.
     """
 
     def __init__(self, pencil: CoupledPencil, line: float = 0.0):
@@ -216,7 +208,6 @@ class Determinant:
 
     Parameters
     ----------
-    pencil : CoupledPencil
     structure : Structure
         Of the pencil.
 

@@ -28,10 +28,6 @@ class SingularShiftError(ArithmeticError):
 class StructureMatrices:
     """M, C, K and what relaxes of pencils on one common sparsity pattern, so that sums cost no symbolic work.
 
-    Parameters
-    ----------
-    pencil : CoupledPencil
-
     Attributes
     ----------
     indptr, indices : ndarray of int32
@@ -162,12 +158,8 @@ class DirectFactor:
         self._factor = None
 
     def refactor(self, values: np.ndarray | None = None) -> None:
-        """Factor the matrix with its `values`, or with others that take their place.
-
-        Raises
-        ------
-        SingularShiftError
-            If the values are not finite or the matrix is singular to working precision.
+        """Factor the matrix with its `values`, or with others that take their place. Raises SingularShiftError if the
+        values are not finite or the matrix is singular to working precision.
         """
         if values is not None:
             self.values[:] = values
@@ -253,7 +245,8 @@ def _release(objects):
 
 
 class ScaledLU:
-    """Real or complex SuperLU of D A D with D = |diag A|^(-1/2), for a nearly symmetric pattern.
+    """Real or complex SuperLU of D A D with D = |diag A|^(-1/2), for a nearly symmetric pattern. Raises
+    SingularShiftError if a pivot is exactly zero.
 
     Unknowns of different kinds (metres, radians) differ by powers of ten; unscaled, SuperLU leaves
     the diagonal for its pivots and fills in without need.
@@ -263,11 +256,6 @@ class ScaledLU:
     matrix : sparse, shape (n, n)
     pivoting : float
         Share of a column below which a pivot is not taken from the diagonal.
-
-    Raises
-    ------
-    SingularShiftError
-        If a pivot is exactly zero.
     """
 
     def __init__(self, matrix: sp.csc_matrix, pivoting: float = 0.01):
@@ -414,11 +402,7 @@ class Workspace:
 
 def first_regular(factor: Callable, pencil: CoupledPencil, shifts: Iterable[complex]) -> tuple[complex, Any]:
     """First of some shifts that is no eigenvalue, and the factor there, by `Workspace.shifted` or `Workspace.factored`.
-
-    Raises
-    ------
-    SingularShiftError
-        If all of them are.
+    Raises SingularShiftError if all of them are.
     """
     singular = SingularShiftError("No shift is given.")
     for shift in shifts:
@@ -430,7 +414,8 @@ def first_regular(factor: Callable, pencil: CoupledPencil, shifts: Iterable[comp
 
 
 class ShiftedPencil:
-    """T(sigma) of the full pencil, ready for solves; also with its transpose.
+    """T(sigma) of the full pencil, ready for solves; also with its transpose. Raises SingularShiftError if either the
+    sparse or the condensed matrix is singular to working precision.
 
     Parameters
     ----------
@@ -439,11 +424,6 @@ class ShiftedPencil:
     shift : complex
     factor : object with solve, solve_transposed
         LU of the structure, sigma^2 M + sigma C + K and what relaxes.
-
-    Raises
-    ------
-    SingularShiftError
-        If either the sparse or the condensed matrix is singular to working precision.
     """
 
     def __init__(self, pencil, structure, shift, factor):

@@ -97,7 +97,6 @@ def measure(pencil: CoupledPencil, eigenvalues, q, u) -> tuple[np.ndarray, np.nd
 
     Parameters
     ----------
-    pencil : CoupledPencil
     eigenvalues : array, shape (k,)
     q, u : arrays, shapes (n, k) and (b, k)
 

@@ -24,57 +24,33 @@ from .operator import CoupledPencil, Relaxation
 
 @dataclass(frozen=True)
 class ReductionOptions:
-    """Sizes of reduced spaces, and how far they are trusted; found by trying on valves with few and many modes.
+    """Sizes of reduced spaces, and how far they are trusted; found by trying on valves with few and many modes."""
 
-    Attributes
-    ----------
-    tolerance : float
-        Estimated relative error of an eigenvalue above which a space is enriched, and cells use the full operator.
-    held : int
-        Leading modes whose error a space is held to.
-    compression : float
-        Share of the largest below which static corrections are left out of the first space.
-    inertia_modes : int
-        Low motions that inertia corrections are made for.
-    band_modes : int
-        Lowest motions of the structure in the first space where a band is searched.
-    vectors, band_vectors : int
-        Leading vectors taken at each point: where damping orders the modes, and for a band.
-    snapshot : float
-        Share of the floor of growth rates down to which vectors are taken.
-    weak, deeper : float
-        Shares of a vector that the second space lacks, below which it is left out: at first, and corrected again.
-    corrections : int
-        Corrections of a vector where parts of the stiffness relax: one leaves 1e-6 of an eigenvalue, two 1e-8, and more
-        do not converge, since the inertia is left out of them.
-    typical_modes : int
-        Lowest motions of which a typical frequency is taken.
-    losses : int
-        Points at least at which vectors are taken where the relaxations differ.
-    joint, close : float
-        Directions weaker than these are left out of the space of a count: at first, and where counts disagree.
-    beside : int
-        Leading modes that are found and corrected beside another operator.
-    searched, kept : int
-        Leading modes searched for with the full operator, and kept of a cell.
-    """
-
+    #: Estimated relative error of an eigenvalue above which a space is enriched, and cells use the full operator.
     tolerance: float = 1e-6
-    held: int = 2
-    compression: float = 1e-4
-    inertia_modes: int = 20
-    band_modes: int = 24
+    held: int = 2  #: Leading modes whose error a space is held to.
+    compression: float = 1e-4  #: Share of the largest below which static corrections are left out of the first space.
+    inertia_modes: int = 20  #: Low motions that inertia corrections are made for.
+    band_modes: int = 24  #: Lowest motions of the structure in the first space where a band is searched.
+    #: vectors and band_vectors: leading vectors taken at each point: where damping orders the modes, and for a band.
     vectors: int = 4
     band_vectors: int = 12
-    snapshot: float = 0.75
+    snapshot: float = 0.75  #: Share of the floor of growth rates down to which vectors are taken.
+    #: weak and deeper: shares of a vector that the second space lacks, below which it is left out: at first, and
+    #: corrected again.
     weak: float = 3e-7
     deeper: float = 1e-5
+    #: Corrections of a vector where parts of the stiffness relax: one leaves 1e-6 of an eigenvalue, two 1e-8, and more
+    #: do not converge, since the inertia is left out of them.
     corrections: int = 2
-    typical_modes: int = 8
-    losses: int = 4
+    typical_modes: int = 8  #: Lowest motions of which a typical frequency is taken.
+    losses: int = 4  #: Points at least at which vectors are taken where the relaxations differ.
+    #: joint and close: directions weaker than these are left out of the space of a count: at first, and where counts
+    #: disagree.
     joint: float = 3e-3
     close: float = 1e-5
-    beside: int = 6
+    beside: int = 6  #: Leading modes that are found and corrected beside another operator.
+    #: searched and kept: leading modes searched for with the full operator, and kept of a cell.
     searched: int = 6
     kept: int = 8
 

@@ -46,10 +46,7 @@ ALL = (
     Made(
         "closure",
         "dbvfiv closure cases/closure.toml",
-        {
-            "side-views.png": "closure-side-views.png",
-            "contact-map.png": "closure-contact-map.png",
-        },
+        {"side-views.png": "closure-side-views.png", "contact-map.png": "closure-contact-map.png"},
     ),
     Made("closure-thin", "dbvfiv closure cases/closure-thin.toml", {"closure-curve.png": "closure-thin.png"}),
     Made(

@@ -28,10 +28,6 @@ NUMBERS = (
 class AskPanel:
     """Sliders and the answer beside.
 
-    Parameters
-    ----------
-    page : Page
-
     Attributes
     ----------
     values : dict
@@ -309,11 +305,7 @@ def _space(found: dict[str, Any], colour: str) -> dict[str, Any]:
     """Figure of the skin in space."""
     (x, y, z), (i, j, k) = zip(*found["points"]), zip(*found["triangles"])
     mesh = {"type": "mesh3d", "x": z, "y": x, "z": y, "i": i, "j": j, "k": k, "colorscale": "Cividis"}
-    mesh |= {
-        "intensity": found["colours"][colour],
-        "flatshading": True,
-        "colorbar": colour_bar(colour, -0.05),
-    }
+    mesh |= {"intensity": found["colours"][colour], "flatshading": True, "colorbar": colour_bar(colour, -0.05)}
     camera = {"eye": {"x": -1.8, "y": -1.9, "z": 1.1}}
     scene = {"aspectmode": "data", "camera": camera, **{f"{a}axis": {"title": {"text": f"{n}, m"}} for a, n in _AXES}}
     layout = {"margin": {"l": 0, "r": 0, "t": 30, "b": 80}, "height": 480, "scene": scene}

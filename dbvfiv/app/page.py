@@ -55,7 +55,6 @@ class Page:
 
     Parameters
     ----------
-    site : Site
     home : Path
         Folder of the user.
 
@@ -136,25 +135,14 @@ class Page:
     # -- the valve ----
 
     def take(self, text: str, name: str) -> None:
-        """Take a case in place of that on the page.
-
-        Raises
-        ------
-        CaseError
-            For what is no TOML.
-        """
+        """Take a case in place of that on the page. Raises CaseError for what is no TOML."""
         self.data, self.name = read_sheet(text), name
         self._form.refresh()
         self._parts.refresh()
         self.changed(text)
 
     def start_from(self, path: Path) -> None:
-        """Take a case file with the files that it names.
-
-        Raises
-        ------
-        CaseError, OSError, UnicodeDecodeError
-        """
+        """Take a case file with the files that it names. Raises CaseError, OSError, UnicodeDecodeError."""
         self.take(bring(path, self.home), path.stem)
 
     async def keep_result(self, name: str, content: Path | bytes) -> Run:
@@ -185,12 +173,7 @@ class Page:
             return found or await self.keep_result(path.name, path)
 
     def take_case_of(self, run: Run) -> None:
-        """Take the valve of a run, unless it is that on the page.
-
-        Raises
-        ------
-        CaseError, OSError
-        """
+        """Take the valve of a run, unless it is that on the page. Raises CaseError, OSError."""
         text = bring(run.case, self.home, anew=False)
         if read_sheet(text) != self.data:
             self.take(text, run.case.stem)

@@ -181,26 +181,14 @@ class Workers:
 
 @dataclass(eq=False)
 class Run:
-    """A run of the command line in a folder of its own, which holds its case, journal, output and results.
-
-    Attributes
-    ----------
-    folder : Path
-    kind : str
-        Study, report, or verdict of a record.
-    title : str
-    arguments : list of str
-    state : str
-        waiting, running, done, failed, cancelled or interrupted.
-    made, started, ended : float, s
-        Since 1970.
-    """
+    """A run of the command line in a folder of its own, which holds its case, journal, output and results."""
 
     folder: Path
-    kind: str
+    kind: str  #: Study, report, or verdict of a record.
     title: str
     arguments: list[str] = field(default_factory=list)
-    state: str = "waiting"
+    state: str = "waiting"  #: waiting, running, done, failed, cancelled or interrupted.
+    #: made, started and ended: s; since 1970.
     made: float = 0.0
     started: float = 0.0
     ended: float = 0.0
@@ -287,12 +275,7 @@ class Run:
 
 
 class Runs:
-    """Queue of the runs of all users, so many at once.
-
-    Parameters
-    ----------
-    at_once : int
-    """
+    """Queue of the runs of all users, so many at once."""
 
     def __init__(self, at_once: int = 1):
         self.at_once = at_once
@@ -312,13 +295,7 @@ class Runs:
         return self._known[folder]
 
     def add(self, folder: Path, kind: str, title: str, files: dict[str, bytes], arguments: list[str]) -> Run:
-        """Put a run with its files into the queue.
-
-        Raises
-        ------
-        CaseError
-            Where a user has too many.
-        """
+        """Put a run with its files into the queue. Raises CaseError where a user has too many."""
         if sum(run.is_live for run in self.of(folder)) >= WAITING:
             raise CaseError(f"{WAITING} runs are waiting already; cancel one or wait.")
         run = self._make(folder, kind, title, files, arguments)
@@ -326,12 +303,8 @@ class Runs:
         return run
 
     def keep(self, folder: Path, title: str, result: Path | bytes) -> Run:
-        """Keep a result file that was made elsewhere beside the runs; its kind is to be told yet.
-
-        Raises
-        ------
-        CaseError
-            Where a user has too many.
+        """Keep a result file that was made elsewhere beside the runs; its kind is to be told yet. Raises CaseError
+        where a user has too many.
         """
         run = self._make(folder, "", title, {"result.h5": result}, [])
         run.state = "done"

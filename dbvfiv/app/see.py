@@ -26,10 +26,7 @@ LOOK, LARGEST = 1.0, 15 << 20
 PICTURES = {
     "Head-loss curve": ("steady", ("-p", "{shown_low:.6g} {unit}:{shown_high:.6g} {unit}:10")),
     "Root locus over head": ("sweep", ("--over", "pressure={low:.6g}:{high:.6g}:10")),
-    "Stability map": (
-        "map",
-        ("--x", "pressure={low:.6g}:{high:.6g}:8", "--y", "{damping}:8", "--contours", "2 %,5 %"),
-    ),
+    "Stability map": ("map", ("--x", "pressure={low:.6g}:{high:.6g}:8", "--y", "{damping}:8", "--contours", "2 %,5 %")),
     "Cycle amplitude": ("cycle", ("--over", "{damping}:6")),
     "Closure": ("closure", ()),
     "Probability of chatter": ("uncertainty", ()),
@@ -73,8 +70,6 @@ class RunView:
 
     Parameters
     ----------
-    page : Page
-    run : Run
     opens : bool
         Show what it found as soon as it ends.
     """
@@ -130,7 +125,6 @@ class RunList:
 
     Parameters
     ----------
-    page : Page
     opens : bool
         Show what a run found as soon as it ends.
     """
@@ -242,12 +236,7 @@ def show_map(page: Any, run: Run, found: dict[str, Any]) -> None:
 
 
 class SeePanel:
-    """Pictures of the valve of the page, each computed when it is asked for.
-
-    Parameters
-    ----------
-    page : Page
-    """
+    """Pictures of the valve of the page, each computed when it is asked for."""
 
     def __init__(self, page: Any):
         self.page = page
@@ -279,12 +268,7 @@ class SeePanel:
 
 
 class RunsPanel:
-    """Any study and the report, in a queue; results that are kept.
-
-    Parameters
-    ----------
-    page : Page
-    """
+    """Any study and the report, in a queue; results that are kept."""
 
     def __init__(self, page: Any):
         self.page = page

@@ -238,12 +238,8 @@ def build(site: Site, token: str, password: str = "") -> FastAPI:
 
 
 def serve(site: Site, host: str = "127.0.0.1", port: int = 0, password: str = "", told: Callable = print) -> None:
-    """Serve pages until the process is ended; the address is told once they are there.
-
-    Raises
-    ------
-    CaseError
-        For an address that cannot be had, or one that others reach without a password.
+    """Serve pages until the process is ended; the address is told once they are there. Raises CaseError for an address
+    that cannot be had, or one that others reach without a password.
     """
     if not is_local(host) and len(password) < 8:
         raise CaseError(f"--host {host} is reached by others, so a password of 8 characters at least is needed.")

@@ -63,32 +63,17 @@ FORM: dict[str, tuple[tuple[str, str], ...]] = {
 
 @dataclass(frozen=True)
 class Checked:
-    """Outcome of a check.
+    """Outcome of a check."""
 
-    Attributes
-    ----------
-    case : Case or None
-        None where the keys give no case.
-    problems, notes : tuple of str
-        Sentences on what is wrong, and on what is allowed and seldom meant.
-    key : str
-        Key to blame for the first problem.
-    """
-
-    case: Case | None
+    case: Case | None  #: None where the keys give no case.
+    #: problems and notes: sentences on what is wrong, and on what is allowed and seldom meant.
     problems: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
-    key: str = ""
+    key: str = ""  #: Key to blame for the first problem.
 
 
 def read_sheet(text: str) -> dict[str, Any]:
-    """Data of a TOML text.
-
-    Raises
-    ------
-    CaseError
-        For a text that is too long, nested too deep, or no TOML.
-    """
+    """Data of a TOML text. Raises CaseError for a text that is too long, nested too deep, or no TOML."""
     if len(text) > LONGEST:
         raise CaseError(f"The case file has {len(text)} characters; it may have {LONGEST}.")
     try:
@@ -137,12 +122,7 @@ def shown_as(case: Case, name: str, beside: Collection[str] = ()) -> dict[str, A
 
 
 def change(data: dict[str, Any], key: str, text: str) -> None:
-    """Set a key to what was typed; an empty text takes it away.
-
-    Raises
-    ------
-    CaseError
-    """
+    """Set a key to what was typed; an empty text takes it away. Raises CaseError."""
     if text.strip():
         Case.make_way(data, {put(Case, data, key, toml_value(text.strip()))})
         return
@@ -159,7 +139,8 @@ def change(data: dict[str, Any], key: str, text: str) -> None:
 
 
 def bring(path: Path, home: Path, anew: bool = True) -> str:
-    """Text of a case file, of which the files that it names are put into a folder, under names without theirs.
+    """Text of a case file, of which the files that it names are put into a folder, under names without theirs. Raises
+    CaseError, OSError, UnicodeDecodeError.
 
     Parameters
     ----------
@@ -167,10 +148,6 @@ def bring(path: Path, home: Path, anew: bool = True) -> str:
         Case file, and folder.
     anew : bool
         Take the place of files that are there already.
-
-    Raises
-    ------
-    CaseError, OSError, UnicodeDecodeError
     """
     text, names = path.read_bytes().decode("utf-8-sig"), {}
     data = read_sheet(text)
@@ -210,12 +187,7 @@ def check(data: Mapping[str, Any], folder: Path, text: str = "") -> Checked:
 
 
 def stay_inside(data: Mapping[str, Any], runs: bool = True) -> None:
-    """Refuse names of files outside the folder, and processes elsewhere of a case that runs.
-
-    Raises
-    ------
-    CaseError
-    """
+    """Refuse names of files outside the folder, and processes elsewhere of a case that runs. Raises CaseError."""
     for key, value in _leaves(data, ""):
         if key.endswith("workers") and not runs:
             continue

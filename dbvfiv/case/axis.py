@@ -24,21 +24,11 @@ PLACES = tuple(name for name in PARAMETERS if name not in DESIGN)
 
 @dataclass(frozen=True)
 class Axis:
-    """A parameter and the values it takes.
+    """A parameter and the values it takes."""
 
-    Attributes
-    ----------
-    parameter : str
-        Name of one of `dbvfiv.case.parameters.PARAMETERS`.
-    values : tuple of float
-        SI values, rising.
-    log : bool
-        Whether they are spaced logarithmically.
-    """
-
-    parameter: str
-    values: tuple[float, ...]
-    log: bool = False
+    parameter: str  #: Name of one of `dbvfiv.case.parameters.PARAMETERS`.
+    values: tuple[float, ...]  #: SI values, rising.
+    log: bool = False  #: Whether they are spaced logarithmically.
 
     @property
     def key(self) -> str:
@@ -48,12 +38,8 @@ class Axis:
 
 def parse_axis(text: str, names: Iterable[str] = SWEPT, density: float | None = None) -> Axis:
     """Read ``PARAMETER=START:STOP:COUNT[:log]`` or ``PARAMETER=VALUE,VALUE,...`` for one of the parameters named;
-    pressures may be heads of a fluid whose density, kg/m3, is given.
-
-    Raises
-    ------
-    ValueError
-        With a clause that completes "key is given as X, ...".
+    pressures may be heads of a fluid whose density, kg/m3, is given. Raises ValueError with a clause that completes
+    "key is given as X, ...".
     """
     if not isinstance(text, str):
         raise ValueError("which is not a text")
@@ -92,12 +78,8 @@ def parse_axis(text: str, names: Iterable[str] = SWEPT, density: float | None = 
 
 
 def write_axis(given: Any) -> Any:
-    """Text of a range that is given as ``{"density": [1, 10, 100]}``; anything else as it is.
-
-    Raises
-    ------
-    CaseError
-        For a mapping that is not of one parameter and two or more values.
+    """Text of a range that is given as ``{"density": [1, 10, 100]}``; anything else as it is. Raises CaseError for a
+    mapping that is not of one parameter and two or more values.
     """
     if not isinstance(given, Mapping):
         return given
@@ -117,12 +99,7 @@ def _value(row: Parameter, text: str, density: float | None) -> float:
 
 def parse_point(text: str, density: float | None = None) -> dict[str, float]:
     """Read ``PARAMETER=VALUE, ...``, SI values by name; a pressure may be a head of a fluid of the density, kg/m3, that
-    is given, or that stands beside it.
-
-    Raises
-    ------
-    ValueError
-        With a clause that completes "key is given as X, ...".
+    is given, or that stands beside it. Raises ValueError with a clause that completes "key is given as X, ...".
     """
     found: dict[str, float] = {}
     parts = [[piece.strip() for piece in part.partition("=")] for part in filter(str.strip, text.split(","))]
@@ -140,12 +117,8 @@ def parse_point(text: str, density: float | None = None) -> dict[str, float]:
 
 
 def parse_stability_axis(text: str, density: float | None = None) -> Axis:
-    """Read a range as `parse_axis` does, or a parameter alone with its usual range.
-
-    Raises
-    ------
-    ValueError
-        With a clause that completes "key is given as X, ...".
+    """Read a range as `parse_axis` does, or a parameter alone with its usual range. Raises ValueError with a clause
+    that completes "key is given as X, ...".
     """
     if isinstance(text, str) and text.strip() in PARAMETERS:
         text = PARAMETERS[text.strip()].usual_range
@@ -207,12 +180,9 @@ _ALLOWED = (
 
 
 def read_pressures(given: Iterable[Any], name: str, density: float | None = None) -> tuple[float, ...]:
-    """Pressures in Pa from numbers and texts with units, heads of a fluid of that density, kg/m3, included.
-
-    Raises
-    ------
-    CaseError
-        For anything that is not a pressure above zero and up to 10 MPa; `name` says in the sentence where it was given.
+    """Pressures in Pa from numbers and texts with units, heads of a fluid of that density, kg/m3, included. Raises
+    CaseError for anything that is not a pressure above zero and up to 10 MPa; `name` says in the sentence where it was
+    given.
     """
     found = []
     for value in given:
@@ -237,27 +207,14 @@ def is_single(pressure: Any) -> bool:
 
 @dataclass(frozen=True)
 class Level:
-    """Damping that a mode has where it crosses a contour; of neutral modes none.
+    """Damping that a mode has where it crosses a contour; of neutral modes none."""
 
-    Attributes
-    ----------
-    rate : float, 1/s
-        Growth rate.
-    ratio : float
-        Damping ratio, of its own besides a rate of zero.
-    """
-
-    rate: float = 0.0
-    ratio: float = 0.0
+    rate: float = 0.0  #: 1/s; growth rate.
+    ratio: float = 0.0  #: Damping ratio, of its own besides a rate of zero.
 
     @classmethod
     def parse(cls, text: str) -> Level:
-        """Level of a text: a growth rate, "-2" or "-2 1/s", or a damping ratio, "5 %".
-
-        Raises
-        ------
-        ValueError
-        """
+        """Level of a text: a growth rate, "-2" or "-2 1/s", or a damping ratio, "5 %". Raises ValueError."""
         ratio = text.strip().endswith("%")
         try:
             number = float(text.strip().removesuffix("%").removesuffix("1/s"))

@@ -33,13 +33,7 @@ _TEMPERATURES = {
 
 
 def kelvin(value: float, unit: str) -> float:
-    """A temperature in K.
-
-    Raises
-    ------
-    ValueError
-        One clause, for a unit that is none of temperature.
-    """
+    """A temperature in K. Raises ValueError: one clause, for a unit that is none of temperature."""
     word = unit.strip().lower()
     word = {"c": "degc", "f": "degf"}.get(word, word)
     if word not in _TEMPERATURES:
@@ -111,8 +105,7 @@ Temperature = Annotated[
     float,
     BeforeValidator(_temperature),
     Described(
-        "temperature",
-        f'a temperature from {_COLDEST:g} to {_HOTTEST:g} K, such as "20 degC"; a bare number is in K',
+        "temperature", f'a temperature from {_COLDEST:g} to {_HOTTEST:g} K, such as "20 degC"; a bare number is in K'
     ),
 ]
 Series = Annotated[

@@ -31,28 +31,17 @@ from .section import Described, Section, mark_of
 
 @dataclass(frozen=True)
 class KeyInfo:
-    """One key of the case file, described.
+    """One key of the case file, described."""
 
-    Attributes
-    ----------
-    key : str
-        Dotted key; ``[]`` stands for an index, ``NAME`` for a free name.
-    type, unit, allowed, description : str
-        Words for people; ``unit`` is empty for what has none.
-    default : object
-        SI default, None when there is none; ``shown`` is its text in a case file.
-    required : bool
-        Whether the key must be given.
-    """
-
-    key: str
+    key: str  #: Dotted key; ``[]`` stands for an index, ``NAME`` for a free name.
+    #: type, unit, allowed and description: words for people; ``unit`` is empty for what has none.
     type: str
     unit: str
     allowed: str
     description: str
-    default: Any
+    default: Any  #: SI default, None when there is none; ``shown`` is its text in a case file.
     shown: str
-    required: bool
+    required: bool  #: Whether the key must be given.
 
 
 def quantity_of(field: FieldInfo) -> Quantity | None:
@@ -285,12 +274,8 @@ def synonym(key: str) -> str | None:
 
 
 def explain(model: type[Section], key: str | None = None) -> list[KeyInfo]:
-    """Return the keys of a case that a word stands for: a key, a section, or all of them for None.
-
-    Raises
-    ------
-    CaseError
-        For a key there is not, naming the nearest.
+    """Return the keys of a case that a word stands for: a key, a section, or all of them for None. Raises CaseError for
+    a key there is not, naming the nearest.
     """
     infos = walk(model)
     if key is None:

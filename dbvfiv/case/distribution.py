@@ -38,17 +38,10 @@ FORMS = (
 
 @dataclass(frozen=True)
 class Distribution:
-    """Distribution of one number.
+    """Distribution of one number."""
 
-    Attributes
-    ----------
-    form : str
-        "normal", "lognormal", "uniform" or "samples".
-    numbers : tuple of float
-        Mean and standard deviation, median and factor, bounds, or the values in ascending order; SI.
-    """
-
-    form: str
+    form: str  #: "normal", "lognormal", "uniform" or "samples".
+    #: Mean and standard deviation, median and factor, bounds, or the values in ascending order; SI.
     numbers: tuple[float, ...]
 
     @classmethod
@@ -56,12 +49,7 @@ class Distribution:
         cls, text: Any, quantity: Quantity, own: float | None = None, density: float | None = None
     ) -> Distribution:
         """Read a distribution of a quantity whose value in the case is `own`, SI, where it has one number; heads are of
-        a fluid with a density, kg/m3.
-
-        Raises
-        ------
-        ValueError
-            With a clause that completes "KEY is given as X, ...".
+        a fluid with a density, kg/m3. Raises ValueError with a clause that completes "KEY is given as X, ...".
         """
         match = _FORM.fullmatch(text) if isinstance(text, str) else None
         if match is None:

@@ -24,21 +24,12 @@ _LARGEST = 200_000
 
 @dataclass(frozen=True)
 class KeyProfile:
-    """One section of the mid-surface.
+    """One section of the mid-surface."""
 
-    Attributes
-    ----------
-    points : tuple of (x, y, z), m
-        From the centre, x = 0, or from one side edge, y = 0, to the other side edge.
-    joints : tuple of int
-        Points inside at which the curvature jumps or the section has a corner.
-    smooth : bool
-        Whether the section is smooth between joints, so that curves of higher degree serve.
-    """
-
+    #: (x, y, z), m; from the centre, x = 0, or from one side edge, y = 0, to the other side edge.
     points: tuple[tuple[float, float, float], ...]
-    joints: tuple[int, ...] = ()
-    smooth: bool = False
+    joints: tuple[int, ...] = ()  #: Points inside at which the curvature jumps or the section has a corner.
+    smooth: bool = False  #: Whether the section is smooth between joints, so that curves of higher degree serve.
 
     @property
     def z(self) -> float:
@@ -57,7 +48,7 @@ class KeyProfile:
 
 
 def read_key_points(path: Path) -> tuple[KeyProfile, ...]:
-    """Read a file of key points.
+    """Read a file of key points. Raises ValueError with a clause that completes "key_points is given as FILE, ...".
 
     Parameters
     ----------
@@ -72,11 +63,6 @@ def read_key_points(path: Path) -> tuple[KeyProfile, ...]:
     -------
     tuple of KeyProfile
         From lip to flange.
-
-    Raises
-    ------
-    ValueError
-        With a clause that completes "key_points is given as FILE, ...".
     """
     numbered = numbered_lines(path)
     if not numbered:

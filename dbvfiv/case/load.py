@@ -224,7 +224,8 @@ Model = TypeVar("Model", bound=Section)
 
 
 def read_case_file(model: type[Model], path: str | Path | None = None, overrides: Iterable[str] = ()) -> Model:
-    """Read and check a case file.
+    """Read and check a case file. Raises CaseError: one sentence: which key, in which line, what was given, what is
+    allowed.
 
     Parameters
     ----------
@@ -238,11 +239,6 @@ def read_case_file(model: type[Model], path: str | Path | None = None, overrides
     Returns
     -------
     Model
-
-    Raises
-    ------
-    CaseError
-        One sentence: which key, in which line, what was given, what is allowed.
     """
     data, text, name, folder = {}, "", "", Path(".")
     if path is not None:
@@ -266,7 +262,7 @@ def make_case(
     overridden: Iterable[tuple[str, ...]] = (),
     check_files: bool = True,
 ) -> Model:
-    """Validate plain data as it comes out of a TOML file.
+    """Validate plain data as it comes out of a TOML file. Raises CaseError.
 
     Parameters
     ----------
@@ -282,10 +278,6 @@ def make_case(
         Key paths that did not come from the file.
     check_files : bool
         Whether the files that the case names must exist.
-
-    Raises
-    ------
-    CaseError
     """
     context = {"folder": folder, "check_files": check_files}
     try:
@@ -316,13 +308,7 @@ def _read(path: str | Path) -> str:
 
 
 def parse_toml(text: str, name: str = "") -> dict[str, Any]:
-    """Parse TOML.
-
-    Raises
-    ------
-    CaseError
-        With the line of the slip.
-    """
+    """Parse TOML. Raises CaseError with the line of the slip."""
     try:
         return tomllib.loads(text)
     except (ValueError, RecursionError) as error:  # over-long integers come as plain ValueError
@@ -362,14 +348,10 @@ def key_path(dotted: str) -> tuple[str, ...]:
 
 
 def put(model: type[Section], data: dict[str, Any], dotted: str, value: Any) -> tuple[str, ...]:
-    """Set ``data["a"]["b"] = value`` for ``"a.b"``; lists are entered by index.
+    """Set ``data["a"]["b"] = value`` for ``"a.b"``; lists are entered by index. Raises CaseError when a list has no
+    such element, or a value stands where a table is needed.
 
     A list that the data does not hold yet starts from its default in the model.
-
-    Raises
-    ------
-    CaseError
-        When a list has no such element, or a value stands where a table is needed.
     """
     path = key_path(dotted)
     target: Any = data

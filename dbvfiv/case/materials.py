@@ -210,8 +210,7 @@ class Fit(Relaxing):
 
     kind: Literal["fit"] = key(..., "Rubber fitted to its tests.")
     path: ExistingFile = key(
-        ...,
-        "CSV file of the tension test, or of several tests with a column test; relative to the case file.",
+        ..., "CSV file of the tension test, or of several tests with a column test; relative to the case file."
     )
     planar: ExistingFile | None = key(
         None, "CSV file of a test in planar tension (pure shear), fitted with the others."
@@ -378,12 +377,8 @@ class Materials(Section):
         return Relaxing(loss_factor=known) if known else None
 
     def card(self, name: str) -> Card:
-        """Return the card of a material; tables of the case file go before the built-in ones.
-
-        Raises
-        ------
-        KeyError
-            For a name that is neither built in nor in the case file.
+        """Return the card of a material; tables of the case file go before the built-in ones. Raises KeyError for a
+        name that is neither built in nor in the case file.
         """
         if not self.is_built_in(name) and name in self.named:
             return self.named[name]

@@ -48,18 +48,11 @@ _HEADER = (
 
 @dataclass(frozen=True)
 class MeasuredTable:
-    """A table of measured numbers.
+    """A table of measured numbers."""
 
-    Attributes
-    ----------
-    name : str
-        Of its file.
-    columns : mapping of names to tuples
-        SI: ``pressure`` (Pa), and ``mass_flow`` (kg/s), ``area`` (m2), ``x``, ``y``, ``z`` (m), ``tap`` (Pa) or words
-        in ``face``; ``z`` is None at the edge of the lip.
-    """
-
-    name: str
+    name: str  #: Of its file.
+    #: SI: ``pressure`` (Pa), and ``mass_flow`` (kg/s), ``area`` (m2), ``x``, ``y``, ``z`` (m), ``tap`` (Pa) or words in
+    #: ``face``; ``z`` is None at the edge of the lip.
     columns: Mapping[str, tuple[Any, ...]]
 
     @property
@@ -69,7 +62,8 @@ class MeasuredTable:
 
 
 def read_measured(path: Path, density: float | None = None) -> MeasuredTable:
-    """Read a table of measured numbers.
+    """Read a table of measured numbers. Raises ValueError with a clause that completes "measured is given as FILE,
+    ...".
 
     Parameters
     ----------
@@ -80,11 +74,6 @@ def read_measured(path: Path, density: float | None = None) -> MeasuredTable:
     density : float, optional
         Of the fluid, kg/m3, for heads and volume flows; that of water where it is not known, which will do to check a
         file.
-
-    Raises
-    ------
-    ValueError
-        With a clause that completes "measured is given as FILE, ...".
     """
     density = 1000.0 if density is None else density
     numbered = numbered_lines(path)
@@ -179,19 +168,14 @@ MEASURED_FILES = Described("file or list of files", "the name of a file that can
 
 
 def find_measured(given: Any, info: ValidationInfo, kinds: Collection[str]) -> Any:
-    """Full names of the files that a key names, one or several, looked into where files are to be looked for.
+    """Full names of the files that a key names, one or several, looked into where files are to be looked for. Raises
+    ValueError with a clause that completes "KEY is given as X, ...".
 
     Parameters
     ----------
     given : text, path, list of those or None
-    info : ValidationInfo
     kinds : collection of str
         What the files may hold.
-
-    Raises
-    ------
-    ValueError
-        With a clause that completes "KEY is given as X, ...".
     """
     several = isinstance(given, (list, tuple))
     paths = list(given) if several else [] if given is None else [given]
@@ -212,12 +196,6 @@ def find_measured(given: Any, info: ValidationInfo, kinds: Collection[str]) -> A
 
 
 def check_kind(table: MeasuredTable, kinds: Collection[str]) -> None:
-    """Refuse a table of something else.
-
-    Raises
-    ------
-    ValueError
-        With a clause that completes "KEY is given as FILE, ...".
-    """
+    """Refuse a table of something else. Raises ValueError with a clause that completes "KEY is given as FILE, ..."."""
     if not table.holds & set(kinds):
         raise ValueError(f"which holds {' and '.join(sorted(table.holds))}, and here belong {' or '.join(kinds)}")

@@ -398,12 +398,8 @@ class Case(Section):
         return made
 
     def replace(self, changes: Mapping[str, Any]) -> Self:
-        """Return a validated copy with some keys changed, ``{"drive.pressure": 36e3, ...}``.
-
-        Raises
-        ------
-        CaseError
-            As `dbvfiv.case.load.make_case` does.
+        """Return a validated copy with some keys changed, ``{"drive.pressure": 36e3, ...}``. Raises CaseError: as
+        `dbvfiv.case.load.make_case` does.
         """
         data = self.to_dict()
         changed = {put(type(self), data, dotted, _plain(value)) for dotted, value in changes.items()}
@@ -425,18 +421,12 @@ _FORM = """a mapping such as {"drive.pressure": "18 kPa"} or texts such as "driv
 
 
 def change_case(case: Case, changes: Changes) -> Case:
-    """A case with some keys changed.
+    """A case with some keys changed. Raises CaseError: one sentence: which key, what was given, what is allowed.
 
     Parameters
     ----------
-    case : Case
     changes : mapping, text or iterable of texts
         ``{"drive.pressure": "18 kPa", "mesh.around": 8}``, or ``"drive.pressure=18 kPa"`` as after ``--set``.
-
-    Raises
-    ------
-    CaseError
-        One sentence: which key, what was given, what is allowed.
     """
     wanted = _as_mapping(changes)
     while True:

@@ -16,58 +16,31 @@ from .quantity import Quantity
 
 @dataclass(frozen=True)
 class Parameter:
-    """One row of the table.
+    """One row of the table."""
 
-    Attributes
-    ----------
-    name : str
-        As it stands in ranges, results and arguments of the Python interface.
-    key : str
-        Key of the case that holds it.
-    quantity : Quantity
-        SI unit of its values.
-    title, symbol : str
-        What figures, tables and formulas call it; the symbol is empty where there is none.
-    usual : tuple
-        Start, stop and count of the range taken where only the name is given; SI.
-    low, high : float
-        Values that can be computed, SI.
-    low_included : bool
-        Whether `low` itself can be.
-    shown_unit, scale : str, float
-        Unit in figures and tables, and what a value is divided by to be in it.
-    log : bool
-        Whether the usual range has logarithmic steps.
-    swept : bool
-        Whether modes are tracked along it.
-    note : str
-        Added to the name in lists, where the name alone does not say what it is.
-    moves_equilibrium : bool
-        Whether the steady state changes with it. Those that do not are surroundings: the linearised structure stays.
-        The length of a line with friction does change it, although it stands among those: see
-        `dbvfiv.studies.stability.place.is_surrounding`.
-    design : bool
-        Whether the model is built anew for each value.
-    system_name : str
-        Its name in `dbvfiv.model.forms.ValveForms`; its own where not given, none for parameters of the design.
-    """
-
-    name: str
-    key: str
-    quantity: Quantity
+    name: str  #: As it stands in ranges, results and arguments of the Python interface.
+    key: str  #: Key of the case that holds it.
+    quantity: Quantity  #: SI unit of its values.
+    #: title and symbol: what figures, tables and formulas call it; the symbol is empty where there is none.
     title: str
-    usual: tuple[float, float, int]
+    usual: tuple[float, float, int]  #: Start, stop and count of the range taken where only the name is given; SI.
+    #: low and high: values that can be computed, SI.
     low: float = 0.0
     high: float = math.inf
-    low_included: bool = True
+    low_included: bool = True  #: Whether `low` itself can be.
     symbol: str = ""
+    #: shown_unit and scale: float; unit in figures and tables, and what a value is divided by to be in it.
     shown_unit: str = ""
     scale: float = 1.0
-    log: bool = False
-    swept: bool = False
-    note: str = ""
+    log: bool = False  #: Whether the usual range has logarithmic steps.
+    swept: bool = False  #: Whether modes are tracked along it.
+    note: str = ""  #: Added to the name in lists, where the name alone does not say what it is.
+    #: Whether the steady state changes with it. Those that do not are surroundings: the linearised structure stays. The
+    #: length of a line with friction does change it, although it stands among those: see
+    #: `dbvfiv.studies.stability.place.is_surrounding`.
     moves_equilibrium: bool = False
-    design: bool = False
+    design: bool = False  #: Whether the model is built anew for each value.
+    #: Its name in `dbvfiv.model.forms.ValveForms`; its own where not given, none for parameters of the design.
     system_name: str = ""
 
     def __post_init__(self) -> None:
@@ -171,7 +144,8 @@ OUTSIDE = "outside"
 
 
 class Mu(Mapping[str, float]):
-    """Parameter point: values in SI units by the names of the table; immutable and hashable.
+    """Parameter point: values in SI units by the names of the table; immutable and hashable. Raises ValueError for a
+    name that is not in the table.
 
     A value reads as an item or an attribute. A parameter that the valve does not have is not held (a pipe that is not
     there, loss factors of an elastic wall), and reads as 0 as an attribute; one of the design is held only where it is
@@ -182,11 +156,6 @@ class Mu(Mapping[str, float]):
     values : mapping, optional
     named : float
         Further values by their names.
-
-    Raises
-    ------
-    ValueError
-        For a name that is not in the table.
 
     Examples
     --------

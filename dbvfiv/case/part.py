@@ -20,23 +20,14 @@ class Part:
 
     A section is a curve over its parameter s, which runs from `begin` to 1; s = 0 is the centre, |s| = 1 a side edge on
     y = 0.
-
-    Attributes
-    ----------
-    name : str
-        "quarter" or "half".
-    images : tuple of (int, int)
-        Mirror signs in x and y of the pieces of the whole valve, the part itself first.
-    begin : float
-        Parameter at which sections begin: 0, the centre on x = 0, or -1, the other side edge.
-    classes : tuple of str
-        Names of the classes of small motions about a state of its symmetry, that of the equilibria first; see
-        `dbvfiv.model.symmetry`.
     """
 
-    name: str
+    name: str  #: "quarter" or "half".
+    #: (int, int); mirror signs in x and y of the pieces of the whole valve, the part itself first.
     images: tuple[tuple[int, int], ...]
-    begin: float
+    begin: float  #: Parameter at which sections begin: 0, the centre on x = 0, or -1, the other side edge.
+    #: Names of the classes of small motions about a state of its symmetry, that of the equilibria first; see
+    #: `dbvfiv.model.symmetry`.
     classes: tuple[str, ...]
 
     @property

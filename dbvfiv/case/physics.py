@@ -326,11 +326,8 @@ class Outside(Section):
         return f"with {fluid} outside, {place}{lips}"
 
     def check_pipe(self, outer: float) -> None:
-        """Refuse a pipe that the valve does not go into; `outer` is the largest diameter of its outer face, m.
-
-        Raises
-        ------
-        BrokenRule
+        """Refuse a pipe that the valve does not go into; `outer` is the largest diameter of its outer face, m. Raises
+        BrokenRule.
         """
         if self.is_there and self.pipe_diameter is not None and self.pipe_diameter < CLEARANCE * outer:
             raise BrokenRule(

@@ -63,11 +63,7 @@ class Pipe(Section):
 
     def check_roughness(self, inlet: float, name: str) -> None:
         """Refuse a roughness that no pipe of its diameter has; `inlet` is the diameter of the valve's inlet, m, and
-        `name` the key of the pipe.
-
-        Raises
-        ------
-        BrokenRule
+        `name` the key of the pipe. Raises BrokenRule.
         """
         diameter = inlet if self.diameter is None else self.diameter
         if self.length > 0 and self.roughness > _ROUGHEST * diameter:
@@ -139,11 +135,8 @@ class Upstream(Pipe):
         return any(pipe.friction > 0 or pipe.roughness > 0 for pipe in self.pipes)
 
     def check_pipes(self, inlet: float) -> None:
-        """Refuse a roughness that no pipe of its diameter has; `inlet` is the diameter of the valve's inlet, m.
-
-        Raises
-        ------
-        BrokenRule
+        """Refuse a roughness that no pipe of its diameter has; `inlet` is the diameter of the valve's inlet, m. Raises
+        BrokenRule.
         """
         for i, pipe in enumerate(self.pipes):
             pipe.check_roughness(inlet, f"upstream.pieces.{i}" if self.pieces else "upstream")
@@ -211,11 +204,7 @@ class Downstream(Section):
 
     def check_pipe(self, inlet: float, bill: float) -> None:
         """Refuse a pipe that the valve does not stand in; `inlet` is the diameter of its flow section at the flange and
-        `bill` the width of the bill over its outer faces, m.
-
-        Raises
-        ------
-        BrokenRule
+        `bill` the width of the bill over its outer faces, m. Raises BrokenRule.
         """
         for least, around, why in (
             (inlet, f"a valve with a flow section of {1e3 * inlet:.4g} mm", "for the valve stands in it"),

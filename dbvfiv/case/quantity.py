@@ -108,12 +108,8 @@ def head_of(pressure: float, density: float) -> float:
 
 
 def _head(text: str, density: float | None) -> float | None:
-    """Pressure, Pa, of a head; None for a text that is no head.
-
-    Raises
-    ------
-    ValueError
-        For a head of a fluid whose density is not known.
+    """Pressure, Pa, of a head; None for a text that is no head. Raises ValueError for a head of a fluid whose density
+    is not known.
     """
     unit = unit_behind(text)
     water = _HEAD_OF_WATER.fullmatch(unit)
@@ -168,18 +164,13 @@ class Quantity:
     head: bool = False
 
     def parse(self, given: Any, density: float | None = None) -> float:
-        """Return the SI value of a number or a string with a unit.
+        """Return the SI value of a number or a string with a unit. Raises ValueError with a clause that completes "key
+        is given as X, ...".
 
         Parameters
         ----------
-        given : object
         density : float, optional
             Of the fluid, kg/m3, for heads of it.
-
-        Raises
-        ------
-        ValueError
-            With a clause that completes "key is given as X, ...".
         """
         if isinstance(given, bool):
             raise ValueError("which is a truth value")

@@ -39,29 +39,15 @@ _FORM = re.compile(
 
 @dataclass(frozen=True)
 class Statement:
-    """One aim or constraint.
-
-    Attributes
-    ----------
-    text : str
-    quantity : str
-        Of `QUANTITIES`.
-    pressures : tuple of float, Pa
-        Inlet pressures at which it is asked, back pressures below zero; none where it needs none.
-    span : bool
-        Whether all pressures between the first and the last count.
-    sign : float
-        +1 where more is better, -1 where less is.
-    bounds : tuple of float
-        SI; none of an aim.
-    """
+    """One aim or constraint."""
 
     text: str
-    quantity: str
+    quantity: str  #: Of `QUANTITIES`.
+    #: Pa; inlet pressures at which it is asked, back pressures below zero; none where it needs none.
     pressures: tuple[float, ...]
-    span: bool
-    sign: float
-    bounds: tuple[float, ...] = ()
+    span: bool  #: Whether all pressures between the first and the last count.
+    sign: float  #: +1 where more is better, -1 where less is.
+    bounds: tuple[float, ...] = ()  #: SI; none of an aim.
 
     def asked_also_at(self, pressure: float) -> Statement:
         """The statement with a further pressure of its span."""
@@ -76,17 +62,12 @@ class Statement:
 
 
 def parse_statement(text: str, aim: bool, density: float | None = None) -> Statement:
-    """Read an aim or a constraint.
+    """Read an aim or a constraint. Raises ValueError with a clause that completes "key is given as X, ...".
 
     Parameters
     ----------
     density : float, optional
         Of the fluid, kg/m3, for heads of it.
-
-    Raises
-    ------
-    ValueError
-        With a clause that completes "key is given as X, ...".
     """
     match = _FORM.fullmatch(re.sub(rf"^\s*{SEALS}\s(.*)", rf"{BEHIND[0]} \1 at most 0", text))
     if match is None or (match["sense"] in ("up", "down")) != (match["bound"] is None):
@@ -129,11 +110,7 @@ def _bounds(text: str | None, what: str) -> tuple[float, ...]:
 
 def parse_span(text: str, quantity: Quantity, density: float | None = None) -> tuple[float, float]:
     """Read the bounds of a variable, ``0.7:1.4`` or ``30 deg:70 deg``; heads of a fluid whose density, kg/m3, is given.
-
-    Raises
-    ------
-    ValueError
-        With a clause that completes "key is given as X, ...".
+    Raises ValueError with a clause that completes "key is given as X, ...".
     """
     parts = [part.strip() for part in text.split(":")]
     if len(parts) != 2:

@@ -16,12 +16,8 @@ from .section import Described
 
 
 def read_text_file(path: Path, encoding: str | None = "utf-8-sig") -> str:
-    """Text of a file; in UTF-8, without the mark that some programs put in front, unless told otherwise.
-
-    Raises
-    ------
-    ValueError
-        With a clause that completes "KEY is given as FILE, ...".
+    """Text of a file; in UTF-8, without the mark that some programs put in front, unless told otherwise. Raises
+    ValueError with a clause that completes "KEY is given as FILE, ...".
     """
     try:
         return Path(path).read_text(encoding=encoding)
@@ -101,7 +97,7 @@ _UNIT = re.compile(r"[\[(]\s*([^\])]+?)\s*[\])]")
 
 
 def read_drive_table(path: Path) -> list[tuple[float, float]]:
-    """Read a drive table.
+    """Read a drive table. Raises ValueError with a clause that completes "drive_table is given as FILE, ...".
 
     Parameters
     ----------
@@ -115,11 +111,6 @@ def read_drive_table(path: Path) -> list[tuple[float, float]]:
     -------
     list of tuple
         Times in s, increasing, and pressures in Pa.
-
-    Raises
-    ------
-    ValueError
-        With a clause that completes "drive_table is given as FILE, ...".
     """
     rows = read_pairs(path, (_TIME, _PRESSURE), "a time and a pressure")
     for (before, _), (after, _) in zip(rows, rows[1:]):
@@ -132,12 +123,8 @@ def read_drive_table(path: Path) -> list[tuple[float, float]]:
 
 
 def read_pairs(path: Path, kinds: tuple[Quantity, Quantity], words: str) -> list[tuple[float, float]]:
-    """Rows of two numbers with units, SI; `words` says what a row is.
-
-    Raises
-    ------
-    ValueError
-        With a clause that completes "KEY is given as FILE, ...".
+    """Rows of two numbers with units, SI; `words` says what a row is. Raises ValueError with a clause that completes
+    "KEY is given as FILE, ...".
     """
     units, rows = [kind.si for kind in kinds], []
     for number, line in numbered_lines(path):
@@ -186,25 +173,17 @@ FLOW, HEAD = Quantity("m^3/s", "L/s"), Quantity("m", "m")
 
 
 def read_pump_table(path: Path) -> list[tuple[float, float]]:
-    """Rows of flow, m3/s, and head, m, of a CSV file as `dbvfiv.case.tables.read_drive_table` reads one.
+    """Rows of flow, m3/s, and head, m, of a CSV file as `dbvfiv.case.tables.read_drive_table` reads one. Raises
+    ValueError with a clause that completes "pump is given as FILE, ...".
 
     The header names the units, ``flow [L/s], head [m]``. Plain numbers without a header are m3/s and m.
-
-    Raises
-    ------
-    ValueError
-        With a clause that completes "pump is given as FILE, ...".
     """
     return read_pairs(path, (FLOW, HEAD), "a flow and a head")
 
 
 def parse_rows(given: Any) -> list[tuple[float, float]]:
-    """Rows given in the case itself, numbers in SI or texts with units.
-
-    Raises
-    ------
-    ValueError
-        With a clause that completes "pump is given as ROWS, ...".
+    """Rows given in the case itself, numbers in SI or texts with units. Raises ValueError with a clause that completes
+    "pump is given as ROWS, ...".
     """
     rows = []
     for number, row in enumerate(given, 1):
@@ -218,13 +197,7 @@ def parse_rows(given: Any) -> list[tuple[float, float]]:
 
 
 def check_curve(rows: list[tuple[float, float]]) -> None:
-    """Refuse what no pump's curve is.
-
-    Raises
-    ------
-    ValueError
-        With a clause that completes "pump is given as ..., ...".
-    """
+    """Refuse what no pump's curve is. Raises ValueError with a clause that completes "pump is given as ..., ..."."""
     if len(rows) < 2:
         raise ValueError("which holds fewer than two rows, and a curve needs a range of flows")
     if rows[0][0] < 0:

@@ -34,12 +34,8 @@ _NUMBERS = rf"(?:{_NUMBER}(?:, | to | and | or ))*{_NUMBER}"
 
 
 def read_units(text: str) -> dict[str, str]:
-    """Unit of each quantity from "ft, gpm, in"; quantities that are not named are left out.
-
-    Raises
-    ------
-    ValueError
-        With a clause that completes "key is given as X, ...".
+    """Unit of each quantity from "ft, gpm, in"; quantities that are not named are left out. Raises ValueError with a
+    clause that completes "key is given as X, ...".
     """
     chosen: dict[str, str] = {}
     for unit in filter(None, (part.strip() for part in text.split(","))):

@@ -26,20 +26,11 @@ class LipSizes:
 
     Straight at the height of its radius up to the half width, then a quarter circle (App. A); with a rise a circular
     arc that meets that of the side edge with a common tangent.
-
-    Attributes
-    ----------
-    half_width : float, m
-        From the centre to where the arc of the side edge begins.
-    radius : float, m
-        Of that arc.
-    rise : float, m
-        By which the centre stands above that place.
     """
 
-    half_width: float
-    radius: float
-    rise: float = 0.0
+    half_width: float  #: m; from the centre to where the arc of the side edge begins.
+    radius: float  #: m; of that arc.
+    rise: float = 0.0  #: m; by which the centre stands above that place.
 
     @property
     def turn(self) -> float:

@@ -83,11 +83,7 @@ class Extent(_Piece):
 
 def edges_of(parts: Sequence[Extent], name: str, length: float) -> tuple[set[float], set[float]]:
     """Axial positions, m, and shares of the section at which parts of a wall of this length begin or end, 0 among them.
-
-    Raises
-    ------
-    BrokenRule
-        For a part beyond the end of the valve; `name` is the key of the list.
+    Raises BrokenRule for a part beyond the end of the valve; `name` is the key of the list.
     """
     along, around = {0.0}, {0.0}
     for i, part in enumerate(parts):

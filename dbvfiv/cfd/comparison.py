@@ -38,18 +38,11 @@ class FlowComparison:
     Pressures are in Pa over that at the wall of the pipe (or in the room) beside the lip, which is the zero of the flow
     law. They scale with the square of the flow, nearly exactly at these Reynolds numbers, so the rows are given at the
     flow law's pressure at the flange.
-
-    Attributes
-    ----------
-    case : FlowCase
-    fields : FlowFields
-    published : bool
-        Whether the valve is that of the thesis, beside whose losses it is set.
     """
 
     case: FlowCase
     fields: FlowFields
-    published: bool = False
+    published: bool = False  #: Whether the valve is that of the thesis, beside whose losses it is set.
 
     @cached_property
     def back(self) -> float:

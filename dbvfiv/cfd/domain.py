@@ -32,24 +32,16 @@ TIPWARDS = 0.35
 
 @dataclass(frozen=True)
 class Pattern:
-    """Cells of a section.
+    """Cells of a section."""
 
-    Attributes
-    ----------
-    top, side : int
-        Of the core: beside the centre line x = 0 across the lips, and along the opening.
-    layer, wall, outside : int
-        Rings at the inner face, behind the lip and up to the pipe.
-    growth : float
-        Of the layer's cells away from the inner face.
-    """
-
+    #: top and side: of the core: beside the centre line x = 0 across the lips, and along the opening.
     top: int = 26
     side: int = 12
+    #: layer, wall and outside: rings at the inner face, behind the lip and up to the pipe.
     layer: int = 9
     wall: int = 5
     outside: int = 14
-    growth: float = 1.35
+    growth: float = 1.35  #: Of the layer's cells away from the inner face.
 
     def refined(self, factor: float) -> Pattern:
         """More cells in both directions, of the same spread."""
@@ -64,17 +56,11 @@ class Pattern:
 
 @dataclass(frozen=True)
 class Section:
-    """Nodes of a section, m.
+    """Nodes of a section, m."""
 
-    Attributes
-    ----------
-    core : (top + 1, side + 1, 3) array
-        From the axis.
-    layer, wall, outside : (around + 1, rings + 1, 3) arrays
-        From the core, inner face and outer face outwards; columns from x = 0 to y = 0.
-    """
-
-    core: np.ndarray
+    core: np.ndarray  #: (top + 1, side + 1, 3); from the axis.
+    #: layer, wall and outside: (around + 1, rings + 1, 3); from the core, inner face and outer face outwards; columns
+    #: from x = 0 to y = 0.
     layer: np.ndarray
     wall: np.ndarray
     outside: np.ndarray
@@ -89,7 +75,6 @@ def section_nodes(inner: np.ndarray, outer: np.ndarray, radius: float, pattern: 
         Sections of both faces, from x = 0 to y = 0.
     radius : float, m
         Of the pipe.
-    pattern : Pattern
     """
     face, behind, roundness = _perimeters(inner, outer, pattern)
     core = _core_edge(face, pattern, roundness)
@@ -218,23 +203,12 @@ FAR_INNER, FAR_OUTER = 0.5, 0.68
 
 @dataclass(frozen=True)
 class Domain:
-    """Region of fluid that is meshed: valve, and the pipe or room around it.
-
-    Attributes
-    ----------
-    faces : WallFaces
-    radius : float, m
-        Radius of the downstream pipe, or of the room.
-    free : bool
-        True for a room (free discharge), False for a pipe.
-    fineness : float
-        Cells in each direction over the usual number.
-    """
+    """Region of fluid that is meshed: valve, and the pipe or room around it."""
 
     faces: WallFaces
-    radius: float
-    free: bool = False
-    fineness: float = 1.0
+    radius: float  #: m; radius of the downstream pipe, or of the room.
+    free: bool = False  #: True for a room (free discharge), False for a pipe.
+    fineness: float = 1.0  #: Cells in each direction over the usual number.
 
     @cached_property
     def pattern(self) -> Pattern:
@@ -340,18 +314,11 @@ _SAME = 1e-9
 
 @dataclass(frozen=True)
 class Block:
-    """Cells between sections `first` and `last` of one part of the pattern.
+    """Cells between sections `first` and `last` of one part of the pattern."""
 
-    Attributes
-    ----------
-    nodes : (l + 1, m + 1, n + 1) int array
-        From the outlet on; columns; rings or, of the core, cells along the opening.
-    first : int
-        Number of its first section.
-    """
-
+    #: (l + 1, m + 1, n + 1); from the outlet on; columns; rings or, of the core, cells along the opening.
     nodes: np.ndarray
-    first: int
+    first: int  #: Number of its first section.
 
     @property
     def shape(self) -> tuple[int, int, int]:
@@ -375,29 +342,15 @@ class Block:
 
 @dataclass(frozen=True)
 class FlowMesh:
-    """Hexahedra of a domain.
-
-    Attributes
-    ----------
-    domain : Domain
-    points : (np, 3) array, m
-    blocks : dict of str to Block
-        ``core``, ``layer``, ``wall`` and ``outside``.
-    """
+    """Hexahedra of a domain."""
 
     domain: Domain
-    points: np.ndarray
-    blocks: dict[str, Block]
+    points: np.ndarray  #: (np, 3), m.
+    blocks: dict[str, Block]  #: ``core``, ``layer``, ``wall`` and ``outside``.
 
     @classmethod
     def of(cls, domain: Domain) -> FlowMesh:
-        """Mesh a domain.
-
-        Raises
-        ------
-        ValueError
-            If a cell is turned inside out.
-        """
+        """Mesh a domain. Raises ValueError if a cell is turned inside out."""
         sections, last = domain.sections, len(domain.stations)
         ranges = {"core": (0, last), "layer": (0, last), "wall": (0, domain.lip + 1), "outside": (0, domain.flange + 1)}
         grids = {name: np.stack([getattr(s, name) for s in sections[a:b]]) for name, (a, b) in ranges.items()}

@@ -137,12 +137,8 @@ _FACES = np.array([[0, 3, 2, 1], [4, 5, 6, 7], [0, 1, 5, 4], [1, 2, 6, 5], [2, 3
 
 
 def write_mesh(mesh: FlowMesh, case: str | Path) -> None:
-    """Write ``constant/polyMesh`` of a case; cells keep their numbers.
-
-    Raises
-    ------
-    ValueError
-        If faces without a second cell are not those of the patches.
+    """Write ``constant/polyMesh`` of a case; cells keep their numbers. Raises ValueError if faces without a second cell
+    are not those of the patches.
     """
     faces, owner, neighbour, patches = faces_of(mesh)
     folder = Path(case) / "constant" / "polyMesh"
@@ -218,12 +214,8 @@ def has_openfoam() -> bool:
 
 
 def run_openfoam(folder: str | Path, iterations: int, observer: Observer | None = None) -> None:
-    """Run the case in a folder, from where it stopped if it did, to its end.
-
-    Raises
-    ------
-    SolveError
-        If there is no OpenFOAM, or it fails.
+    """Run the case in a folder, from where it stopped if it did, to its end. Raises SolveError if there is no OpenFOAM,
+    or it fails.
     """
     if not has_openfoam():
         raise SolveError(
@@ -286,22 +278,12 @@ WATCHED = 0.2
 
 @dataclass(frozen=True)
 class FlowFields:
-    """Fields of the last iteration that was written.
+    """Fields of the last iteration that was written."""
 
-    Attributes
-    ----------
-    pressure : (nc,) array, m2/s2
-        Over the density.
-    velocity : (nc, 3) array, m/s
-    iterations : int
-    history : (n, 2) array
-        Iteration and pressure over density at the inlet.
-    """
-
-    pressure: np.ndarray
-    velocity: np.ndarray
+    pressure: np.ndarray  #: (nc,), m2/s2; over the density.
+    velocity: np.ndarray  #: (nc, 3), m/s.
     iterations: int
-    history: np.ndarray
+    history: np.ndarray  #: (n, 2); iteration and pressure over density at the inlet.
 
     @property
     def unrest(self) -> float:
@@ -311,17 +293,12 @@ class FlowFields:
 
 
 def read_fields(folder: str | Path, cells: int) -> FlowFields:
-    """Read what a run left in a folder.
+    """Read what a run left in a folder. Raises SolveError if it left nothing, or fields of another mesh.
 
     Parameters
     ----------
     cells : int
         How many there are in the mesh.
-
-    Raises
-    ------
-    SolveError
-        If it left nothing, or fields of another mesh.
     """
     folder = Path(folder)
     times = [int(p.name) for p in _times(folder)]
@@ -363,33 +340,17 @@ WATER_VISCOSITY = 1.0e-6
 
 @dataclass(frozen=True)
 class FlowCase:
-    """Viscous flow through the shape of one steady state, with the volume flow of that state.
+    """Viscous flow through the shape of one steady state, with the volume flow of that state."""
 
-    Attributes
-    ----------
-    name : str
-        Of the valve, for titles.
-    mesh : MeshData
-        Of the shell.
-    state : SteadyState
-    density : float, kg/m3
-    pipe : float, optional
-        Diameter of the pipe in which the valve stands, m; the jet goes into a room without it.
-    fineness : float
-        Cells in each direction over the usual number.
-    iterations : int
-        At most.
-    viscosity : float, m2/s
-    """
-
-    name: str
-    mesh: MeshData
+    name: str  #: Of the valve, for titles.
+    mesh: MeshData  #: Of the shell.
     state: SteadyState
-    density: float
+    density: float  #: kg/m3.
+    #: Diameter of the pipe in which the valve stands, m; the jet goes into a room without it.
     pipe: float | None = None
-    fineness: float = 0.5
-    iterations: int = 400
-    viscosity: float = WATER_VISCOSITY
+    fineness: float = 0.5  #: Cells in each direction over the usual number.
+    iterations: int = 400  #: At most.
+    viscosity: float = WATER_VISCOSITY  #: m2/s.
 
     @cached_property
     def faces(self) -> WallFaces:
@@ -398,12 +359,8 @@ class FlowCase:
 
     @cached_property
     def domain(self) -> Domain:
-        """Region of fluid that is meshed.
-
-        Raises
-        ------
-        CaseError
-            If the valve does not go into the pipe, or more than a quarter of it is computed.
+        """Region of fluid that is meshed. Raises CaseError if the valve does not go into the pipe, or more than a
+        quarter of it is computed.
         """
         if not self.mesh.part.is_quarter:
             raise CaseError(
@@ -422,13 +379,7 @@ class FlowCase:
 
     @cached_property
     def cells(self) -> FlowMesh:
-        """The mesh.
-
-        Raises
-        ------
-        CaseError
-            If it does not come out sound.
-        """
+        """The mesh. Raises CaseError if it does not come out sound."""
         try:
             return FlowMesh.of(self.domain)
         except ValueError as error:
@@ -452,12 +403,8 @@ class FlowCase:
         }
 
     def write(self, folder: str | Path) -> bool:
-        """Write the case, unless the folder holds it already; returns whether it did not.
-
-        Raises
-        ------
-        CaseError
-            If the folder holds another case, or cannot be written.
+        """Write the case, unless the folder holds it already; returns whether it did not. Raises CaseError if the
+        folder holds another case, or cannot be written.
         """
         folder = Path(folder)
         try:

@@ -81,13 +81,7 @@ def _print_inputs(case, as_json: bool) -> None:
 
 
 def _check(case, name: str) -> None:
-    """Print the sizes of a case, and whether its keys fit.
-
-    Raises
-    ------
-    CaseError
-        With all that contradicts what.
-    """
+    """Print the sizes of a case, and whether its keys fit. Raises CaseError with all that contradicts what."""
     from ..studies.case import contradictions, oddities, unanswered_rating
 
     found = [*contradictions(case), *unanswered_rating(case)]

@@ -92,8 +92,7 @@ def _describe(result: Any) -> list[str]:
 
 def plot(
     file: Annotated[
-        Path,
-        typer.Argument(metavar="RESULT.h5|CASE.toml", help="Result file of an earlier command, or a case file."),
+        Path, typer.Argument(metavar="RESULT.h5|CASE.toml", help="Result file of an earlier command, or a case file.")
     ],
     folder: Annotated[Path, typer.Option("-o", "--output", metavar="DIR", help="Folder for the figures.")] = Path("."),
     format: Annotated[FigureFormat, typer.Option("--format", help="File format.")] = FigureFormat.png,
@@ -509,12 +508,10 @@ def verdict(
         float, typer.Option("--steady", metavar="X", help="Relative change below which a signal is steady.")
     ] = 1e-4,
     closed_below: Annotated[
-        float | None,
-        typer.Option("--closed-below", metavar="X", help="Level below which a signal counts as closed."),
+        float | None, typer.Option("--closed-below", metavar="X", help="Level below which a signal counts as closed.")
     ] = None,
     plots: Annotated[
-        Path | None,
-        typer.Option("--plots", metavar="DIR", help="Draw each signal and its spectrum into this folder."),
+        Path | None, typer.Option("--plots", metavar="DIR", help="Draw each signal and its spectrum into this folder.")
     ] = None,
     as_json: AsJson = False,
 ) -> None:

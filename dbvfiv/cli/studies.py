@@ -164,23 +164,16 @@ def _report(
     printed: bool = False,
     others: Sequence[Any] = (),
 ) -> None:
-    """Print a result, draw it, and leave with the exit status that it and others of its sheet deserve.
+    """Print a result, draw it, and leave with the exit status that it and others of its sheet deserve. Raises Stopped
+    if a run was interrupted. Raises SolveError if something was not reached.
 
     Parameters
     ----------
-    result : StudyResult
     further : callable, optional
         Writes further files.
     printed : bool
         True where its table was printed row by row already.
     others : sequence of StudyResult
-
-    Raises
-    ------
-    Stopped
-        If a run was interrupted.
-    SolveError
-        If something was not reached.
     """
 
     def draw() -> list[Path]:

@@ -80,12 +80,8 @@ def in_units(units: Units) -> Iterator[None]:
 
 
 def refuse_beside(given: Mapping[str, object], why: str) -> None:
-    """Refuse options, by name, that mean nothing beside others.
-
-    Raises
-    ------
-    CaseError
-        For the first one that is given, with why.
+    """Refuse options, by name, that mean nothing beside others. Raises CaseError for the first one that is given, with
+    why.
     """
     for name, value in given.items():
         if value not in (None, False, (), []):
@@ -117,10 +113,8 @@ def print_answer(
 
     Parameters
     ----------
-    document : mapping
     lines : callable
         Makes the lines.
-    as_json : bool
     drawn : figures and the folder that they are in
     output : path, optional
         Where the numbers were written.

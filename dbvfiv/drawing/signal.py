@@ -99,13 +99,7 @@ def _draw_spectrum(axes, part: Series, verdict: Verdict) -> None:
 
 
 def save_signals(folder: Path, judged: Iterable[JudgedSignal]) -> list[Path]:
-    """Draw signals into PNG files of a folder, each of its name.
-
-    Raises
-    ------
-    CaseError
-        If the folder cannot be written.
-    """
+    """Draw signals into PNG files of a folder, each of its name. Raises CaseError if the folder cannot be written."""
     written: list[Path] = []
     for one in judged:
         own, taken = re.sub(r"[\W_]+", "-", one.signal.name).strip("-") or "signal", {path.stem for path in written}

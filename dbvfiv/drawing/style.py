@@ -214,7 +214,7 @@ FORMATS = ("png", "svg")
 def draw_figures(
     drawers: Mapping[str, Callable[[], Figure]], only: Sequence[str], whose: str, units: Units | None = None
 ) -> dict[str, Figure]:
-    """Figures by name.
+    """Figures by name. Raises CaseError for a name that there is no figure of, or nothing to draw.
 
     Parameters
     ----------
@@ -225,11 +225,6 @@ def draw_figures(
         For messages, "steady result of 'dbv12'".
     units : Units, optional
         That axes and words are to have.
-
-    Raises
-    ------
-    CaseError
-        For a name that there is no figure of, or nothing to draw.
     """
     if not drawers:
         raise CaseError(f"The {whose} holds nothing that could be drawn.")
@@ -242,12 +237,8 @@ def draw_figures(
 
 
 def write_figures(figures: Mapping[str, Figure], folder: str | Path = ".", format: str = "png") -> list[Path]:
-    """Write figures into files NAME.FORMAT of a folder and return their names.
-
-    Raises
-    ------
-    CaseError
-        For an unknown format or a folder that cannot be written.
+    """Write figures into files NAME.FORMAT of a folder and return their names. Raises CaseError for an unknown format
+    or a folder that cannot be written.
     """
     if format not in FORMATS:
         raise CaseError(f"Figures are written as {' or '.join(FORMATS)}, not as {format!r}.")

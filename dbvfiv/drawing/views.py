@@ -23,18 +23,7 @@ from ..model.sizes import ValveSizes
 from ..model.valve import ValveModel
 from ..record.mesh import MeshData, WholeValve
 from ..record.vtkhdf import faces
-from .style import (
-    COMPUTED,
-    HALO,
-    MAGNITUDE,
-    MOTION,
-    PUBLISHED,
-    REST,
-    colour_bar,
-    driven,
-    headline,
-    new_figure,
-)
+from .style import COMPUTED, HALO, MAGNITUDE, MOTION, PUBLISHED, REST, colour_bar, driven, headline, new_figure
 
 
 def closed_section(section: np.ndarray, part: Part = QUARTER) -> np.ndarray:
@@ -63,13 +52,7 @@ def offset_line(z: np.ndarray, y: np.ndarray, half: np.ndarray) -> tuple[np.ndar
 
 @dataclass(frozen=True)
 class ValveSkin:
-    """Both faces of the whole valve and the rims that join them, ready to be drawn.
-
-    Attributes
-    ----------
-    mesh : MeshData
-    valve : WholeValve
-    """
+    """Both faces of the whole valve and the rims that join them, ready to be drawn."""
 
     mesh: MeshData
     valve: WholeValve

@@ -17,7 +17,8 @@ from ..record.vtkhdf import faces
 
 
 def trim_section(points: np.ndarray) -> np.ndarray:
-    """The part of a section that bounds the passage.
+    """The part of a section that bounds the passage. Raises ValueError if no passage is left: the section begins at or
+    below y = 0.
 
     Parameters
     ----------
@@ -29,11 +30,6 @@ def trim_section(points: np.ndarray) -> np.ndarray:
     (m, 3) array, m
         From x = 0, y > 0 to y = 0, x never falling: loops are left out, what lies beyond the first crossing of y = 0 is
         cut off, and so is what an overhang hides from y = 0.
-
-    Raises
-    ------
-    ValueError
-        If no passage is left: the section begins at or below y = 0.
     """
     points = np.asarray(points, float)
     if not points[0, 1] > 0.0:
@@ -86,7 +82,7 @@ def _last_crossing(start, step, points, first):
 
 
 def passage_grid(inner: np.ndarray) -> np.ndarray:
-    """Inner face of the passage, row by row.
+    """Inner face of the passage, row by row. Raises CaseError if the passage is shut somewhere.
 
     Parameters
     ----------
@@ -98,11 +94,6 @@ def passage_grid(inner: np.ndarray) -> np.ndarray:
     (rows, columns, 3) array, m
         Rows that need no trimming keep their points; the others are divided anew in the shares of arc length of their
         points before.
-
-    Raises
-    ------
-    CaseError
-        If the passage is shut somewhere.
     """
     rows = []
     for row in np.asarray(inner, float):
@@ -133,30 +124,16 @@ def _arc(path: np.ndarray) -> np.ndarray:
 class WallFaces:
     """Grids (rows, columns, 3), m, of the part that is computed: rows from the lip to the flange, columns from x = 0,
     of a half from y = 0, to y = 0.
-
-    Attributes
-    ----------
-    inner : array
-        The inner face that fluid meets, see `dbvfiv.exchange.bodies`.
-    middle, outer : arrays
-    part : Part
-        Of the valve.
     """
 
-    inner: np.ndarray
+    inner: np.ndarray  #: The inner face that fluid meets, see `dbvfiv.exchange.bodies`.
     middle: np.ndarray
     outer: np.ndarray
-    part: Part = QUARTER
+    part: Part = QUARTER  #: Of the valve.
 
     @classmethod
     def of(cls, mesh: MeshData, nodal: np.ndarray) -> WallFaces:
-        """Faces of the deformed wall from nodal unknowns (nn, c).
-
-        Raises
-        ------
-        CaseError
-            If the passage is shut.
-        """
+        """Faces of the deformed wall from nodal unknowns (nn, c). Raises CaseError if the passage is shut."""
         inner, outer = faces(mesh, nodal)
         grids = [inner[mesh.rows], 0.5 * (inner + outer)[mesh.rows], outer[mesh.rows]]
         for grid in grids:  # the planes of symmetry, to the last digit
@@ -196,17 +173,11 @@ LINE = np.array([0.0, 1.0])
 
 @dataclass(frozen=True)
 class Piece:
-    """A piece of surface.
+    """A piece of surface."""
 
-    Attributes
-    ----------
-    points : (m, n, 3) array, m
-        Its normals, from the first direction to the second, point out of a closed body.
-    places : (m,) array, (n,) array
-        Parameters 0..1 of the points in both directions; the same where two pieces of a shape meet.
-    """
-
+    #: (m, n, 3), m; its normals, from the first direction to the second, point out of a closed body.
     points: np.ndarray
+    #: (m,), (n,); parameters 0..1 of the points in both directions; the same where two pieces of a shape meet.
     places: tuple[np.ndarray, np.ndarray]
 
     def mirrored(self, sx: int, sy: int) -> Piece:
@@ -217,20 +188,11 @@ class Piece:
 
 @dataclass(frozen=True)
 class Shape:
-    """Pieces of surface of the part that is computed, and its images.
+    """Pieces of surface of the part that is computed, and its images."""
 
-    Attributes
-    ----------
-    pieces : tuple of Piece
-        Points of two pieces that meet are the same.
-    closed : bool
-        Whether they bound a body.
-    signs : tuple of (int, int)
-        Of x and y in the images: those of the whole valve, or of the part alone.
-    """
-
-    pieces: tuple[Piece, ...]
-    closed: bool
+    pieces: tuple[Piece, ...]  #: Points of two pieces that meet are the same.
+    closed: bool  #: Whether they bound a body.
+    #: (int, int); of x and y in the images: those of the whole valve, or of the part alone.
     signs: tuple[tuple[int, int], ...]
 
     def images(self) -> list[Piece]:

@@ -25,13 +25,7 @@ MILLIMETRES = 1e3
 
 @contextmanager
 def open_gmsh(name: str) -> Iterator[Any]:
-    """A quiet gmsh with an empty model.
-
-    Raises
-    ------
-    CaseError
-        If gmsh is not there or cannot be loaded.
-    """
+    """A quiet gmsh with an empty model. Raises CaseError if gmsh is not there or cannot be loaded."""
     try:
         import gmsh
     except (ImportError, OSError) as error:
@@ -51,7 +45,7 @@ def open_gmsh(name: str) -> Iterator[Any]:
 
 
 def write_step(shape: Shape, path: str | Path, name: str) -> dict[str, float]:
-    """Write a shape as STEP in millimetres.
+    """Write a shape as STEP in millimetres. Raises CaseError if gmsh is missing, or a body does not close.
 
     Along rows and columns the faces are cubic with a continuous tangent and without overshoot (Fritsch and Carlson
     1980), and go through all points.
@@ -60,11 +54,6 @@ def write_step(shape: Shape, path: str | Path, name: str) -> dict[str, float]:
     -------
     dict
         ``area`` of its faces, m2, and ``volume``, m3, as the kernel measures them.
-
-    Raises
-    ------
-    CaseError
-        If gmsh is missing, or a body does not close.
     """
     with open_gmsh(name) as gmsh:
         kernel = gmsh.model.occ
@@ -96,13 +85,7 @@ def _silent() -> Iterator[None]:
 
 
 def _sewn(kernel: Any, faces: list[int], name: str) -> int:
-    """The body that faces bound.
-
-    Raises
-    ------
-    CaseError
-        If they do not close.
-    """
+    """The body that faces bound. Raises CaseError if they do not close."""
     try:
         return kernel.addVolume([kernel.addSurfaceLoop(faces, sewing=True)])
     except Exception as error:  # gmsh raises no other kind
@@ -153,12 +136,8 @@ SAME = 1e-9
 
 
 def triangulated(shape: Shape) -> pyvista.PolyData:
-    """Triangles of a shape, m: the diagonals of each image are mirror images of those of the part itself.
-
-    Raises
-    ------
-    ValueError
-        If a body is not watertight.
+    """Triangles of a shape, m: the diagonals of each image are mirror images of those of the part itself. Raises
+    ValueError if a body is not watertight.
     """
     points, triangles, count = [], [], 0
     for sx, sy in shape.signs:
@@ -211,15 +190,13 @@ def write_shapes(
     shapes: Sequence[str] = (),
     quarter: bool = False,
 ) -> list[Path]:
-    """Write shapes of a deformed valve, each into a file ``NAME-SHAPE.FORMAT``.
+    """Write shapes of a deformed valve, each into a file ``NAME-SHAPE.FORMAT``. Raises CaseError for an unknown shape
+    or format, a state without an open passage, a missing gmsh, or a file that cannot be written.
 
     Parameters
     ----------
-    mesh : MeshData
     nodal : (nn, c) array
         Displacements, m, and rotations of the nodes.
-    folder : path
-    name : str
     format : str
         ``stl``: triangles through the nodes, in metres; ``step``: smooth faces, in millimetres.
     shapes : sequence of str
@@ -230,12 +207,6 @@ def write_shapes(
     Returns
     -------
     list of Path
-
-    Raises
-    ------
-    CaseError
-        For an unknown shape or format, a state without an open passage, a missing gmsh, or a file that cannot be
-        written.
     """
     for given, allowed, what in ((shapes, SHAPES, "shape"), ([format], FORMATS, "format of surfaces")):
         unknown = [value for value in given if value not in allowed]

@@ -62,17 +62,12 @@ CARD_KINDS = tuple(_LAWS)
 
 
 def law_from_card(card: Any) -> Law:
-    """The law that a material card describes.
+    """The law that a material card describes. Raises MaterialError for an unknown kind or constants the law refuses.
 
     Parameters
     ----------
     card : dbvfiv.case.Card
         Any object with ``kind``, the constants of that kind and ``stiffness_factor``.
-
-    Raises
-    ------
-    MaterialError
-        For an unknown kind or constants the law refuses.
     """
     if card.kind not in _LAWS:
         raise MaterialError(f"A material's kind must be one of {', '.join(CARD_KINDS)}, but {card.kind!r} was given.")
@@ -80,15 +75,11 @@ def law_from_card(card: Any) -> Law:
 
 
 def law_from_case(case: Case, name: str) -> Law:
-    """The law of a material by its name in a case.
+    """The law of a material by its name in a case. Raises CaseError for a name the case does not know or constants that
+    the law refuses; ``key`` is the table.
 
     Tables of the case go before the built-in CR, SBR, EPDM (at ``materials.strain_level``, by
     ``materials.constants``) and fibre (by ``materials.fibre_constants``).
-
-    Raises
-    ------
-    CaseError
-        For a name the case does not know or constants that the law refuses; ``key`` is the table.
     """
     _require_name(case, name)
     materials = case.materials
@@ -109,29 +100,18 @@ def _require_name(case: Case, name: str) -> None:
 @shortly
 @dataclass(frozen=True)
 class MaterialDamping:
-    """Viscoelasticity of one material of a case.
-
-    Attributes
-    ----------
-    name : str
-    source : str
-        Origin of the data, in words.
-    prony : Prony
-        Series without the case's factor on all loss factors.
-    fit : PronyFit or None
-        Error of the series against the given data; None for a series that was given outright.
-    data : tuple of arrays, or None
-        Frequencies, Hz, and tan delta that were given or measured; None for a relaxation modulus or a series.
-    missed : float
-        Largest relative error over the band of the series with the factor, against the factor times tan delta of
-        `prony`.
-    """
+    """Viscoelasticity of one material of a case."""
 
     name: str
-    source: str
-    prony: Prony
+    source: str  #: Origin of the data, in words.
+    prony: Prony  #: Series without the case's factor on all loss factors.
+    #: Error of the series against the given data; None for a series that was given outright.
     fit: PronyFit | None = None
+    #: tuple of, or None; frequencies, Hz, and tan delta that were given or measured; None for a relaxation modulus or a
+    #: series.
     data: tuple[np.ndarray, np.ndarray] | None = None
+    #: Largest relative error over the band of the series with the factor, against the factor times tan delta of
+    #: `prony`.
     missed: float = 0.0
 
     @property
@@ -151,17 +131,13 @@ class MaterialDamping:
 
 
 def relaxation_from_case(case: Case, name: str) -> Prony | None:
-    """Prony series of a material of a case.
+    """Prony series of a material of a case. Raises CaseError for a name that the case does not know, a material without
+    any viscoelastic data, or data that cannot be used.
 
     Returns
     -------
     Prony or None
         Without the factor damping.loss_factor; strengths of zero for an elastic material; None under Rayleigh damping.
-
-    Raises
-    ------
-    CaseError
-        For a name that the case does not know, a material without any viscoelastic data, or data that cannot be used.
     """
     return damping_of(case, name).prony if case.damping.relaxes else None
 
@@ -245,17 +221,13 @@ def rayleigh_ratio(frequency, alpha: float, beta: float):
 
 
 def rayleigh_constants(ratios: tuple[float, float], frequencies: tuple[float, float]) -> tuple[float, float]:
-    """alpha and beta that give two damping ratios at two frequencies (Th. Eq. 5.5).
+    """alpha and beta that give two damping ratios at two frequencies (Th. Eq. 5.5). Raises MaterialError for
+    frequencies that are not two positive ones.
 
     Between the frequencies the damping is lower, beyond them higher. One constant is negative where the ratios
     differ by more than the frequencies do, and then no Rayleigh damping meets both.
 
     Ratios are half the loss factors, frequencies in Hz, positive and different; alpha comes in 1/s and beta in s.
-
-    Raises
-    ------
-    MaterialError
-        For frequencies that are not two positive ones.
 
     Examples
     --------
@@ -283,17 +255,10 @@ _SHARE = 1e-9
 @shortly
 @dataclass(frozen=True)
 class DampingReport:
-    """Damping of a case.
-
-    Attributes
-    ----------
-    case : Case
-    materials : tuple of MaterialDamping
-        Of the layers, inside to outside, each once; under Rayleigh damping those of which the case says how they
-        relax.
-    """
+    """Damping of a case."""
 
     case: Case
+    #: Of the layers, inside to outside, each once; under Rayleigh damping those of which the case says how they relax.
     materials: tuple[MaterialDamping, ...]
 
     @property
@@ -411,13 +376,7 @@ class DampingReport:
 
 
 def describe_damping(case: Case) -> DampingReport:
-    """Report on the damping of a case.
-
-    Raises
-    ------
-    CaseError
-        For data of a material that cannot be used.
-    """
+    """Report on the damping of a case. Raises CaseError for data of a material that cannot be used."""
     names = dict.fromkeys(layer.material for layer in case.layers)
     told = [name for name in names if case.damping.relaxes or case.materials.loss(name) is not None]
     return DampingReport(case, tuple(damping_of(case, name) for name in told))
@@ -451,12 +410,7 @@ def outside_band(case: Case, frequencies: Iterable[float]) -> str | None:
 
 
 def read_frequencies(given: str | Sequence[float]) -> tuple[float, float]:
-    """Two frequencies, Hz, of a text such as "5,40" or "5 Hz, 40 Hz", or of two numbers.
-
-    Raises
-    ------
-    CaseError
-    """
+    """Two frequencies, Hz, of a text such as "5,40" or "5 Hz, 40 Hz", or of two numbers. Raises CaseError."""
     quantity = Quantity("Hz")
     parts = given.split(",") if isinstance(given, str) else list(given)
     try:

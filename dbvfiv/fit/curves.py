@@ -50,24 +50,13 @@ _NOISE = 1e-9
 
 @dataclass(frozen=True)
 class TensionTest:
-    """A curve of one test, and of one cycle of it where the table tells cycles apart.
+    """A curve of one test, and of one cycle of it where the table tells cycles apart."""
 
-    Attributes
-    ----------
-    strain : numpy.ndarray, shape (n,)
-        Engineering strain, a fraction; greater than -1.
-    stress : numpy.ndarray, shape (n,)
-        Nominal (engineering) stress, Pa.
-    mode : str
-        "uniaxial", "planar" (pure shear: the width is held) or "biaxial" (both directions pulled alike).
-    cycle : int or None
-        A cycle has its way back too, in the order of the file; loading alone without one.
-    """
-
-    strain: np.ndarray
-    stress: np.ndarray
+    strain: np.ndarray  #: (n,); engineering strain, a fraction; greater than -1.
+    stress: np.ndarray  #: (n,); nominal (engineering) stress, Pa.
+    #: "uniaxial", "planar" (pure shear: the width is held) or "biaxial" (both directions pulled alike).
     mode: str = "uniaxial"
-    cycle: int | None = None
+    cycle: int | None = None  #: A cycle has its way back too, in the order of the file; loading alone without one.
 
     def __post_init__(self) -> None:
         if self.mode not in MODES:
@@ -90,7 +79,8 @@ class TensionTest:
 
 
 def read_curves(path: str | Path, mode: str | None = None) -> list[TensionTest]:
-    """Read tests of a rubber.
+    """Read tests of a rubber. Raises MaterialError if the file cannot be read, a column or unit is missing or unknown,
+    or a cell is no number; the message names file, line and column.
 
     Parameters
     ----------
@@ -106,12 +96,6 @@ def read_curves(path: str | Path, mode: str | None = None) -> list[TensionTest]:
     -------
     list of TensionTest
         In SI units; tests in the order of `MODES`, cycles ascending.
-
-    Raises
-    ------
-    MaterialError
-        If the file cannot be read, a column or unit is missing or unknown, or a cell is no
-        number; the message names file, line and column.
     """
     header, rows = _table(Path(path), _COLUMNS)
     words = {t.strip().lower(): i for i, t in enumerate(header) if t.strip().lower() in ("test", "cycle", "cycle [-]")}
@@ -128,18 +112,13 @@ def read_curves(path: str | Path, mode: str | None = None) -> list[TensionTest]:
 
 
 def read_columns(path: str | Path, others: dict[str, dict[str, float]]) -> tuple[TensionTest, dict[str, np.ndarray]]:
-    """The one test of a table, and further columns in SI units.
+    """The one test of a table, and further columns in SI units. Raises MaterialError: see `read_curves`.
 
     Parameters
     ----------
     path : str or Path
     others : dict
         Names of columns that may stand beside strain and stress, and factors of their units.
-
-    Raises
-    ------
-    MaterialError
-        See `read_curves`.
     """
     found = [values for _, _, values in _table(Path(path), _COLUMNS | others)[1]]
     columns = {name: np.array([values[name] for values in found]) for name in found[0]}
@@ -287,26 +266,16 @@ def _columns(
 
 @dataclass(frozen=True)
 class CycleReport:
-    """One cycle of a test.
-
-    Attributes
-    ----------
-    mode : str
-    cycle : int
-    peak_strain, peak_stress : float
-        Largest engineering strain, and the nominal stress there, Pa.
-    set_strain : float
-        Strain at which its loading begins to carry stress; 0 where it does so from the first row.
-    lost, loss_factor : float
-        Work lost in the loop over the volume, J/m3, that of both directions of a biaxial test, and tan delta; NaN
-        without a way back.
-    """
+    """One cycle of a test."""
 
     mode: str
     cycle: int
+    #: peak_strain and peak_stress: largest engineering strain, and the nominal stress there, Pa.
     peak_strain: float
     peak_stress: float
-    set_strain: float
+    set_strain: float  #: Strain at which its loading begins to carry stress; 0 where it does so from the first row.
+    #: lost and loss_factor: work lost in the loop over the volume, J/m3, that of both directions of a biaxial test, and
+    #: tan delta; NaN without a way back.
     lost: float
     loss_factor: float
 
@@ -314,12 +283,8 @@ class CycleReport:
 def read_tests(
     path: str | Path, planar: str | Path | None = None, biaxial: str | Path | None = None
 ) -> list[TensionTest]:
-    """Tests of one rubber from one file or several; see `read_curves`.
-
-    Raises
-    ------
-    MaterialError
-        Also if two files hold the same kind of test.
+    """Tests of one rubber from one file or several; see `read_curves`. Raises MaterialError: also if two files hold the
+    same kind of test.
     """
     curves = read_curves(path)
     for name, mode in ((planar, "planar"), (biaxial, "biaxial")):
@@ -333,12 +298,8 @@ def read_tests(
 
 
 def loading_tests(curves: list[TensionTest], cycle: str = "last") -> tuple[TensionTest, ...]:
-    """The loading branch of the "first" or "last" cycle of each test; curves without cycles as they are.
-
-    Raises
-    ------
-    MaterialError
-        For another word, or a loading branch without rows.
+    """The loading branch of the "first" or "last" cycle of each test; curves without cycles as they are. Raises
+    MaterialError for another word, or a loading branch without rows.
     """
     if cycle not in CYCLES:
         raise MaterialError(f"The cycle must be one of {', '.join(CYCLES)}, but {cycle!r} was given.")
@@ -356,17 +317,13 @@ def describe_cycles(curves: list[TensionTest]) -> list[CycleReport]:
 
 
 def hysteresis_loss(strain, stress) -> tuple[float, float]:
-    """Work lost in a loop over the volume, J/m3, and its loss factor.
+    """Work lost in a loop over the volume, J/m3, and its loss factor. Raises MaterialError for a loop without range,
+    without stiffness, or run through the wrong way about.
 
     Parameters
     ----------
     strain, stress : array_like, shape (n,)
         Engineering strain and nominal stress in the order of time; the loop is closed by a straight line.
-
-    Raises
-    ------
-    MaterialError
-        For a loop without range, without stiffness, or run through the wrong way about.
     """
     strain, stress = np.asarray(strain, float), np.asarray(stress, float)
     middle = strain - strain.mean()

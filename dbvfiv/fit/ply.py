@@ -39,12 +39,8 @@ class StripTest:
 
     @property
     def modulus(self) -> float:
-        """Between second Piola-Kirchhoff stress and Green-Lagrange strain, Pa, by least squares.
-
-        Raises
-        ------
-        MaterialError
-            If stress does not grow with strain.
+        """Between second Piola-Kirchhoff stress and Green-Lagrange strain, Pa, by least squares. Raises MaterialError
+        if stress does not grow with strain.
         """
         column = self.unit_stress(self.test.strain)
         if not np.any(column):
@@ -75,12 +71,8 @@ class StripTest:
 
 
 def read_strip_test(path: str | Path, direction: str) -> StripTest:
-    """Read a strip test: engineering_strain (or stretch), nominal_stress, and transverse_strain if measured.
-
-    Raises
-    ------
-    MaterialError
-        See `curves.read_curves`.
+    """Read a strip test: engineering_strain (or stretch), nominal_stress, and transverse_strain if measured. Raises
+    MaterialError: see `curves.read_curves`.
     """
     test, columns = read_columns(path, {"transverse_strain": STRAIN_UNITS})
     return StripTest(direction, test, columns.get("transverse_strain"))
@@ -111,7 +103,8 @@ def constituents_of(
     nu12: float | None = None,
     poisson: tuple[float, float] = _USUAL,
 ) -> Constituents:
-    """Halpin-Tsai backwards: fibre and matrix from the moduli of the ply.
+    """Halpin-Tsai backwards: fibre and matrix from the moduli of the ply. Raises MaterialError for moduli or a Poisson
+    ratio that no fibre and matrix give.
 
     Parameters
     ----------
@@ -121,11 +114,6 @@ def constituents_of(
         Volume fraction of the fibre, and coefficient along it.
     nu12 : float, optional
         Poisson ratio of the ply; gives that of the matrix in place of the second of `poisson`, of fibre and matrix.
-
-    Raises
-    ------
-    MaterialError
-        For moduli or a Poisson ratio that no fibre and matrix give.
     """
     require_positive("Halpin-Tsai ply", e1=e1, e2=e2, fibre_fraction=fibre_fraction, xi=xi)
     if fibre_fraction >= 1.0:
@@ -188,12 +176,8 @@ class PlyFit:
 def fit_ply(
     tests: tuple[StripTest, ...], fibre_fraction: float = 0.45, xi: float = 120000.0, density: float = 1270.0
 ) -> PlyFit:
-    """Ply constants from strips pulled along warp and weft, and at 45 degrees if that was tested.
-
-    Raises
-    ------
-    MaterialError
-        If warp or weft is missing, or the moduli fit no ply.
+    """Ply constants from strips pulled along warp and weft, and at 45 degrees if that was tested. Raises MaterialError
+    if warp or weft is missing, or the moduli fit no ply.
     """
     by = {test.direction: test for test in tests}
     for direction in ("warp", "weft"):

@@ -49,7 +49,8 @@ SAME_TEMPERATURE = 1.0
 
 
 def fit_tan_delta(frequency, tan_delta, times) -> PronyFit:
-    """Series of given times from tan delta over frequency; relative errors count, evenly over the logarithm.
+    """Series of given times from tan delta over frequency; relative errors count, evenly over the logarithm. Raises
+    MaterialError for tables that cannot be used.
 
     Parameters
     ----------
@@ -57,17 +58,13 @@ def fit_tan_delta(frequency, tan_delta, times) -> PronyFit:
         Hz, ascending; greater than 0 and at most 2.
     times : array_like, shape (j,)
         s.
-
-    Raises
-    ------
-    MaterialError
-        For tables that cannot be used.
     """
     return fit_loss_curve(*checked_tan_delta(frequency, tan_delta), np.asarray(times, float))
 
 
 def fit_moduli(frequency, storage, loss, times) -> PronyFit:
-    """Series of given times from storage and loss modulus over frequency.
+    """Series of given times from storage and loss modulus over frequency. Raises MaterialError for tables that cannot
+    be used, or moduli that leave no slow modulus.
 
     The slow modulus is found with the strengths and dropped: what a law is scaled with is its own test.
 
@@ -77,11 +74,6 @@ def fit_moduli(frequency, storage, loss, times) -> PronyFit:
         Hz, ascending; Pa, or any common unit, positive.
     times : array_like, shape (j,)
         s.
-
-    Raises
-    ------
-    MaterialError
-        For tables that cannot be used, or moduli that leave no slow modulus.
     """
     frequency, storage, loss = checked_moduli(frequency, storage, loss)
     times = np.asarray(times, float)
@@ -95,7 +87,8 @@ def fit_moduli(frequency, storage, loss, times) -> PronyFit:
 
 
 def fit_relaxation(time, modulus, times) -> PronyFit:
-    """Series of given times from a relaxation test: the modulus over the time since the strain was put on.
+    """Series of given times from a relaxation test: the modulus over the time since the strain was put on. Raises
+    MaterialError for tables that cannot be used, or a modulus that relaxes to nothing.
 
     Parameters
     ----------
@@ -103,11 +96,6 @@ def fit_relaxation(time, modulus, times) -> PronyFit:
         s, ascending, positive; Pa, or any unit, positive.
     times : array_like, shape (j,)
         s.
-
-    Raises
-    ------
-    MaterialError
-        For tables that cannot be used, or a modulus that relaxes to nothing.
     """
     time, modulus = checked_relaxation(time, modulus)
     times = np.asarray(times, float)
@@ -182,17 +170,13 @@ def _over_slow(found: np.ndarray, what: str) -> np.ndarray:
 
 def read_loss_table(path: str | Path, temperature: float | None = None) -> tuple[np.ndarray, ...]:
     """Read frequencies, Hz, with tan delta, or with storage and loss modulus, Pa, where a table holds both; each (n,).
+    Raises MaterialError if the file cannot be read, a column or its unit is missing or unknown, or several temperatures
+    are left.
 
     Parameters
     ----------
-    path : path
     temperature : float, optional
         K; which rows are meant where the table holds several temperatures.
-
-    Raises
-    ------
-    MaterialError
-        If the file cannot be read, a column or its unit is missing or unknown, or several temperatures are left.
     """
     columns = _read(path, ("frequency", "tan delta", "storage modulus", "loss modulus"), temperature)
     _require(
@@ -312,7 +296,8 @@ def _steps(measured: np.ndarray) -> list[float]:
 
 
 def series_of_loss_table(card: Relaxing, band: tuple[float, float], branches: int) -> tuple:
-    """Series of the table of loss factors or moduli that a card names, over a band, Hz.
+    """Series of the table of loss factors or moduli that a card names, over a band, Hz. Raises MaterialError for a
+    table that cannot be used.
 
     Returns
     -------
@@ -321,11 +306,6 @@ def series_of_loss_table(card: Relaxing, band: tuple[float, float], branches: in
         Origin of the data, in words.
     data : tuple of arrays
         Frequencies, Hz, and tan delta that were measured.
-
-    Raises
-    ------
-    MaterialError
-        For a table that cannot be used.
     """
     table = read_loss_table(card.loss_data, card.loss_temperature)
     check, fit_to, what = (

@@ -140,16 +140,12 @@ def describe_fits(
     error: str = "absolute",
     cycle: str = "last",
 ) -> FitReport:
-    """Fit every form, and tell one in full.
+    """Fit every form, and tell one in full. Raises MaterialError for options that there are not, or tests that no form
+    can be fitted to.
 
     `law` and `terms` are the form told in full; the softening rubber if not given and the tests suffice for it, else of
     those but Ogden's that are stable as far as the tests reach the one of least residual. For the other options see
     `rubber.fit_rubber` and `curves.loading_tests`.
-
-    Raises
-    ------
-    MaterialError
-        For options that there are not, or tests that no form can be fitted to.
     """
     if law is None and terms is not None:
         raise MaterialError("A number of terms needs the law they belong to.")

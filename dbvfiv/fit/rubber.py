@@ -143,12 +143,8 @@ class Form:
 
 
 def form_of(name: str, terms: int | None = None) -> Form:
-    """A form by its name; with the usual number of terms if none is given.
-
-    Raises
-    ------
-    MaterialError
-        For a form or a number of terms that there is not.
+    """A form by its name; with the usual number of terms if none is given. Raises MaterialError for a form or a number
+    of terms that there is not.
     """
     if name not in TERMS:
         raise MaterialError(f"The law to be fitted must be one of {', '.join(TERMS)}, but {name!r} was given.")
@@ -181,41 +177,23 @@ def uniaxial_stress(law: Law, stretch) -> np.ndarray:
 
 @dataclass(frozen=True)
 class RubberFit:
-    """Constants fitted to tests, and how far to trust them.
-
-    Attributes
-    ----------
-    form : Form
-    tests : tuple of TensionTest
-    constants : numpy.ndarray, shape (terms,)
-        Those that W is linear in, Pa: mu_inf, mu_0, c and c_3 of the softening rubber, the C_ij, or Ogden's mu_p.
-    exponents : numpy.ndarray, shape (terms,), (1,) or (0,)
-        Those that it is not linear in: Ogden's alpha_p, x_0 of the softening rubber.
-    residuals : numpy.ndarray, shape (n,)
-        Measured minus fitted nominal stress, Pa, test after test.
-    r_squared : float
-        1 - |residuals|^2/|stress - mean|^2 over all tests; NaN if all stresses are equal.
-    condition_number : float
-        Of the Jacobian by constants and exponents, with columns scaled to unit length.
-    covariance : numpy.ndarray, shape (m, m)
-        Of constants and exponents, from the residual variance; that of the unconstrained problem even if a
-        constraint is active, in which case it overstates the scatter.
-    constraint : str
-        "none", "non-negative" or "stable".
-    active : bool
-        Whether the constraint changed the answer.
-    """
+    """Constants fitted to tests, and how far to trust them."""
 
     form: Form
     tests: tuple[TensionTest, ...]
+    #: (terms,); those that W is linear in, Pa: mu_inf, mu_0, c and c_3 of the softening rubber, the C_ij, or Ogden's
+    #: mu_p.
     constants: np.ndarray
+    #: (terms,), (1,) or (0,); those that it is not linear in: Ogden's alpha_p, x_0 of the softening rubber.
     exponents: np.ndarray
-    residuals: np.ndarray
-    r_squared: float
-    condition_number: float
+    residuals: np.ndarray  #: (n,); measured minus fitted nominal stress, Pa, test after test.
+    r_squared: float  #: 1 - |residuals|^2/|stress - mean|^2 over all tests; NaN if all stresses are equal.
+    condition_number: float  #: Of the Jacobian by constants and exponents, with columns scaled to unit length.
+    #: (m, m); of constants and exponents, from the residual variance; that of the unconstrained problem even if a
+    #: constraint is active, in which case it overstates the scatter.
     covariance: np.ndarray
-    constraint: str
-    active: bool
+    constraint: str  #: "none", "non-negative" or "stable".
+    active: bool  #: Whether the constraint changed the answer.
 
     @property
     def standard_errors(self) -> np.ndarray:
@@ -258,13 +236,7 @@ class RubberFit:
         return self.form.columns(mode, strain, self.exponents) @ self.constants
 
     def law(self, density: float) -> Law:
-        """The fitted rubber, for a wall.
-
-        Raises
-        ------
-        MaterialError
-            If the constants give no positive shear modulus.
-        """
+        """The fitted rubber, for a wall. Raises MaterialError if the constants give no positive shear modulus."""
         constants, exponents = self.constants.tolist(), self.exponents.tolist()
         if self.form.name == "ogden":
             return Ogden(tuple(constants), tuple(exponents), density)
@@ -282,7 +254,8 @@ def fit_rubber(
     stable_to: float | None = None,
     error: str = "absolute",
 ) -> RubberFit:
-    """Fit a form of the energy to one or several tests at once by least squares.
+    """Fit a form of the energy to one or several tests at once by least squares. Raises MaterialError for fewer
+    different strains than unknowns plus one, or an unknown option.
 
     Parameters
     ----------
@@ -299,11 +272,6 @@ def fit_rubber(
         of the tests if not given. Only for "stable".
     error : {"absolute", "relative"}
         What is squared and summed: stress, or stress over the measured one (points without stress do not count).
-
-    Raises
-    ------
-    MaterialError
-        For fewer different strains than unknowns plus one, or an unknown option.
     """
     tests = tuple(tests)
     for what, given, known in (("constraint", constraint, CONSTRAINTS), ("error", error, ERRORS)):
@@ -459,12 +427,8 @@ def _first_invariant(test: TensionTest) -> np.ndarray:
 
 
 def states_within(reach: float) -> np.ndarray:
-    """Principal logarithmic strains (k, 3) that fill the ball of an equivalent strain.
-
-    Raises
-    ------
-    MaterialError
-        For a reach that is not positive and finite.
+    """Principal logarithmic strains (k, 3) that fill the ball of an equivalent strain. Raises MaterialError for a reach
+    that is not positive and finite.
     """
     if not 0.0 < reach < np.inf:
         raise MaterialError(f"stable_to must be a strain greater than 0, but {np.expm1(reach):.6g} was given.")
@@ -516,12 +480,8 @@ def _least_squares_above(matrix, target, normals) -> np.ndarray:
 
 
 def law_of_tests(card: Any) -> Law:
-    """Law fitted to the tests that a material card (`dbvfiv.case.Card`) names, as it says.
-
-    Raises
-    ------
-    MaterialError
-        For tests that cannot be used, or constants that its constraint leaves none of.
+    """Law fitted to the tests that a material card (`dbvfiv.case.Card`) names, as it says. Raises MaterialError for
+    tests that cannot be used, or constants that its constraint leaves none of.
     """
     tests = loading_tests(read_tests(card.path, card.planar, card.biaxial), card.cycle)
     form = form_of(card.law, card.terms)

@@ -30,6 +30,8 @@ from .term import VISCOSITY, FlowTerm, Stream, upstream_integral, wall_share
 
 class Channel(FlowLaw):
     """Flow through m stations; its one unknown is the inlet velocity, its one equation the pressure at the outlet.
+    Raises ValueError if the positions do not increase, two terms share the name of a parameter, or heads and momenta of
+    a fluid without viscosity do not go with the square of the speeds and the speeds.
 
     Parameters
     ----------
@@ -57,12 +59,6 @@ class Channel(FlowLaw):
         Of the fluid that equilibria are found with.
     bowed : bool
         Let the integral of the speed be a parabola between stations, as the wall feels it, and not straight.
-
-    Raises
-    ------
-    ValueError
-        If the positions do not increase, two terms share the name of a parameter, or heads and momenta of a fluid
-        without viscosity do not go with the square of the speeds and the speeds.
     """
 
     DATA = ("step", "floor", "terms", "back", "static", "perimeter", "front")
@@ -148,7 +144,6 @@ class Channel(FlowLaw):
         return own + tuple(parameter for term in self.terms for parameter in term.parameters)
 
     # -- the definition
-    # ----
 
     def speeds(self, area, area_rate, velocity, storage):
         """Speeds (m,) at the stations; traceable."""
@@ -229,7 +224,6 @@ class Channel(FlowLaw):
         return jnp.concatenate([jnp.zeros(1), values[1:], values[:1]])
 
     # -- the flange, where a line may stand in front
-    # ----
 
     def supply(self, parameters):
         """Enthalpy at the far end of a line, m2/s2, and what of it stands against the flow at rest; traceable."""
@@ -254,7 +248,6 @@ class Channel(FlowLaw):
         return parameters["storage"] if self.unsteady else 0.0
 
     # -- the steady flow, in closed form
-    # ----
 
     def steady_start(self, area, parameters):
         open_ = above_floor(area, self.floor)
@@ -284,7 +277,6 @@ class Channel(FlowLaw):
         return pressure, jnp.where(ratio > 0, speed, jnp.inf)[None]
 
     # -- still fluid in front of a seal
-    # ----
 
     def shut(self, seal: int | None) -> Channel:
         if seal is None:
@@ -381,15 +373,9 @@ def _of_channel(name: str) -> property:
 
 
 class AroundChannel(FlowLaw):
-    """Flow law that extends a channel, as by an elastic line or a compressible fluid.
+    """Flow law that extends a channel, as by an elastic line or a compressible fluid."""
 
-    Attributes
-    ----------
-    channel : Channel
-        Gives the law its stations, levels, terms and blend of the continuity laws.
-    """
-
-    channel: Channel
+    channel: Channel  #: Gives the law its stations, levels, terms and blend of the continuity laws.
     count, step, terms, storage, unsteady = map(_of_channel, ("count", "step", "terms", "storage", "unsteady"))
     back, level, static, sealed = map(_of_channel, ("back", "level", "static", "sealed"))
 

@@ -46,30 +46,19 @@ DEGREE = 4
 
 
 class Element(NamedTuple):
-    """An element on 0..1.
+    """An element on 0..1."""
 
-    Attributes
-    ----------
-    nodes : (N + 1,) array
-        Where the flow's unknowns are.
-    points, weights : (N,) arrays
-        Gauss's, where those of the pressure are.
-    slope : (N, N + 1) array
-        Derivative of the flow at the points from its unknowns.
-    finer, value : (N + 1,) and (N + 1, N + 1) arrays
-        Gauss's weights for one point more, and the flow there from its unknowns: friction that is summed over the
-        points of the pressure does not see a flow of degree N whose zeros they are, the quickest wave of an element.
-    mass : (N + 1, N + 1) array
-        Integral of the product of two shapes.
-    """
-
-    nodes: np.ndarray
+    nodes: np.ndarray  #: (N + 1,); where the flow's unknowns are.
+    #: points and weights: (N,); Gauss's, where those of the pressure are.
     points: np.ndarray
     weights: np.ndarray
-    slope: np.ndarray
+    slope: np.ndarray  #: (N, N + 1); derivative of the flow at the points from its unknowns.
+    #: finer and value: (N + 1,) and (N + 1, N + 1); Gauss's weights for one point more, and the flow there from its
+    #: unknowns: friction that is summed over the points of the pressure does not see a flow of degree N whose zeros
+    #: they are, the quickest wave of an element.
     finer: np.ndarray
     value: np.ndarray
-    mass: np.ndarray
+    mass: np.ndarray  #: (N + 1, N + 1); integral of the product of two shapes.
 
 
 @cache
@@ -107,20 +96,15 @@ def default_elements(length: float, wave_speed: float) -> int:
 
 
 class Segments(NamedTuple):
-    """The elements of a line from the far end to the flange, and what stands at its nodes.
+    """The elements of a line from the far end to the flange, and what stands at its nodes."""
 
-    Attributes
-    ----------
-    length, ratio, speed, lost : (e,) arrays
-        Of each element: length, m; area of the inlet over its own; wave speed, m/s; what it loses of w|w|.
-    inertance, loss : (k + 1,) arrays
-        Of rigid pipes at the nodes: length times ratio, m; what they lose of w|w|.
-    """
-
+    #: length, ratio, speed and lost: (e,); of each element: length, m; area of the inlet over its own; wave speed, m/s;
+    #: what it loses of w|w|.
     length: Any
     ratio: Any
     speed: Any
     lost: Any
+    #: inertance and loss: (k + 1,); of rigid pipes at the nodes: length times ratio, m; what they lose of w|w|.
     inertance: Any
     loss: Any
 
@@ -271,7 +255,6 @@ class LineChannel(AroundChannel):
         Without the line.
     rigid : Channel or GasChannel
         With its rigid column, which has the same steady flow.
-    line : ElasticLine
     """
 
     DATA = ("channel", "rigid", "line", "floor")
@@ -326,7 +309,6 @@ class LineChannel(AroundChannel):
         return float(inner[self.channel.inner])
 
     # -- the definition
-    # ----
 
     @jax.jit
     def held(self, area, area_rate, inner, parameters):
@@ -395,7 +377,6 @@ class LineChannel(AroundChannel):
         return p, jnp.concatenate([own, jnp.full(self.line.size // 2, velocity), pressure])
 
     # -- its energy, see `dbvfiv.flow.energy`
-    # ----
 
     @property
     def book_names(self) -> tuple[str, ...]:

@@ -50,26 +50,16 @@ LINE_BOOKS = tuple(f"line_{name}" for name in ("supply", "dissipation", "work", 
 
 
 class Instant(NamedTuple):
-    """A fluid at the beginning or end of a step.
+    """A fluid at the beginning or end of a step."""
 
-    Attributes
-    ----------
-    area, area_rate : (m,) arrays
-        m2, m2/s.
-    inner : (l,) array
-        The law's unknowns.
-    held, rate : (m + l,) arrays
-        What its balances hold, and the scheme's value of the rate.
-    carried : array
-        What the books of the next step need, see `FlowLaw.step_books`.
-    """
-
+    #: area and area_rate: (m,); m2, m2/s.
     area: Any
     area_rate: Any
-    inner: Any
+    inner: Any  #: (l,); the law's unknowns.
+    #: held and rate: (m + l,); what its balances hold, and the scheme's value of the rate.
     held: Any
     rate: Any
-    carried: Any
+    carried: Any  #: What the books of the next step need, see `FlowLaw.step_books`.
 
 
 class BookStep(NamedTuple):

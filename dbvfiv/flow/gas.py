@@ -109,7 +109,6 @@ class GasChannel(AroundChannel):
         return float(np.sqrt(12.0 * _RESOLVED) * speed / (2.0 * np.pi * np.max(self.channel.step)))
 
     # -- the fluid
-    # ----
 
     def pressure(self, sigma, parameters):
         """Pressures over that around the jet, Pa; traceable."""
@@ -155,7 +154,6 @@ class GasChannel(AroundChannel):
         return speed, jnp.concatenate([outlet, sigma])
 
     # -- the definition
-    # ----
 
     def stored(self, area, area_rate, inner, parameters):
         """Quantities (2 m - 1,) whose rates the balances of momentum and mass contain; traceable.
@@ -241,7 +239,6 @@ class GasChannel(AroundChannel):
         return jnp.concatenate([pressure, self.balances(area, area_rate, inner, parameters, drive)])
 
     # -- the flange, where a line may stand in front
-    # ----
 
     def supply(self, parameters):
         """Enthalpy at the far end of a line, m2/s2, over that around the jet; nothing else stands against the flow;
@@ -273,7 +270,6 @@ class GasChannel(AroundChannel):
         return jnp.zeros(self.count + self.inner).at[2 * self.count - 1].set(-1.0)
 
     # -- the steady flow
-    # ----
 
     def steady_start(self, area, parameters):
         """The flow without compression, no faster than sound, and the densities that its pressures make."""
@@ -323,7 +319,6 @@ class GasChannel(AroundChannel):
         return np.exp(np.asarray(sigma) / self.sound_speed)
 
     # -- still gas in front of a seal
-    # ----
 
     def _in_front(self, momentum, flange, mass, speed, sigma):
         """Numbers (2 m - 1,) of the cells in front of a seal and of the flange; behind it speeds, that at the seal
@@ -353,7 +348,6 @@ class GasChannel(AroundChannel):
         return inner if velocity else np.append(np.zeros(self.count), np.full(self.count - 1, inner[-1]))
 
     # -- its energy, see `dbvfiv.flow.energy`
-    # ----
 
     book_names = GAS_BOOKS
     energy_names = ("gas_energy",)

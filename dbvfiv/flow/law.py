@@ -22,19 +22,13 @@ import numpy as np
 
 
 class FlowMotion(NamedTuple):
-    """A passage in motion and the law's own unknowns.
+    """A passage in motion and the law's own unknowns."""
 
-    Attributes
-    ----------
-    area, area_rate, area_acceleration : (m,) arrays
-        m2, m2/s, m2/s2, from the outlet to the inlet.
-    inner, inner_rate : (l,) arrays
-        The law's unknowns and their rates.
-    """
-
+    #: area, area_rate and area_acceleration: (m,); m2, m2/s, m2/s2, from the outlet to the inlet.
     area: Any
     area_rate: Any
     area_acceleration: Any
+    #: inner and inner_rate: (l,); the law's unknowns and their rates.
     inner: Any
     inner_rate: Any
 
@@ -47,19 +41,12 @@ class FlowMotion(NamedTuple):
 
 @dataclass(frozen=True)
 class FlowParameter:
-    """A number that a law depends on.
-
-    Attributes
-    ----------
-    name, unit, meaning : str
-    value : float, optional
-        What it is unless given; without it, it must be given.
-    """
+    """A number that a law depends on."""
 
     name: str
     unit: str
     meaning: str
-    value: float | None = None
+    value: float | None = None  #: What it is unless given; without it, it must be given.
 
 
 @dataclass(frozen=True)
@@ -70,23 +57,20 @@ class FluidOperators:
 
     p = (A0 + lambda A1 + lambda^2 A2) a + (B0 + lambda B1) u
     0 = (R0 + lambda R1 + lambda^2 R2) a + (S0 + lambda S1) u
-
-    Attributes
-    ----------
-    A0, A1, A2 : (m, m) arrays, Pa/m2, Pa s/m2, Pa s2/m2
-    B0, B1 : (m, l) arrays
-    R0, R1, R2 : (l, m) arrays
-    S0, S1 : (l, l) arrays
     """
 
+    #: A0, A1 and A2: (m, m), Pa/m2, Pa s/m2, Pa s2/m2.
     A0: np.ndarray
     A1: np.ndarray
     A2: np.ndarray
+    #: B0 and B1: (m, l).
     B0: np.ndarray
     B1: np.ndarray
+    #: R0, R1 and R2: (l, m).
     R0: np.ndarray
     R1: np.ndarray
     R2: np.ndarray
+    #: S0 and S1: (l, l).
     S0: np.ndarray
     S1: np.ndarray
 
@@ -140,51 +124,32 @@ class FlowLaw(Traceable, ABC):
     A subclass gives `inner_names`, `parameters`, `count` and `equations`; the first inner unknown of a law with a fluid
     is the inlet velocity, m/s. Its steady flow is then found by Newton's
     method from `steady_start`; a law that knows it in closed form overrides `steady` by it.
-
-    Attributes
-    ----------
-    inner_names : tuple of str
-        The law's own unknowns.
-    floor : float
-        Smallest area that the fluid sees, m2; 0 without such a floor.
-    has_fluid : bool
-        Whether a fluid moves: its density matters, and small motions of the wall change the pressures.
-    back : float
-        Pressure that inlet pressures work against, Pa: that at the far end downstream, and `level`. Station pressures
-        are what the wall sees and not over it.
-    level : float
-        Weight of the fluid between the levels of inlet and outlet, Pa; positive where the outlet is higher.
-    static : (m,) array or 0
-        Pressure of the levels, Pa: what stands on the wall at each station where nothing flows against `back`, that of
-        the fluid inside less that outside. It vanishes at the outlet.
-    unsteady : bool
-        Whether rates matter; without, the steady law holds at every instant and the inner unknowns follow from the
-        passage.
-    compressed : bool
-        Whether the fluid in the passage is compressed; pressures do not contain rates then.
-    density : float
-        Of the fluid that equilibria are found with, kg/m3; it matters only to those of a viscous fluid.
-    step : (m - 1,) array or 0
-        Distances of the stations, m, where the fluid between them has momentum.
-    book_names, energy_names : tuples of str
-        What time steps keep of the fluid's energy: what became of it, and what it holds; see `step_books`.
-    sealed : bool
-        Whether this is the law of still fluid in front of a seal; see `shut`.
     """
 
-    inner_names: ClassVar[tuple[str, ...]] = ()
-    floor: float = 0.0
+    inner_names: ClassVar[tuple[str, ...]] = ()  #: The law's own unknowns.
+    floor: float = 0.0  #: Smallest area that the fluid sees, m2; 0 without such a floor.
+    #: Pressure that inlet pressures work against, Pa: that at the far end downstream, and `level`. Station pressures
+    #: are what the wall sees and not over it.
     back: float = 0.0
+    #: Weight of the fluid between the levels of inlet and outlet, Pa; positive where the outlet is higher.
     level: float = 0.0
+    #: (m,) or 0; pressure of the levels, Pa: what stands on the wall at each station where nothing flows against
+    #: `back`, that of the fluid inside less that outside. It vanishes at the outlet.
     static: Any = 0.0
+    #: Whether a fluid moves: its density matters, and small motions of the wall change the pressures.
     has_fluid: bool = True
+    #: Whether rates matter; without, the steady law holds at every instant and the inner unknowns follow from the
+    #: passage.
     unsteady: bool = True
-    compressed: bool = False
+    compressed: bool = False  #: Whether the fluid in the passage is compressed; pressures do not contain rates then.
+    #: Of the fluid that equilibria are found with, kg/m3; it matters only to those of a viscous fluid.
     density: float = 1.0
-    step: Any = 0.0
+    step: Any = 0.0  #: (m - 1,) or 0; distances of the stations, m, where the fluid between them has momentum.
+    #: book_names and energy_names: what time steps keep of the fluid's energy: what became of it, and what it holds;
+    #: see `step_books`.
     book_names: tuple[str, ...] = ()
     energy_names: tuple[str, ...] = ()
-    sealed: bool = False
+    sealed: bool = False  #: Whether this is the law of still fluid in front of a seal; see `shut`.
 
     @property
     @abstractmethod
@@ -241,7 +206,6 @@ class FlowLaw(Traceable, ABC):
         return solve_steady(self, area, parameters)
 
     # -- a passage that faces in contact shut
-    # ----
 
     def shut(self, seal: int | None) -> FlowLaw:
         """The law of fluid that is still but for what the wall displaces in front of a seal, the last of the stations
@@ -262,7 +226,6 @@ class FlowLaw(Traceable, ABC):
         return inner
 
     # -- steps in time, see `dbvfiv.flow.stepping`
-    # ----
 
     def reversed(self) -> FlowLaw:
         """The law with a flow that may run backwards, as time steps need it."""
@@ -305,7 +268,6 @@ class FlowLaw(Traceable, ABC):
         return np.inf
 
     # -- parameters
-    # ----
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -313,12 +275,8 @@ class FlowLaw(Traceable, ABC):
         return tuple(parameter.name for parameter in self.parameters)
 
     def values(self, given: Mapping[str, float]) -> dict[str, float]:
-        """All parameters by name: those among the given conditions, which may hold others, the rest by default.
-
-        Raises
-        ------
-        ValueError
-            If a parameter without a default is not given.
+        """All parameters by name: those among the given conditions, which may hold others, the rest by default. Raises
+        ValueError if a parameter without a default is not given.
         """
         found = {}
         for parameter in self.parameters:
@@ -329,7 +287,6 @@ class FlowLaw(Traceable, ABC):
         return found
 
     # -- evaluation
-    # ----
 
     def steady_pressure(self, area: np.ndarray, inlet: float) -> np.ndarray:
         """Pressures (m,), Pa, of steady flow driven by the inlet pressure, Pa; independent of the density of a fluid

@@ -16,7 +16,6 @@ class RowAreas:
 
     Parameters
     ----------
-    mesh : ValveMesh
     index : (nn, c) int array
         Numbers of the free unknowns, -1 where constrained.
     """

@@ -51,29 +51,19 @@ SECOND_ORDER = 1.0, 1.5
 
 @dataclass(frozen=True)
 class FluidState:
-    """The fluid at one instant.
+    """The fluid at one instant."""
 
-    Attributes
-    ----------
-    inner : (l,) array
-        The law's unknowns; the inlet velocity alone where it has none.
-    held, rate : (m + l,) arrays
-        What the law's balances hold, and the scheme's value of its rate.
-    area, area_rate, speed : (m,) arrays
-        m2, m2/s and m/s at the stations.
-    turning : (m - 1,) array
-        Rate of the momentum between stations in the last step, m2/s2.
-    carried, books : arrays
-        What the next step's energies need, and energies since the start, J of the part; see `FlowLaw.step_books`.
-    """
-
-    inner: np.ndarray
+    inner: np.ndarray  #: (l,); the law's unknowns; the inlet velocity alone where it has none.
+    #: held and rate: (m + l,); what the law's balances hold, and the scheme's value of its rate.
     held: np.ndarray
     rate: np.ndarray
+    #: area, area_rate and speed: (m,); m2, m2/s and m/s at the stations.
     area: np.ndarray
     area_rate: np.ndarray
     speed: np.ndarray
-    turning: np.ndarray
+    turning: np.ndarray  #: (m - 1,); rate of the momentum between stations in the last step, m2/s2.
+    #: carried and books: what the next step's energies need, and energies since the start, J of the part; see
+    #: `FlowLaw.step_books`.
     carried: np.ndarray
     books: np.ndarray
 
@@ -96,13 +86,7 @@ class FluidState:
 
     @classmethod
     def unpacked(cls, numbers: np.ndarray) -> FluidState:
-        """Undo `packed`.
-
-        Raises
-        ------
-        SolveError
-            If the numbers are those of another version.
-        """
+        """Undo `packed`. Raises SolveError if the numbers are those of another version."""
         numbers = np.asarray(numbers, float)
         count = len(fields(cls)) if len(numbers) else 0
         cuts = count + np.cumsum([0, *np.asarray(numbers[:count], int)])
@@ -119,40 +103,23 @@ def packed_size(stations: int, unknowns: int) -> int:
 
 @dataclass
 class Flow:
-    """Fluid of a step and its force on the wall.
+    """Fluid of a step and its force on the wall."""
 
-    Attributes
-    ----------
-    inlet : float
-        Inlet pressure where the equations are met, Pa.
-    pressure : (m,) array
-        Pa, where the equations are met.
-    area, area_rate, speed : (m,) arrays
-        At the end of the step: m2 of the part, m2/s, m/s.
-    inner, held : (l,) and (m + l,) arrays
-        The law's unknowns and what its balances hold, there.
-    step : FluidStep, optional
-        That found it; without one the state is that of the flow, all rates zero.
-    passage : pair of (m,) arrays, optional
-        Areas and their rates where the equations are met.
-    still : pair of (m,) arrays, optional
-        Pressures of fluid at rest in front of a seal, and the lengths, m, over which what moves there adds to them does
-        work on the areas.
-    force : (n,) array
-        G p, the wall's part to find.
-    """
-
-    inlet: float
-    pressure: np.ndarray
+    inlet: float  #: Inlet pressure where the equations are met, Pa.
+    pressure: np.ndarray  #: (m,); Pa, where the equations are met.
+    #: area, area_rate and speed: (m,); at the end of the step: m2 of the part, m2/s, m/s.
     area: np.ndarray
     area_rate: np.ndarray
     speed: np.ndarray
+    #: inner and held: (l,) and (m + l,); the law's unknowns and what its balances hold, there.
     inner: np.ndarray
     held: np.ndarray
-    step: FluidStep | None = None
-    passage: tuple | None = None
+    step: FluidStep | None = None  #: That found it; without one the state is that of the flow, all rates zero.
+    passage: tuple | None = None  #: pair of (m,); areas and their rates where the equations are met.
+    #: pair of (m,); pressures of fluid at rest in front of a seal, and the lengths, m, over which what moves there adds
+    #: to them does work on the areas.
     still: tuple | None = None
-    force: np.ndarray | None = None
+    force: np.ndarray | None = None  #: (n,); g p, the wall's part to find.
 
     def slopes(self, velocity: float) -> np.ndarray:
         """Derivatives (m, m) of the pressures by the new areas, whose rates follow them by `velocity`, 1/s."""
@@ -168,7 +135,6 @@ class MovingFluid:
 
     Parameters
     ----------
-    law : FlowLaw
     density : float, kg/m3
     seal : callable, optional
         Last station, from the outlet on, that faces shut in a passage of areas (m,), or None.
@@ -436,7 +402,6 @@ class FrozenStep:
 
 
 # -- compiled
-# ----
 
 
 def _values(law, parameters, mid, new, old, theta, weight, known, inner):

@@ -13,35 +13,20 @@ VISCOSITY = "viscosity"
 
 
 class Stream(NamedTuple):
-    """The streamline as a term sees it.
+    """The streamline as a term sees it."""
 
-    Attributes
-    ----------
-    area, area_rate : (m,) arrays
-        m2, m2/s, from the outlet to the inlet.
-    speed : (m,) array
-        Of the fluid at the stations, m/s; negative inwards.
-    inner : (l,) array
-        The law's own unknowns; the first is the inlet velocity, m/s.
-    open_area : (m,) array, optional
-        Areas that the fluid sees, m2: they stay above the floor of the channel, so that `open_area * speed` is the
-        discharge.
-    perimeter : (m,) array, optional
-        Arcs of the wall that the fluid wets, m, of the same part of the section as the areas.
-    step : (m-1,) array, optional
-        Distances of the stations, m.
-    passing : float, optional
-        `velocity` where it is not that of the inlet.
-    """
-
+    #: area and area_rate: (m,); m2, m2/s, from the outlet to the inlet.
     area: Any
     area_rate: Any
-    speed: Any
-    inner: Any
+    speed: Any  #: (m,); of the fluid at the stations, m/s; negative inwards.
+    inner: Any  #: (l,); the law's own unknowns; the first is the inlet velocity, m/s.
+    #: (m,); areas that the fluid sees, m2: they stay above the floor of the channel, so that `open_area * speed` is the
+    #: discharge.
     open_area: Any = None
+    #: (m,); arcs of the wall that the fluid wets, m, of the same part of the section as the areas.
     perimeter: Any = None
-    step: Any = None
-    passing: Any = None
+    step: Any = None  #: (m-1,); distances of the stations, m.
+    passing: Any = None  #: `velocity` where it is not that of the inlet.
 
     @property
     def velocity(self):
@@ -55,20 +40,14 @@ class FlowTerm(Traceable):
     The pressures become p_k - rho [head_k + d/dt momentum_k]. Heads go with the square of the speeds and momenta with
     the speeds themselves, so that equilibria do not depend on density; a head that opposes the flow either way goes
     with U|U|. Both methods are traceable by jax and return (m,) arrays, or one number for all stations.
-
-    Attributes
-    ----------
-    drives : bool
-        Whether its head is what the driving pressure of a steady state changes by when the flow does, as that of a
-        pump: it vanishes in steady flow, then, and need not go with the square of the speeds.
-    viscous : bool
-        Whether its head depends on the Reynolds number; equilibria depend on the density of the fluid then.
-    behind_throat : bool
-        Whether its head is lost behind the narrowest section, where nothing flows if that is shut.
     """
 
+    #: Whether its head is what the driving pressure of a steady state changes by when the flow does, as that of a pump:
+    #: it vanishes in steady flow, then, and need not go with the square of the speeds.
     drives: ClassVar[bool] = False
+    #: Whether its head depends on the Reynolds number; equilibria depend on the density of the fluid then.
     viscous: ClassVar[bool] = False
+    #: Whether its head is lost behind the narrowest section, where nothing flows if that is shut.
     behind_throat: ClassVar[bool] = False
 
     @property

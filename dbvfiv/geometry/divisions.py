@@ -23,17 +23,10 @@ _FINE = 4001
 
 @dataclass(frozen=True)
 class Division:
-    """Positions of rows or columns.
+    """Positions of rows or columns."""
 
-    Attributes
-    ----------
-    positions : (n + 1,) array
-    missed : (k,) array
-        Breaks that no row or column could be put on.
-    """
-
-    positions: np.ndarray
-    missed: np.ndarray
+    positions: np.ndarray  #: (n + 1,).
+    missed: np.ndarray  #: (k,); breaks that no row or column could be put on.
 
 
 def least_rows(surface: Surface) -> int:
@@ -109,7 +102,8 @@ def inverse_grading(s: float, ratio: float) -> float:
 
 
 def divide(joints, breaks, count: int, law=None) -> Division:
-    """Divide a line into `count` elements that end on all joints, and on breaks as far as elements suffice.
+    """Divide a line into `count` elements that end on all joints, and on breaks as far as elements suffice. Raises
+    ValueError if there are fewer elements than pieces between joints.
 
     Parameters
     ----------
@@ -120,11 +114,6 @@ def divide(joints, breaks, count: int, law=None) -> Division:
         before earlier ones.
     law : tuple of two (k,) arrays, optional
         Positions and the number of elements up to them, on any scale: how elements are spread. Evenly by default.
-
-    Raises
-    ------
-    ValueError
-        If there are fewer elements than pieces between joints.
     """
     joints = np.asarray(joints, float)
     along = (lambda z: z) if law is None else (lambda z: np.interp(z, *law))

@@ -23,25 +23,14 @@ _SHORT = 1e-6
 
 @dataclass(frozen=True)
 class Profile:
-    """A section of the mid-surface.
+    """A section of the mid-surface."""
 
-    Attributes
-    ----------
-    z : float
-        Axial position, m.
-    points : callable
-        Positions (k, 2) in x and y, m, at normalised arc lengths s (k,) in 0 (centre) .. 1 (side edge); from
-        -1, the other side edge, on where the section is that of a whole lip.
-    length : float
-        Arc length, m.
-    joints : tuple of float
-        Normalised arc lengths at which the curvature jumps.
-    """
-
-    z: float
+    z: float  #: Axial position, m.
+    #: Positions (k, 2) in x and y, m, at normalised arc lengths s (k,) in 0 (centre) .. 1 (side edge); from -1, the
+    #: other side edge, on where the section is that of a whole lip.
     points: Callable[[np.ndarray], np.ndarray]
-    length: float = np.nan
-    joints: tuple[float, ...] = ()
+    length: float = np.nan  #: Arc length, m.
+    joints: tuple[float, ...] = ()  #: Normalised arc lengths at which the curvature jumps.
 
 
 def both_sides(profile: Profile, middle: float = 0.0) -> Profile:
@@ -183,11 +172,7 @@ _PIECES, _BEYOND = 240, 1e-3
 
 def check_profiles(profiles: Sequence[Profile], part: Part = QUARTER) -> None:
     """Refuse sections through key points that cross themselves, or that run beyond a plane of symmetry between them.
-
-    Raises
-    ------
-    ValueError
-        In one sentence.
+    Raises ValueError in one sentence.
     """
     for number, profile in enumerate(profiles, 1):
         points = profile.points(np.linspace(part.begin, 1.0, _PIECES * part.quarters + 1))

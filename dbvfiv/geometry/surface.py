@@ -17,21 +17,11 @@ from .sections import Profile, both_sides, check_profiles, key_point_sections, l
 
 @dataclass(frozen=True)
 class Surface:
-    """Profiles joined one to the next at equal normalised arc length.
+    """Profiles joined one to the next at equal normalised arc length."""
 
-    Attributes
-    ----------
-    profiles : tuple of Profile
-        From lip to flange.
-    smooth : bool
-        Blend that leaves and meets the profiles with zero slope instead of straight rulings.
-    part : Part
-        Of the valve, whose sections the profiles are.
-    """
-
-    profiles: tuple[Profile, ...]
-    smooth: bool = False
-    part: Part = QUARTER
+    profiles: tuple[Profile, ...]  #: From lip to flange.
+    smooth: bool = False  #: Blend that leaves and meets the profiles with zero slope instead of straight rulings.
+    part: Part = QUARTER  #: Of the valve, whose sections the profiles are.
 
     @property
     def breaks(self) -> np.ndarray:
@@ -39,12 +29,8 @@ class Surface:
         return np.array([profile.z for profile in self.profiles])
 
     def section(self, z: float, s: np.ndarray) -> np.ndarray:
-        """Points (k, 3) of the section at the axial position z, at normalised arc lengths s (k,).
-
-        Raises
-        ------
-        ValueError
-            If two profiles lie at one place.
+        """Points (k, 3) of the section at the axial position z, at normalised arc lengths s (k,). Raises ValueError if
+        two profiles lie at one place.
         """
         xy = self._through(z, s)
         return np.column_stack([xy, np.full(len(xy), z)])
@@ -115,13 +101,8 @@ class SmoothSurface(Surface):
 
 
 def surface_of(valve: Valve, part: Part = QUARTER) -> Surface:
-    """Surface of a part of a valve: from its key points if it has any, else lip, saddle, cuff, flare and flange
-    (App. A).
-
-    Raises
-    ------
-    ValueError
-        If a section through key points crosses itself.
+    """Surface of a part of a valve: from its key points if it has any, else lip, saddle, cuff, flare and flange (App.
+    A). Raises ValueError if a section through key points crosses itself.
     """
     if valve.key_points is not None:
         given = read_key_points(valve.key_points)
@@ -152,7 +133,8 @@ def surface_of(valve: Valve, part: Part = QUARTER) -> Surface:
 
 
 def key_point_table(valve: Valve, points: int = 17, extra: int = 0) -> str:
-    """Table of key points that gives a valve's shape back.
+    """Table of key points that gives a valve's shape back. Raises CaseError if the valve has key points already, or a
+    smooth saddle meets a flare without a cuff between.
 
     Parameters
     ----------
@@ -168,11 +150,6 @@ def key_point_table(valve: Valve, points: int = 17, extra: int = 0) -> str:
     str
         As `dbvfiv.case.key_points.read_key_points` takes it. With a smooth saddle `valve.key_point_skin` must be
         "smooth" too.
-
-    Raises
-    ------
-    CaseError
-        If the valve has key points already, or a smooth saddle meets a flare without a cuff between.
     """
     valve = valve.as_given
     if valve.key_points is not None:

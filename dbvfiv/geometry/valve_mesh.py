@@ -23,57 +23,34 @@ from .surface import Surface, surface_of
 @shortly
 @dataclass(frozen=True)
 class ValveMesh:
-    """Nodes on rows of constant z, from the lip (row 0) to the flange (last row).
+    """Nodes on rows of constant z, from the lip (row 0) to the flange (last row)."""
 
-    Attributes
-    ----------
-    nodes : (nn, 3) array, m
-    quads : (ne, 4) int array
-        Oriented so that the normal points out of the valve.
-    rows : (rows, columns) int array
-        Node numbers; column 0 on x = 0, of a half on y = 0, the last column on y = 0.
-    columns : (columns,) array
-        Position of the columns in the parameter of the grading, 0 at the centre, 1 at the side edge; negative on the
-        other side of the centre.
-    z : (rows,) array, m
-    thickness : (ne,) array, m
-    element_z : (ne,) array, m
-        Axial position of the element centres.
-    element_columns : (ne, 2) array
-        Distance in that parameter of the two sides of each element from the centre, the nearer one first.
-    rest_area : (rows,) array, m2
-        Area between mid-surface and symmetry planes at rest, of the surface itself, not of the polygon through the
-        nodes.
-    wall_deduction : (rows,) array, m2
-        Area taken by the wall (Th. 4.12-4.14), less the initial gap.
-    lip_gap : float, m2
-        Area at the lip that lips in touch leave: the passage at rest, or what the initial gap is of it where they stand
-        apart there.
-    perimeter : (rows,) array, m
-        Arc of the inner face. A face inside a section of length L that turns by a right angle and takes the area T off
-        it has the length (L^2 - pi T)^(1/2) (Steiner);
-        where it turns by two, (L^2 - 2 pi T)^(1/2).
-    missed_rows, missed_columns : arrays
-        Breaks, in m and in the parameter of the grading, inside elements because there are too few of them.
-    part : Part
-        Of the valve, that is meshed.
-    """
-
-    nodes: np.ndarray
-    quads: np.ndarray
-    rows: np.ndarray
+    nodes: np.ndarray  #: (nn, 3), m.
+    quads: np.ndarray  #: (ne, 4); oriented so that the normal points out of the valve.
+    rows: np.ndarray  #: (rows, columns); node numbers; column 0 on x = 0, of a half on y = 0, the last column on y = 0.
+    #: (columns,); position of the columns in the parameter of the grading, 0 at the centre, 1 at the side edge;
+    #: negative on the other side of the centre.
     columns: np.ndarray
-    z: np.ndarray
-    thickness: np.ndarray
-    element_z: np.ndarray
+    z: np.ndarray  #: (rows,), m.
+    thickness: np.ndarray  #: (ne,), m.
+    element_z: np.ndarray  #: (ne,), m; axial position of the element centres.
+    #: (ne, 2); distance in that parameter of the two sides of each element from the centre, the nearer one first.
     element_columns: np.ndarray
+    #: (rows,), m2; area between mid-surface and symmetry planes at rest, of the surface itself, not of the polygon
+    #: through the nodes.
     rest_area: np.ndarray
-    wall_deduction: np.ndarray
+    wall_deduction: np.ndarray  #: (rows,), m2; area taken by the wall (Th. 4.12-4.14), less the initial gap.
+    #: m2; area at the lip that lips in touch leave: the passage at rest, or what the initial gap is of it where they
+    #: stand apart there.
     lip_gap: float
+    #: (rows,), m; arc of the inner face. A face inside a section of length L that turns by a right angle and takes the
+    #: area T off it has the length (L^2 - pi T)^(1/2) (Steiner); where it turns by two, (L^2 - 2 pi T)^(1/2).
     perimeter: np.ndarray
+    #: missed_rows and missed_columns: breaks, in m and in the parameter of the grading, inside elements because there
+    #: are too few of them.
     missed_rows: np.ndarray
     missed_columns: np.ndarray
-    part: Part = QUARTER
+    part: Part = QUARTER  #: Of the valve, that is meshed.
 
     @property
     def centre_line(self) -> np.ndarray:
@@ -106,7 +83,8 @@ class ValveMesh:
 
 
 def valve_mesh(valve: Valve, mesh: Mesh, column_breaks=(), parts: Sequence[Extent] = ()) -> ValveMesh:
-    """Mesh a valve.
+    """Mesh a valve. Raises ValueError if the mesh has fewer elements along than the surface has pieces. Raises
+    CaseError if the wall leaves no flow area in a section.
 
     Parameters
     ----------
@@ -114,13 +92,6 @@ def valve_mesh(valve: Valve, mesh: Mesh, column_breaks=(), parts: Sequence[Exten
         Where load or supports change along the section, in the parameter of the grading.
     parts : sequence of Extent
         Parts of the wall, beside its patches, that rows and columns should end at.
-
-    Raises
-    ------
-    ValueError
-        If the mesh has fewer elements along than the surface has pieces.
-    CaseError
-        If the wall leaves no flow area in a section.
     """
     part = part_of(valve, mesh)
     surface = surface_of(valve, part)
@@ -204,12 +175,8 @@ _FINE = 1000
 def wall_deduction(valve: Valve, z: np.ndarray, surface: Surface) -> np.ndarray:
     """Part of the section taken by the wall (Th. 4.12-4.14, App. A): constant on cuff, flange and an even duckbill,
     linear over a ruled saddle and flare; over smooth ones it grows as their sections do, which gain nothing at first.
-
-    Raises
-    ------
-    ValueError
-        If the wall fills the section of the lip or of the flange that key points give, if these leave a wider passage
-        at the lip than at the flange, or if patches fill a section.
+    Raises ValueError if the wall fills the section of the lip or of the flange that key points give, if these leave a
+    wider passage at the lip than at the flange, or if patches fill a section.
     """
     place, joint = np.asarray(z, float), valve.duckbill_length
     share = _grown(surface, place, joint, valve.saddle_length)

@@ -59,20 +59,13 @@ OGDEN_FOCI, OGDEN_SPREAD = 0.5, 6.0
 
 
 class PlaneStressInvariants(NamedTuple):
-    """Invariants of C for an incompressible sheet with S33 = 0.
+    """Invariants of C for an incompressible sheet with S33 = 0."""
 
-    Attributes
-    ----------
-    i1_minus_3, i2_minus_3, i2_minus_i1 : scalars
-        Each computed without cancellation.
-    in_plane_determinant : scalar
-        det C2, the squared ratio of deformed to reference area; must be positive.
-    """
-
+    #: i1_minus_3, i2_minus_3 and i2_minus_i1: each computed without cancellation.
     i1_minus_3: object
     i2_minus_3: object
     i2_minus_i1: object
-    in_plane_determinant: object
+    in_plane_determinant: object  #: det C2, the squared ratio of deformed to reference area; must be positive.
 
 
 def plane_stress_invariants(e) -> PlaneStressInvariants:

@@ -50,22 +50,13 @@ _WIDTH = 2.5631
 
 @dataclass(frozen=True)
 class CrackGrowth:
-    """Constants of a rubber: numbers, or arrays (n, 1) of samples.
+    """Constants of a rubber: numbers, or arrays (n, 1) of samples."""
 
-    Attributes
-    ----------
-    rate : B, m/cycle at T = 1 kJ/m2
-    exponent : F
-    threshold : T_0, J/m2
-    crystallisation : k, 0 of a rubber that does not crystallise
-    precursor : c_0, m
-    """
-
-    rate: Any
+    rate: Any  #: m/cycle at T = 1 kJ/m2.
     exponent: Any
-    threshold: Any
-    crystallisation: Any
-    precursor: Any
+    threshold: Any  #: J/m2.
+    crystallisation: Any  #: 0 of a rubber that does not crystallise.
+    precursor: Any  #: m.
 
     @classmethod
     def middle(cls, spread: Mapping[str, Sequence[float]]) -> CrackGrowth:

@@ -38,29 +38,18 @@ def require_positive(law: str, **constants: float) -> None:
 
 
 class Law:
-    """A plane-stress material law.
+    """A plane-stress material law."""
 
-    Attributes
-    ----------
-    kind : int
-        ``LINEAR_ELASTIC`` (0) or ``MOONEY_RIVLIN`` (1, with Yeoh's terms, a knee and Ogden's terms); a class constant.
-    title : str
-        What messages call it; a class constant.
-    density : float
-        Reference density, kg/m3.
-    parameters : numpy.ndarray, shape (8,), or (8 + 2 n,) of a rubber with n terms of Ogden's; float64
-        See `dbvfiv.materials.energy.linear_elastic_energy` and `rubber_energy`.
-    small_strain_shear_modulus : float
-        In-plane shear modulus (12) in the reference state, Pa.
-    """
-
+    #: ``LINEAR_ELASTIC`` (0) or ``MOONEY_RIVLIN`` (1, with Yeoh's terms, a knee and Ogden's terms); a class constant.
     kind: ClassVar[int]
-    title: ClassVar[str]
+    title: ClassVar[str]  #: What messages call it; a class constant.
     #: Names of the constants that are moduli.
     moduli: ClassVar[tuple[str, ...]]
-    density: float
+    density: float  #: Reference density, kg/m3.
+    #: (8,), or (8 + 2 n,) of a rubber with n terms of Ogden's; float64; see
+    #: `dbvfiv.materials.energy.linear_elastic_energy` and `rubber_energy`.
     parameters: np.ndarray
-    small_strain_shear_modulus: float
+    small_strain_shear_modulus: float  #: In-plane shear modulus (12) in the reference state, Pa.
 
     def energy(self, e):
         """Strain energy per reference volume, J/m3, of ``e = [E11, E22, 2 E12, 2 E13, 2 E23]``."""
@@ -101,16 +90,12 @@ class Rubber(Law):
 
 @dataclass(frozen=True)
 class MooneyRivlin(Rubber):
-    """Mooney-Rivlin rubber: W = c10 (I1 - 3) + c01 (I2 - 3) + c11 (I1 - 3)(I2 - 3) (Th. 3.1, 3.2).
+    """Mooney-Rivlin rubber: W = c10 (I1 - 3) + c01 (I2 - 3) + c11 (I1 - 3)(I2 - 3) (Th. 3.1, 3.2). Raises MaterialError
+    for a constant that is not finite, a density that is not positive, or c10 + c01 <= 0.
 
     The third constant multiplies the product of both invariants; it is not the C20 (I1 - 3)^2 of other
     three-parameter forms. Single constants, Pa, may be negative, as in the fits of Th. Table 3-3, but the small-strain
     shear modulus 2 (c10 + c01) must be positive.
-
-    Raises
-    ------
-    MaterialError
-        For a constant that is not finite, a density that is not positive, or c10 + c01 <= 0.
     """
 
     title = "Mooney-Rivlin rubber"
@@ -143,14 +128,10 @@ class MooneyRivlin(Rubber):
 
 @dataclass(frozen=True)
 class Yeoh(Rubber):
-    """Yeoh rubber: W = c10 x + c20 x^2 + c30 x^3, x = I1 - 3 (Yeoh 1993, Rubber Chem. Technol. 66, 754).
+    """Yeoh rubber: W = c10 x + c20 x^2 + c30 x^3, x = I1 - 3 (Yeoh 1993, Rubber Chem. Technol. 66, 754). Raises
+    MaterialError for a constant that is not finite, a density or c10 that is not positive.
 
     Constants in Pa.
-
-    Raises
-    ------
-    MaterialError
-        For a constant that is not finite, a density or c10 that is not positive.
     """
 
     title = "Yeoh rubber"
@@ -171,7 +152,8 @@ class Yeoh(Rubber):
 
 @dataclass(frozen=True)
 class SofteningRubber(Rubber):
-    """Rubber that softens at small strain and stiffens at large ones, by the first invariant x = I1 - 3 alone.
+    """Rubber that softens at small strain and stiffens at large ones, by the first invariant x = I1 - 3 alone. Raises
+    MaterialError for a constant out of range.
 
         W = 1/2 [mu_inf x + 2 mu_0 x_0 (sqrt(1 + x/x_0) - 1) + c x^2/2 + c_3 x^3/3]
 
@@ -192,11 +174,6 @@ class SofteningRubber(Rubber):
         Reference density, kg/m3.
     c_3 : float
         Stiffening that grows with the square of x, Pa; not negative.
-
-    Raises
-    ------
-    MaterialError
-        For a constant out of range.
 
     Examples
     --------
@@ -232,14 +209,10 @@ class SofteningRubber(Rubber):
 @dataclass(frozen=True)
 class Ogden(Rubber):
     """Ogden rubber: W = sum mu_p/alpha_p (l1^alpha_p + l2^alpha_p + l3^alpha_p - 3) with the principal stretches l.
+    Raises MaterialError for unequal numbers of moduli and exponents, a constant that is not finite, an exponent of 0,
+    or a shear modulus at small strain that is not positive.
 
     As many moduli mu_p, Pa, single ones of which may be negative, as exponents alpha_p, none of them 0.
-
-    Raises
-    ------
-    MaterialError
-        For unequal numbers of moduli and exponents, a constant that is not finite, an exponent of 0, or a shear modulus
-        at small strain that is not positive.
 
     Examples
     --------
@@ -278,17 +251,12 @@ class Ogden(Rubber):
 
 @dataclass(frozen=True)
 class IsotropicElastic(Law):
-    """Isotropic linear elastic (St Venant-Kirchhoff) sheet.
+    """Isotropic linear elastic (St Venant-Kirchhoff) sheet. Raises MaterialError for a constant outside these bounds.
 
         W = E/(2 (1 - nu^2)) (e1^2 + e2^2 + 2 nu e1 e2) + G/2 (e3^2 + e4^2 + e5^2),  G = E/(2 (1 + nu))
 
     Young's modulus in Pa, greater than zero; Poisson's ratio greater than -1, at most 0.5 (plane stress allows the
     incompressible limit).
-
-    Raises
-    ------
-    MaterialError
-        For a constant outside these bounds.
     """
 
     kind = LINEAR_ELASTIC
@@ -322,19 +290,14 @@ class IsotropicElastic(Law):
 
 @dataclass(frozen=True)
 class OrthotropicPly(Law):
-    """Unidirectional ply (orthotropic St Venant-Kirchhoff sheet), axis 1 along the fibre.
+    """Unidirectional ply (orthotropic St Venant-Kirchhoff sheet), axis 1 along the fibre. Raises MaterialError for a
+    modulus or density that is not positive, or a Poisson ratio that makes the plane-stress stiffness indefinite.
 
         W = (Q11 e1^2 + 2 Q12 e1 e2 + Q22 e2^2 + G12 e3^2 + G13 e4^2 + G23 e5^2) / 2
         Q11 = E1/k,  Q22 = E2/k,  Q12 = nu12 E2/k,  k = 1 - nu12^2 E2/E1
 
     Young's moduli along and across the fibre and shear moduli in Pa; nu12 is the contraction across the fibre for
     tension along it, and its square must be less than e1/e2.
-
-    Raises
-    ------
-    MaterialError
-        For a modulus or density that is not positive, or a Poisson ratio that makes the plane-stress stiffness
-        indefinite.
     """
 
     kind = LINEAR_ELASTIC
@@ -390,19 +353,15 @@ def ply_from_constituents(
     xi: float = 120000.0,
     density: float = 1270.0,
 ) -> OrthotropicPly:
-    """Unidirectional ply from its isotropic constituents by Halpin-Tsai; the defaults are App. A's.
+    """Unidirectional ply from its isotropic constituents by Halpin-Tsai; the defaults are App. A's. Raises
+    MaterialError for a fraction that is not between 0 and 1, a modulus or density that is not positive, or a Poisson
+    ratio that is not greater than 0 and at most 0.5.
 
     ``e1`` uses `xi`, 2 (length/thickness) of the fibre, ``e2`` 0, ``g12`` and ``nu12`` 2, ``g13`` = ``g23`` 0. That is
     how App. A's program has it (5.57 MPa in the plane of the ply, 2.94 MPa across it), while Th. Table 3-5 prints 2.94
     MPa for xy and xz and 5.57 MPa for yz, exchanges the Poisson ratios (0.282 with xi = 2, 0.269 with xi = 0) in the
     same way, and has 1558 MPa along the fibre, 0.3 % above the program's 1553.8. Which of the two the published results
     were computed with is not said.
-
-    Raises
-    ------
-    MaterialError
-        For a fraction that is not between 0 and 1, a modulus or density that is not positive, or a Poisson ratio that
-        is not greater than 0 and at most 0.5.
     """
     name = "Halpin-Tsai ply"
     require_positive(name, fibre_modulus=fibre_modulus, matrix_modulus=matrix_modulus)
@@ -432,11 +391,7 @@ def ply_from_constituents(
 
 def fibre_ply(constants: str = "program") -> OrthotropicPly:
     """The reference valve's fibre ply: "program", App. A's constituents, or "table", the constants of Th. Table 3-5.
-
-    Raises
-    ------
-    MaterialError
-        For any other word.
+    Raises MaterialError for any other word.
     """
     if constants == "program":
         return ply_from_constituents()

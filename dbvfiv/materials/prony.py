@@ -81,7 +81,8 @@ def fit_loss(frequency, wanted, times, weights, level: bool = False) -> np.ndarr
 
 @dataclass(frozen=True)
 class Prony:
-    r"""Generalised Maxwell branches beside the slow law.
+    r"""Generalised Maxwell branches beside the slow law. Raises MaterialError if the numbers of both differ, or one of
+    them is out of range; a negative strength would give energy away.
 
     Stress :math:`S = S_e(E) + \sum_j h_j` with :math:`\dot h_j + h_j/\tau_j = g_j \dot S_e` (quasi-linear
     viscoelasticity). Small motions see the tangent of the slow law times
@@ -93,11 +94,6 @@ class Prony:
         g_j, over the slow modulus; not negative.
     times : tuple of float
         tau_j, s; positive.
-
-    Raises
-    ------
-    MaterialError
-        If the numbers of both differ, or one of them is out of range; a negative strength would give energy away.
 
     Examples
     --------
@@ -117,10 +113,7 @@ class Prony:
                 f"A Prony series has as many times as strengths; {len(strengths)} strengths and "
                 f"{len(times)} times were given."
             )
-        for name, values, fits in (
-            ("strength", strengths, lambda x: x >= 0),
-            ("time", times, lambda x: x > 0),
-        ):
+        for name, values, fits in (("strength", strengths, lambda x: x >= 0), ("time", times, lambda x: x > 0)):
             for value in values:
                 if not (np.isfinite(value) and fits(value)):
                     raise MaterialError(
@@ -147,14 +140,11 @@ class Prony:
 
     def scaled(self, factor: float) -> Prony:
         """The series whose loss factor is `factor` times this one's, at the same times; 0 gives an elastic material.
+        Raises MaterialError if the factor is negative or not finite, or no series with these times comes near such a
+        loss factor.
 
         Least squares on tan delta over the frequencies of the branches, with strengths that stay positive; the storage
         modulus follows from it, as causality demands.
-
-        Raises
-        ------
-        MaterialError
-            If the factor is negative or not finite, or no series with these times comes near such a loss factor.
         """
         if not (np.isfinite(factor) and factor >= 0):
             raise MaterialError(f"A loss factor was to be multiplied by {factor:g}; the factor must not be negative.")
@@ -186,19 +176,11 @@ def _scaled(prony: Prony, factor: float) -> Prony:
 @shortly
 @dataclass(frozen=True)
 class PronyFit:
-    """A series and how well it meets what it was fitted to.
-
-    Attributes
-    ----------
-    prony : Prony
-    quantity : str
-        What was fitted: "tan delta", "moduli" or "relaxing modulus".
-    error : numpy.ndarray, shape (n,)
-        Fitted over wanted, less one: of tan delta, of storage and then loss modulus, or of the relaxing modulus.
-    """
+    """A series and how well it meets what it was fitted to."""
 
     prony: Prony
-    quantity: str
+    quantity: str  #: What was fitted: "tan delta", "moduli" or "relaxing modulus".
+    #: (n,); fitted over wanted, less one: of tan delta, of storage and then loss modulus, or of the relaxing modulus.
     error: np.ndarray
 
     @property
@@ -230,7 +212,8 @@ def relaxation_times(band: tuple[float, float], branches: int) -> np.ndarray:
 
 
 def fit_constant(loss_factor: float, band: tuple[float, float], branches: int) -> PronyFit:
-    """A series whose loss factor is the same over a band, with the largest relative error as small as it gets.
+    """A series whose loss factor is the same over a band, with the largest relative error as small as it gets. Raises
+    MaterialError for a loss factor or a band out of range.
 
     Parameters
     ----------
@@ -238,12 +221,6 @@ def fit_constant(loss_factor: float, band: tuple[float, float], branches: int) -
         tan delta, 0 (elastic) to 2.
     band : tuple of float
         Lowest and highest frequency, Hz.
-    branches : int
-
-    Raises
-    ------
-    MaterialError
-        For a loss factor or a band out of range.
 
     Examples
     --------

@@ -41,7 +41,8 @@ def strain_levels() -> tuple[float, ...]:
 
 
 def rubber(name: str, strain_level: float = 0.10, *, density: float | None = None) -> SofteningRubber:
-    """A shipped rubber at a strain level, by constants that are stable in every state.
+    """A shipped rubber at a strain level, by constants that are stable in every state. Raises MaterialError for an
+    unknown name or a level outside the tested ones.
 
     Parameters
     ----------
@@ -51,11 +52,6 @@ def rubber(name: str, strain_level: float = 0.10, *, density: float | None = Non
         Engineering strain up to which the constants are meant, as a fraction, 0.10 to 0.60.
     density : float, optional
         kg/m3; the shipped 1300 if not given.
-
-    Raises
-    ------
-    MaterialError
-        For an unknown name or a level outside the tested ones.
 
     Examples
     --------
@@ -69,17 +65,13 @@ def rubber(name: str, strain_level: float = 0.10, *, density: float | None = Non
 def published_rubber(
     name: str, strain_level: float = 0.10, *, terms: int = 3, density: float | None = None
 ) -> MooneyRivlin:
-    """A shipped rubber at a strain level, by the published constants; arguments as `rubber` has them.
+    """A shipped rubber at a strain level, by the published constants; arguments as `rubber` has them. Raises
+    MaterialError for an unknown name, a level outside the tested ones or another number of terms.
 
     Parameters
     ----------
     terms : int
         3 for the constants of App. A, 2 for the two-constant fit of Table 3-3.
-
-    Raises
-    ------
-    MaterialError
-        For an unknown name, a level outside the tested ones or another number of terms.
 
     Examples
     --------

@@ -184,11 +184,11 @@ def hill_margin(law: Law, log_stretches) -> np.ndarray:
 
 
 def stability_margin(law: Law, strains, instantaneous: float = 1.0) -> np.ndarray:
-    """Share of its initial stiffness that a material keeps in its weakest direction, slow or instantaneous.
+    """Share of its initial stiffness that a material keeps in its weakest direction, slow or instantaneous. Raises
+    MaterialError for strains whose last axis is not of length five, or an instantaneous modulus below the slow one.
 
     Parameters
     ----------
-    law : Law
     strains : array_like, shape (..., 5)
         Green-Lagrange strains ``[E11, E22, 2 E12, 2 E13, 2 E23]`` as they occur in a solution.
     instantaneous : float
@@ -201,11 +201,6 @@ def stability_margin(law: Law, strains, instantaneous: float = 1.0) -> np.ndarra
         The lesser of both criteria (see the module): 1 at rest, 0 at the limit of stability, negative beyond; ``-inf``
         where the strain is impossible for a sheet (det C2 <= 0) or not finite. 1 for the linear laws; the softening of
         St Venant-Kirchhoff materials in strong compression is not looked at.
-
-    Raises
-    ------
-    MaterialError
-        For strains whose last axis is not of length five, or an instantaneous modulus below the slow one.
     """
     e = np.asarray(strains, dtype=float)
     if e.ndim == 0 or e.shape[-1] != 5:
@@ -251,21 +246,15 @@ def _stress_moduli(ln, stress, normal) -> np.ndarray:
 
 @dataclass(frozen=True)
 class StableRange:
-    """Stretches between which a rubber is stable, along paths from rest.
+    """Stretches between which a rubber is stable, along paths from rest."""
 
-    Attributes
-    ----------
-    uniaxial, equibiaxial, pure_shear : tuple of float
-        Lowest and highest stretch; 0 and ``inf`` where no limit was found within a logarithmic
-        strain of ln 10.
-    equivalent_strain : float
-        Radius of the largest ball of stable states, sqrt(2/3) |ln U| (the logarithmic strain of
-        uniaxial tension); ``inf`` if no limit was found.
-    """
-
+    #: uniaxial, equibiaxial and pure_shear: lowest and highest stretch; 0 and ``inf`` where no limit was found within a
+    #: logarithmic strain of ln 10.
     uniaxial: tuple[float, float]
     equibiaxial: tuple[float, float]
     pure_shear: tuple[float, float]
+    #: Radius of the largest ball of stable states, sqrt(2/3) |ln U| (the logarithmic strain of uniaxial tension);
+    #: ``inf`` if no limit was found.
     equivalent_strain: float
 
 

@@ -28,16 +28,10 @@ class LinearisedClass(LinearisedState):
 
     `forces` and `slope` belong to the displacements of the sections' centroids along the axis of sway, not to areas;
     they are empty for a twist.
-
-    Attributes
-    ----------
-    symmetry : Symmetry
-    shell : Shell
-        With the unknowns of the class, counted from the state.
     """
 
     symmetry: Symmetry = None
-    shell: Shell = None
+    shell: Shell = None  #: With the unknowns of the class, counted from the state.
 
     @cached_property
     def relaxing(self) -> tuple[sp.csr_matrix, ...]:

@@ -30,23 +30,12 @@ FIRST_SHARE = 20
 
 @dataclass(frozen=True)
 class Passage:
-    """Passage between the inner faces, of the part that is computed, by mesh row from the lip.
+    """Passage between the inner faces, of the part that is computed, by mesh row from the lip."""
 
-    Attributes
-    ----------
-    z : (rows,) array, m
-    area : (rows,) array, m2
-        Between inner face and closing plane; overlapping faces count as shut.
-    reference : float, m2
-        Area at the lip at rest, or of lips that stand apart there what their gap is of it.
-    shut_fraction : float
-        A section is shut where less than this share of the reference is left.
-    """
-
-    z: np.ndarray
-    area: np.ndarray
-    reference: float
-    shut_fraction: float
+    z: np.ndarray  #: (rows,), m.
+    area: np.ndarray  #: (rows,), m2; between inner face and closing plane; overlapping faces count as shut.
+    reference: float  #: m2; area at the lip at rest, or of lips that stand apart there what their gap is of it.
+    shut_fraction: float  #: A section is shut where less than this share of the reference is left.
 
     @property
     def left(self) -> float:
@@ -197,12 +186,7 @@ def load_steps(model: ClosedValve) -> LoadStepOptions:
 
 def close_valve(case: Case, pressure: float) -> tuple[ClosedValve, np.ndarray]:
     """Valve under a back pressure, Pa, and its displacements (n,), from rest; past limit points by arclength where
-    closure.arclength is true.
-
-    Raises
-    ------
-    SolveError
-        If they are not reached.
+    closure.arclength is true. Raises SolveError if they are not reached.
     """
     model = ClosedValve(case)
     steps = LoadSteps(model, load_steps(model))

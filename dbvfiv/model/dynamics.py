@@ -28,37 +28,21 @@ from .valve import ValveModel
 
 @dataclass(frozen=True)
 class LinearisedState:
-    """Matrices of a steady state that do not depend on fluid density, damping or continuity law.
-
-    Attributes
-    ----------
-    model : ValveModel
-    q : (n,) array
-    inlet : float
-        Inlet pressure, Pa.
-    mass, structure, stiffness : (n, n) sparse matrices
-        M, the structure's own tangent K_s, and K = K_s, with contact of inner faces, less the follower stiffness of
-        the pressures.
-    forces : (n, m) sparse matrix G
-    slope : (m, n) sparse matrix J
-    area : (m,) array, m2
-    added : AddedMass or None
-        Of the fluid outside, at unit density; None where there is none.
-    inner : (l,) array or None
-        Unknowns of a flow that is not that of an equilibrium.
-    """
+    """Matrices of a steady state that do not depend on fluid density, damping or continuity law."""
 
     model: ValveModel
-    q: np.ndarray
-    inlet: float
+    q: np.ndarray  #: (n,).
+    inlet: float  #: Inlet pressure, Pa.
+    #: mass, structure and stiffness: (n, n) sparse matrices; M, the structure's own tangent K_s, and K = K_s, with
+    #: contact of inner faces, less the follower stiffness of the pressures.
     mass: object
     structure: object
     stiffness: object
-    forces: object
-    slope: object
-    area: np.ndarray
-    added: AddedMass | None = None
-    inner: np.ndarray | None = None
+    forces: object  #: (n, m) sparse matrix G.
+    slope: object  #: (m, n) sparse matrix J.
+    area: np.ndarray  #: (m,), m2.
+    added: AddedMass | None = None  #: Of the fluid outside, at unit density; None where there is none.
+    inner: np.ndarray | None = None  #: (l,) or None; unknowns of a flow that is not that of an equilibrium.
     _damped: dict = field(default_factory=dict, repr=False, compare=False)
 
     @cached_property
@@ -136,12 +120,7 @@ class LinearisedState:
         return self._damped[key]
 
     def check_pump(self) -> None:
-        """Refuse a state whose flow the pump's table does not hold.
-
-        Raises
-        ------
-        SolveError
-        """
+        """Refuse a state whose flow the pump's table does not hold. Raises SolveError."""
         pump = self.model.pump
         if pump is None:
             return
@@ -217,7 +196,6 @@ def linearise(
 
     Parameters
     ----------
-    model : ValveModel
     q : (n,) array
     inlet : float
         Inlet pressure, Pa.

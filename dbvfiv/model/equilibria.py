@@ -53,13 +53,8 @@ class LoadPath(LoadSteps):
         super().__post_init__()
 
     def go_to(self, target: float) -> SteadyState:
-        """Equilibrium at a pressure, Pa.
-
-        Raises
-        ------
-        SolveError
-            If the load steps became smaller than allowed; `self.pressure` and `self.q` then hold the last equilibrium.
-            If the pressure downstream is not overcome.
+        """Equilibrium at a pressure, Pa. Raises SolveError if the load steps became smaller than allowed;
+        `self.pressure` and `self.q` then hold the last equilibrium. If the pressure downstream is not overcome.
         """
         self._check_drive(target)
         try:
@@ -72,12 +67,7 @@ class LoadPath(LoadSteps):
         return self._described(way)
 
     def settled(self) -> SteadyState:
-        """Equilibrium at the present pressure, found from displacements next to it.
-
-        Raises
-        ------
-        SolveError
-        """
+        """Equilibrium at the present pressure, found from displacements next to it. Raises SolveError."""
         result = self.settle()
         return self._described(LoadStepResult(result.iterations, 0, result))
 
@@ -163,13 +153,7 @@ class LoadPath(LoadSteps):
 
 
 def find_equilibrium(model: ValveModel, pressure: float, observer: Observer | None = None) -> SteadyState:
-    """Equilibrium at one inlet pressure, Pa, by load steps from rest.
-
-    Raises
-    ------
-    SolveError
-        If it is not reached.
-    """
+    """Equilibrium at one inlet pressure, Pa, by load steps from rest. Raises SolveError if it is not reached."""
     observer = Observer() if observer is None else observer
     state = LoadPath(model, SteadyOptions.of(model.case), observer=observer).go_to(pressure)
     for sentence in state_warnings(model, [state]):
@@ -184,12 +168,8 @@ def redescribe(model: ValveModel, state: SteadyState) -> SteadyState:
 
 
 def rest_state(model: ValveModel) -> SteadyState:
-    """The valve at rest without pressure difference, as a state; with gravity it hangs, the fluid in it still.
-
-    Raises
-    ------
-    SolveError
-        If a valve that hangs has no equilibrium.
+    """The valve at rest without pressure difference, as a state; with gravity it hangs, the fluid in it still. Raises
+    SolveError if a valve that hangs has no equilibrium.
     """
     if model.weight is not None:
         return LoadPath(model, SteadyOptions.of(model.case)).go_to(model.flow.back)
@@ -207,12 +187,7 @@ def rest_state(model: ValveModel) -> SteadyState:
 
 
 def require_equilibrium(model: ValveModel, state: SteadyState) -> None:
-    """Refuse a state that is no equilibrium of a model.
-
-    Raises
-    ------
-    SolveError
-    """
+    """Refuse a state that is no equilibrium of a model. Raises SolveError."""
     if not state.converged:
         raise SolveError(
             f"The steady state at {state.pressure:.6g} Pa has not converged (residual "
@@ -291,12 +266,8 @@ def first_opening(model: ValveModel, area_ratio: float) -> float | None:
 
 
 def sealing_for_cracking(case: Case, area_ratio: float, observer: Observer | None = None) -> float:
-    """Sealing pressure, Pa, with which the bill of a case cracks at its valve.cracking_head.
-
-    Raises
-    ------
-    SolveError
-        If there is none, or an equilibrium on the way is not found.
+    """Sealing pressure, Pa, with which the bill of a case cracks at its valve.cracking_head. Raises SolveError if there
+    is none, or an equilibrium on the way is not found.
     """
     observer = Observer() if observer is None else observer
     head = case.valve.cracking_head
@@ -341,12 +312,8 @@ _JUMP = 1e-6
 
 
 def operating_pressure(model: ValveModel, observer: Observer | None = None) -> float:
-    """Pressure, Pa, at the far end of the line at which the pump delivers what the valve takes: the lowest one.
-
-    Raises
-    ------
-    SolveError
-        If an equilibrium is not reached on the way, or the curves meet outside of the pump's table.
+    """Pressure, Pa, at the far end of the line at which the pump delivers what the valve takes: the lowest one. Raises
+    SolveError if an equilibrium is not reached on the way, or the curves meet outside of the pump's table.
     """
     observer = Observer() if observer is None else observer
     pump, density = model.pump, model.case.fluid.density

@@ -33,7 +33,6 @@ class ValveForms:
 
     Parameters
     ----------
-    model : ValveModel
     q : (n,) array
         Displacements of the steady state; behind a pump a static lift gives it the pressure of `mu`, as in spectra.
     mu : mapping
@@ -102,7 +101,6 @@ class ValveForms:
         return np.array([group.series.scaled(factor).modulus(s) - 1.0 for group in self.model.relaxation.groups])
 
     # -- forms
-    # ----
 
     def _form(self, *motions: Motion) -> np.ndarray:
         def remainder(*directions):
@@ -148,13 +146,7 @@ class ValveForms:
 
 
 class PencilAt:
-    """T(s) of a coupled pencil as products and solves in (q, U).
-
-    Parameters
-    ----------
-    pencil : CoupledPencil
-    s : complex
-    """
+    """T(s) of a coupled pencil as products and solves in (q, U)."""
 
     def __init__(self, pencil: CoupledPencil, s: complex):
         self.pencil, self.s = pencil, s

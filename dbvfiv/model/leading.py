@@ -34,30 +34,17 @@ class BandOrigin(Enum):
 
 @dataclass(frozen=True)
 class LeadingSearch:
-    """Search for the leading modes under given conditions.
+    """Search for the leading modes under given conditions."""
 
-    Attributes
-    ----------
-    options : SearchOptions
-        For `eigen.leading_modes` and `eigen.certified_spectrum`.
-    origin : BandOrigin
-    frequencies : int
-        Structural frequencies in vacuo that a band of the origin STRUCTURE holds.
-    creeps : bool
-        True for viscoelastic materials, whose relaxation spectrum has to be told from modes.
-    claimed : float, Hz
-        Frequency up to which the search is a verdict on the state: the band, or without one a band that holds as many
-        structural frequencies as modes are wanted. Reduced-order models resolve no modes above it, whatever they count.
-    wanted : float, Hz
-        Frequency up to which modes are wanted; infinite where nothing says so.
-    """
-
-    options: SearchOptions
+    options: SearchOptions  #: For `eigen.leading_modes` and `eigen.certified_spectrum`.
     origin: BandOrigin
-    frequencies: int = 0
-    creeps: bool = False
+    frequencies: int = 0  #: Structural frequencies in vacuo that a band of the origin STRUCTURE holds.
+    creeps: bool = False  #: True for viscoelastic materials, whose relaxation spectrum has to be told from modes.
+    #: Hz; frequency up to which the search is a verdict on the state: the band, or without one a band that holds as
+    #: many structural frequencies as modes are wanted. Reduced-order models resolve no modes above it, whatever they
+    #: count.
     claimed: float = np.inf
-    wanted: float = np.inf
+    wanted: float = np.inf  #: Hz; frequency up to which modes are wanted; infinite where nothing says so.
 
     @property
     def band(self) -> float:

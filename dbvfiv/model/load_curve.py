@@ -161,12 +161,8 @@ class LoadCurve:
         self._solver = EquilibriumSolver(self.model, replace(self.newton, line_search="l2", max_iterations=100))
 
     def reach(self, target: float) -> tuple[NewtonResult, int]:
-        """First equilibrium of the curve at a pressure, Pa, and the number of new points on the way.
-
-        Raises
-        ------
-        SolveError
-            If the curve does not come to it.
+        """First equilibrium of the curve at a pressure, Pa, and the number of new points on the way. Raises SolveError
+        if the curve does not come to it.
         """
         before = 0 if self._branch is None else len(self._branch)
         if target == self._start:
@@ -338,13 +334,8 @@ class LoadCurve:
         return Tracer(problem, options, observers=_Told(self.observer))
 
     def extend(self, target: float) -> None:
-        """Follow the curve on to a pressure, towards which it leaves its start, anew with other steps where it
-        comes back to that.
-
-        Raises
-        ------
-        SolveError
-            If no curve leaves the start.
+        """Follow the curve on to a pressure, towards which it leaves its start, anew with other steps where it comes
+        back to that. Raises SolveError if no curve leaves the start.
         """
         start, back, way = self._start, self.model.flow.back, np.copysign(1.0, target - self._start)
         for angle in dict.fromkeys((self._angle, *_ANGLES)):

@@ -26,31 +26,20 @@ WIDE = 1 / 16
 
 @dataclass(frozen=True)
 class LoadStepOptions:
-    """Options of load steps.
-
-    Attributes
-    ----------
-    newton : NewtonOptions
-    min_step : float
-        Smallest load step over the target pressure before giving up.
-    first_step, max_step : float, Pa
-        Load step from the start, and the largest; without bounds the whole way is tried at once.
-    largest_jump : float, m
-        An equilibrium farther from the prediction than this is taken for one on another path, and the step is halved;
-        so is one whose path from the last one is not resolved, see `ALIKE`.
-    first_jump : float, m
-        The same from where the walk starts, whose slope is not known.
-    straight : int, optional
-        Most iterations of a wide step, which is halved then: those that wander longer may end at another equilibrium,
-        and two halves take fewer. Where the path ends, wide steps may wander.
-    """
+    """Options of load steps."""
 
     newton: NewtonOptions = NewtonOptions()
-    min_step: float = 1e-4
+    min_step: float = 1e-4  #: Smallest load step over the target pressure before giving up.
+    #: first_step and max_step: Pa; load step from the start, and the largest; without bounds the whole way is tried at
+    #: once.
     first_step: float = np.inf
     max_step: float = np.inf
+    #: m; an equilibrium farther from the prediction than this is taken for one on another path, and the step is halved;
+    #: so is one whose path from the last one is not resolved, see `ALIKE`.
     largest_jump: float = np.inf
-    first_jump: float = np.inf
+    first_jump: float = np.inf  #: m; the same from where the walk starts, whose slope is not known.
+    #: Most iterations of a wide step, which is halved then: those that wander longer may end at another equilibrium,
+    #: and two halves take fewer. Where the path ends, wide steps may wander.
     straight: int | None = None
 
 
@@ -97,12 +86,8 @@ class LoadSteps:
         self.step, self.origin = self.options.first_step, self.pressure
 
     def reach(self, target: float) -> LoadStepResult:
-        """Walk to a pressure, Pa; `self.pressure` and `self.q` hold the equilibrium.
-
-        Raises
-        ------
-        SolveError
-            If the load steps became smaller than allowed; `self.pressure` and `self.q` then hold the last equilibrium.
+        """Walk to a pressure, Pa; `self.pressure` and `self.q` hold the equilibrium. Raises SolveError if the load
+        steps became smaller than allowed; `self.pressure` and `self.q` then hold the last equilibrium.
         """
         smallest = self.options.min_step * max(abs(target - self.origin), abs(self.pressure - self.origin))
         step = np.copysign(min(abs(target - self.pressure), self.step, self.options.max_step), target - self.pressure)
@@ -141,12 +126,7 @@ class LoadSteps:
                 )
 
     def settle(self) -> NewtonResult:
-        """Solve again at the present pressure, after something else of the model has changed.
-
-        Raises
-        ------
-        SolveError
-        """
+        """Solve again at the present pressure, after something else of the model has changed. Raises SolveError."""
         for solver in (self.solver, self.fallback):
             result = solver.solve(self.q, self.pressure)
             if result.converged:
@@ -206,7 +186,6 @@ class Loading:
 
     Parameters
     ----------
-    model : ValveModel
     pressure : float
         That belongs to the whole load, Pa.
     """

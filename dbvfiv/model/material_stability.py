@@ -23,31 +23,16 @@ from .valve import ValveModel
 
 @dataclass(frozen=True)
 class MaterialStability:
-    """Worst of all points of rubber in a wall; plies are not judged.
+    """Worst of all points of rubber in a wall; plies are not judged."""
 
-    Attributes
-    ----------
-    pressure : float
-        Of the state, Pa.
-    margin : float
-        Least share of the stiffness at rest that is kept, of the slow and the instantaneous criterion (see
-        `dbvfiv.materials.stability`); 1 for a wall without rubber.
-    material : str
-        Of the layer of that point.
-    place : tuple of float
-        Its mid-surface point before the wall moves: x, y, z, m.
-    share : float
-        Part of the wall's volume whose margin is not positive.
-    stretches : tuple of float
-        Principal stretches there, ascending; NaN where no sheet has such strains.
-    """
-
-    pressure: float
+    pressure: float  #: Of the state, Pa.
+    #: Least share of the stiffness at rest that is kept, of the slow and the instantaneous criterion (see
+    #: `dbvfiv.materials.stability`); 1 for a wall without rubber.
     margin: float
-    material: str
-    place: tuple[float, float, float]
-    share: float
-    stretches: tuple[float, float, float]
+    material: str  #: Of the layer of that point.
+    place: tuple[float, float, float]  #: Its mid-surface point before the wall moves: x, y, z, m.
+    share: float  #: Part of the wall's volume whose margin is not positive.
+    stretches: tuple[float, float, float]  #: Principal stretches there, ascending; NaN where no sheet has such strains.
 
     @property
     def holds(self) -> bool:
@@ -78,7 +63,6 @@ def material_stability(
 
     Parameters
     ----------
-    model : ValveModel
     q : (n,) array
         Its displacements.
     pressure : float
@@ -119,26 +103,13 @@ _BEYOND = 0.03
 
 @dataclass(frozen=True)
 class LayerLevel:
-    """A layer of rubber at one state.
+    """A layer of rubber at one state."""
 
-    Attributes
-    ----------
-    number : int
-        From inside to outside, from 1.
-    material : str
-    level : float
-        Strain level whose constants it has; NaN of rubbers that have no levels.
-    peak : float
-        Strain that `PEAK` of its volume does not reach: the next level.
-    mean : float
-        Mean strain, weighted with the energy stored.
-    """
-
-    number: int
+    number: int  #: From inside to outside, from 1.
     material: str
-    level: float
-    peak: float
-    mean: float
+    level: float  #: Strain level whose constants it has; NaN of rubbers that have no levels.
+    peak: float  #: Strain that `PEAK` of its volume does not reach: the next level.
+    mean: float  #: Mean strain, weighted with the energy stored.
 
 
 def layer_levels(model: ValveModel, q: np.ndarray, levels: Mapping[str, float]) -> Iterator[LayerLevel]:

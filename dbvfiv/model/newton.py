@@ -27,48 +27,27 @@ _REASONS = {
 
 @dataclass(frozen=True)
 class NewtonOptions:
-    """Options of the equilibrium iteration.
+    """Options of the equilibrium iteration."""
 
-    Attributes
-    ----------
-    tolerance : float
-        Largest norm of the residual over that of the pressure forces.
-    max_iterations : int
-    line_search : str
-        A SNES line search. Full steps ("basic") serve shells best: the residual rises before it falls, as membrane
-        forces follow bending, so searches on its norm crawl; load steps catch what diverges.
-    largest_step : float
-        Largest norm of one Newton step over that of the valve's length per root of the node count; guards against wild
-        first steps.
-    """
-
-    tolerance: float = 1e-8
+    tolerance: float = 1e-8  #: Largest norm of the residual over that of the pressure forces.
     max_iterations: int = 30
+    #: A SNES line search. Full steps ("basic") serve shells best: the residual rises before it falls, as membrane
+    #: forces follow bending, so searches on its norm crawl; load steps catch what diverges.
     line_search: str = "basic"
+    #: Largest norm of one Newton step over that of the valve's length per root of the node count; guards against wild
+    #: first steps.
     largest_step: float = 0.1
 
 
 @dataclass(frozen=True)
 class NewtonResult:
-    """Outcome of one equilibrium iteration.
+    """Outcome of one equilibrium iteration."""
 
-    Attributes
-    ----------
-    q : (n,) array
-    converged : bool
-    iterations : int
-    residual : float
-        Norm of the unbalanced force over that of the pressure forces.
-    rounding : float
-        Relative residual that rounding alone leaves; a residual below it counts as zero.
-    reason : str
-    """
-
-    q: np.ndarray
+    q: np.ndarray  #: (n,).
     converged: bool
     iterations: int
-    residual: float
-    rounding: float
+    residual: float  #: Norm of the unbalanced force over that of the pressure forces.
+    rounding: float  #: Relative residual that rounding alone leaves; a residual below it counts as zero.
     reason: str
 
 
@@ -78,7 +57,6 @@ class EquilibriumSolver:
     Parameters
     ----------
     model : ValveModel, PressedShell or alike
-    options : NewtonOptions
     """
 
     def __init__(self, model: Any, options: NewtonOptions = NewtonOptions()):
@@ -143,7 +121,6 @@ class EquilibriumSolver:
         return -self.factor.solve(self.model.pressure_derivative(q, pressure))
 
     # -- what SNES calls
-    # ----
 
     def _evaluate(self, snes, x, f):
         f.setArray(self.model.residual(_real(x), self._pressure))

@@ -63,22 +63,13 @@ AROUND = 0.5
 
 @dataclass(frozen=True)
 class AddedMass:
-    """Added mass of unit density, m3 for displacements.
+    """Added mass of unit density, m3 for displacements."""
 
-    Attributes
-    ----------
-    columns : (n, r) array
-        w_i: the mass is their product with their transpose.
-    slowness : (r + 1,) array
-        mu_i of the motions kept and of the first left out, s2 m3/kg: a massless wall in a fluid of density rho has the
-        frequencies 1/sqrt(rho mu)/(2 pi).
-    motions : (n, r) array, optional
-        x_i, where they are known.
-    """
-
-    columns: np.ndarray
+    columns: np.ndarray  #: (n, r); w_i: the mass is their product with their transpose.
+    #: (r + 1,); mu_i of the motions kept and of the first left out, s2 m3/kg: a massless wall in a fluid of density rho
+    #: has the frequencies 1/sqrt(rho mu)/(2 pi).
     slowness: np.ndarray
-    motions: np.ndarray | None = None
+    motions: np.ndarray | None = None  #: (n, r); x_i, where they are known.
 
     @classmethod
     def of_images(cls, motions: np.ndarray, images: np.ndarray, slowness: np.ndarray) -> AddedMass:
@@ -121,18 +112,8 @@ class AddedMass:
 
 
 class OutsideFluid:
-    """Added mass of the fluid outside a valve.
-
-    Parameters
-    ----------
-    case : Case
-    mesh : ValveMesh
-    shell : Shell
-
-    Raises
-    ------
-    CaseError
-        If the pipe around the valve does not clear its outer face at rest.
+    """Added mass of the fluid outside a valve. Raises CaseError if the pipe around the valve does not clear its outer
+    face at rest.
     """
 
     def __init__(self, case: Case, mesh: ValveMesh, shell: Shell):
@@ -169,13 +150,8 @@ class OutsideFluid:
         )
 
     def panels(self, q: np.ndarray) -> Panels:
-        """Outer faces of the elements at a state, in their order; behind them what closes the end of the tube, and
-        last the opening between the lips where that is open.
-
-        Raises
-        ------
-        SolveError
-            If the wall touches the pipe around it.
+        """Outer faces of the elements at a state, in their order; behind them what closes the end of the tube, and last
+        the opening between the lips where that is open. Raises SolveError if the wall touches the pipe around it.
         """
         points, directors = self.face.points(self.shell.dofs.expand(q))
         sentence = self._check_clearance(points)
@@ -264,7 +240,8 @@ class OutsideFluid:
 
 
 def leading_added_mass(fluxes, impedance, structure, kept: int, workspace: Workspace | None = None) -> AddedMass:
-    """The part of E' S E that slows motions down most, see the module.
+    """The part of E' S E that slows motions down most, see the module. Raises SolveError if the stiffness is far from
+    positive, or the motions are not found.
 
     Parameters
     ----------
@@ -272,12 +249,6 @@ def leading_added_mass(fluxes, impedance, structure, kept: int, workspace: Works
     impedance : (k, k) array or linear operator S
     structure : (n, n) sparse matrix
         Symmetric; where it is not positive it is shifted by a small part of its diagonal.
-    kept : int
-
-    Raises
-    ------
-    SolveError
-        If the stiffness is far from positive, or the motions are not found.
     """
     n = structure.shape[0]
     kept = min(kept, fluxes.shape[0] - 2, n - 2)
@@ -344,7 +315,6 @@ class OutsideForms:
 
     Parameters
     ----------
-    outside : OutsideFluid
     q : (n,) array
         The state.
     structure : (n, n) sparse matrix
@@ -390,7 +360,6 @@ class OutsideForms:
         return self._forces @ force
 
     # -- derivatives of the mass on the motions
-    # ----
 
     def _parts(self, direction: Sequence[np.ndarray]) -> list[np.ndarray]:
         """Coordinates of displacements, velocities and accelerations."""

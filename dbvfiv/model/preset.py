@@ -33,20 +33,12 @@ from .newton import EquilibriumSolver, NewtonOptions
 
 @dataclass(frozen=True)
 class PressedTangent:
-    """Residual and exact linearisation at one state.
+    """Residual and exact linearisation at one state."""
 
-    Attributes
-    ----------
-    residual : (n,) array, N and N m
-    structure : (nnz,) array
-        Values of the symmetric tangent of the shell.
-    stiffness : (nnz,) array
-        Values of the whole tangent: structure less the follower stiffness, not symmetric where the loaded surface has a
-        free edge.
-    """
-
-    residual: np.ndarray
-    structure: np.ndarray
+    residual: np.ndarray  #: (n,), N and N m.
+    structure: np.ndarray  #: (nnz,); values of the symmetric tangent of the shell.
+    #: (nnz,); values of the whole tangent: structure less the follower stiffness, not symmetric where the loaded
+    #: surface has a free edge.
     stiffness: np.ndarray
 
 
@@ -60,7 +52,6 @@ class PressedShell:
 
     Parameters
     ----------
-    shell : Shell
     sign : float
         +1 for a pressure on the side of the first layer (inside), -1 for one from outside.
     loaded : (ne,) array, optional
@@ -85,7 +76,6 @@ class PressedShell:
         return self.shell.dofs.expand(q)
 
     # -- statics
-    # ----
 
     def residual(self, q: np.ndarray, pressure: float) -> np.ndarray:
         """Unbalanced force (n,) at a pressure, Pa."""
@@ -132,7 +122,6 @@ class PressedShell:
         return data
 
     # -- what solvers ask
-    # ----
 
     def factor(self) -> DirectFactor:
         """A new factorisation object for tangents of this model."""
@@ -177,7 +166,8 @@ _ACCURACY = 1e-9
 
 
 def stress_free_shape(shell: Shell, loaded: np.ndarray, pressure: float) -> ShellMesh:
-    """Shape in which a wall has no stress that balances an even pressure in the shape of its mesh.
+    """Shape in which a wall has no stress that balances an even pressure in the shape of its mesh. Raises SolveError if
+    there is none: the wall buckles before, or is too soft.
 
     Parameters
     ----------
@@ -187,11 +177,6 @@ def stress_free_shape(shell: Shell, loaded: np.ndarray, pressure: float) -> Shel
         Share of each element on which the pressure acts.
     pressure : float, Pa
         On the inner face.
-
-    Raises
-    ------
-    SolveError
-        If there is none: the wall buckles before, or is too soft.
     """
     mesh = shell.mesh
     outside = LoadSteps(PressedShell(shell, -1.0, loaded), LoadStepOptions(_NEWTON))
@@ -247,12 +232,7 @@ class _Mixing:
 
 def pressure_for_overlap(shell: Shell, loaded: np.ndarray, node: int, overlap: float) -> float:
     """Sealing pressure, Pa, with whose shape a node lies beyond the closing plane y = 0 by more than it stands before
-    it at rest by an overlap, m.
-
-    Raises
-    ------
-    SolveError
-        As `stress_free_shape` does.
+    it at rest by an overlap, m. Raises SolveError: as `stress_free_shape` does.
     """
 
     def excess(pressure: float) -> float:

@@ -15,21 +15,11 @@ from ..shell.section import RelaxingGroup, Section
 
 @dataclass(frozen=True)
 class Branches:
-    """Maxwell branches of a wall.
+    """Maxwell branches of a wall."""
 
-    Attributes
-    ----------
-    groups : tuple of str
-        Materials of the layers that relax alike.
-    strengths : (g, j) array
-        Of each group over its slow law at each of the times.
-    times : (j,) array
-        s, increasing.
-    """
-
-    groups: tuple[str, ...]
-    strengths: np.ndarray
-    times: np.ndarray
+    groups: tuple[str, ...]  #: Materials of the layers that relax alike.
+    strengths: np.ndarray  #: (g, j); of each group over its slow law at each of the times.
+    times: np.ndarray  #: (j,); s, increasing.
 
     def __bool__(self) -> bool:
         return bool(self.times.size)
@@ -39,18 +29,13 @@ class Branches:
 class WallRelaxation:
     """Viscoelastic groups of layers of the wall.
 
-    Attributes
-    ----------
-    groups : tuple of RelaxingGroup
-        Layers with the same series together; none where the wall is elastic.
-
     Examples
     --------
     >>> WallRelaxation(()).branches(1.0).times
     array([], dtype=float64)
     """
 
-    groups: tuple[RelaxingGroup, ...]
+    groups: tuple[RelaxingGroup, ...]  #: Layers with the same series together; none where the wall is elastic.
 
     @classmethod
     def of(cls, section: Section) -> WallRelaxation:
@@ -59,11 +44,7 @@ class WallRelaxation:
 
     def branches(self, loss_factor: float) -> Branches:
         """Branches with a factor on the loss factors of all layers; a group has none at the times of others alone.
-
-        Raises
-        ------
-        MaterialError
-            If the factor is negative or not finite, or a series does not come near it.
+        Raises MaterialError if the factor is negative or not finite, or a series does not come near it.
         """
         series = [group.series.scaled(loss_factor) for group in self.groups]
         pairs = [(i, g, t) for i, one in enumerate(series) for g, t in zip(one.strengths, one.times) if g > 0]

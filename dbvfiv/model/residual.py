@@ -33,8 +33,6 @@ class ValveResidual:
 
     Parameters
     ----------
-    model : ValveModel
-
     The residual is a vector (n + l,): forces, then the flow's own equations. A motion is a tuple (q, v, a, inner,
     inner_rate) with the flow's unknowns (l,), one number where there is one; parameters a mapping with alpha, beta and
     those of the flow law that have no default. Second and third derivatives are taken about motions with v = 0. Lip

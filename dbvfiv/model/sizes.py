@@ -21,27 +21,17 @@ def hoop_strain(model: ValveModel, pressure: float) -> float:
 
 @dataclass(frozen=True)
 class ValveSizes:
-    """Derived sizes.
+    """Derived sizes."""
 
-    Attributes
-    ----------
-    length : float, m
-    bill_width, bill_height : float, m
-        Over the outer faces of the lip, at rest.
-    wall_mass : float, kg
-    lip_area, inlet_area : float, m2
-        Passage at rest.
-    line_volume : float, m3
-        Of the pipes in front; 0 without any.
-    """
-
-    length: float
+    length: float  #: m.
+    #: bill_width and bill_height: m; over the outer faces of the lip, at rest.
     bill_width: float
     bill_height: float
-    wall_mass: float
+    wall_mass: float  #: kg.
+    #: lip_area and inlet_area: m2; passage at rest.
     lip_area: float
     inlet_area: float
-    line_volume: float
+    line_volume: float  #: m3; of the pipes in front; 0 without any.
 
     @classmethod
     def of(cls, model: ValveModel) -> ValveSizes:

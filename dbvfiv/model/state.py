@@ -136,12 +136,8 @@ class SteadyState:
 
 
 def describe_state(model: ValveModel, q: np.ndarray, pressure: float, **solution) -> SteadyState:
-    """Steady state of a model from its unknowns; `solution` holds the fields from `converged` to `reason`.
-
-    Raises
-    ------
-    SolveError
-        If no finite steady flow belongs to the state: the lip is as wide as the flange.
+    """Steady state of a model from its unknowns; `solution` holds the fields from `converged` to `reason`. Raises
+    SolveError if no finite steady flow belongs to the state: the lip is as wide as the flange.
     """
     nodal = model.nodal(q)
     area = model.rows.areas(nodal)
@@ -192,11 +188,7 @@ def describe_state(model: ValveModel, q: np.ndarray, pressure: float, **solution
 
 def _behind(model: ValveModel, area: np.ndarray, velocity: float, jet: float) -> tuple[float, float, float, float]:
     """Pressure around the jet, its rise in a pipe behind the valve, Pa, speed there, m/s, and head lost there, m.
-
-    Raises
-    ------
-    SolveError
-        If the jet is wider than the pipe.
+    Raises SolveError if the jet is wider than the pipe.
     """
     tail, density = model.tail, model.case.fluid.density
     downstream = model.flow.back - model.flow.level
@@ -248,7 +240,6 @@ class LipCentre:
 
     Parameters
     ----------
-    mesh : ValveMesh
     shell : Shell
         On this mesh.
     """
@@ -296,27 +287,13 @@ CV_OVER_KV = 1.156
 
 @dataclass(frozen=True)
 class Behind:
-    """Flow downstream of the valve; the defaults are those of a free discharge.
+    """Flow downstream of the valve; the defaults are those of a free discharge."""
 
-    Attributes
-    ----------
-    pressure : float, Pa
-        Static pressure around the jet, over that of the surroundings.
-    jet_velocity : float, m/s
-        NaN where it is not known.
-    recovered : float, Pa
-        Pressure rise where the jet has widened to a pipe; 0 where its energy is lost.
-    velocity : float, m/s
-        Velocity in that pipe; 0 without one.
-    loss : float, m
-        Head lost in that pipe up to its far end.
-    """
-
-    pressure: float = 0.0
-    jet_velocity: float = math.nan
-    recovered: float = 0.0
-    velocity: float = 0.0
-    loss: float = 0.0
+    pressure: float = 0.0  #: Pa; static pressure around the jet, over that of the surroundings.
+    jet_velocity: float = math.nan  #: m/s; NaN where it is not known.
+    recovered: float = 0.0  #: Pa; pressure rise where the jet has widened to a pipe; 0 where its energy is lost.
+    velocity: float = 0.0  #: m/s; velocity in that pipe; 0 without one.
+    loss: float = 0.0  #: m; head lost in that pipe up to its far end.
 
 
 @shortly
@@ -325,50 +302,28 @@ class Hydraulics:
     """Heads, head loss and coefficients of the valve in a steady flow.
 
     The whole head of a valve that discharges freely ends in its jet. In a downstream pipe the jet gives back a part.
-
-    Attributes
-    ----------
-    flange_velocity : float, m/s
-    total_head : float, m
-        Total head at the flange, static and velocity head, of the fluid, over that of the surroundings.
-    head_loss : float, m
-        Total head that ends in the valve and its jet: from the flange to the fluid at rest around a free discharge, or
-        to the downstream pipe where the jet has widened.
-    loss_coefficient : float
-        K, the loss over the velocity head at the flange; infinite without a flow.
-    discharge_coefficient : float
-        Flow over that of the flange's section at the jet velocity of the head that is lost; 1/sqrt(K).
-    kv : float, m3/h
-        Flow of water at a static pressure of 1 bar between flange and fluid behind (IEC 60534-1), at this opening.
-    cv : float, US gallons a minute
-        The same at 1 psi.
-    line_loss : float, m
-        Head lost by friction and fittings of an upstream pipe; 0 without one.
-    supply_head : float, m
-        Total head at the far end of the upstream pipe, or at the flange without one.
-    jet_velocity : float, m/s
-    recovered_pressure, recovered_head : float, Pa, m
-        Pressure and head that the jet gives back in a downstream pipe.
-    tail_loss : float, m
-        Head lost in the downstream pipe.
-    downstream_head : float, m
-        Static head at its far end, or around a free discharge, over that of the surroundings.
     """
 
-    flange_velocity: float
+    flange_velocity: float  #: m/s.
+    #: m; total head at the flange, static and velocity head, of the fluid, over that of the surroundings.
     total_head: float
+    #: m; total head that ends in the valve and its jet: from the flange to the fluid at rest around a free discharge,
+    #: or to the downstream pipe where the jet has widened.
     head_loss: float
-    loss_coefficient: float
+    loss_coefficient: float  #: K, the loss over the velocity head at the flange; infinite without a flow.
+    #: Flow over that of the flange's section at the jet velocity of the head that is lost; 1/sqrt(K).
     discharge_coefficient: float
+    #: m3/h; flow of water at a static pressure of 1 bar between flange and fluid behind (IEC 60534-1), at this opening.
     kv: float
-    cv: float
-    line_loss: float
-    supply_head: float
-    jet_velocity: float
+    cv: float  #: US gallons a minute; the same at 1 psi.
+    line_loss: float  #: m; head lost by friction and fittings of an upstream pipe; 0 without one.
+    supply_head: float  #: m; total head at the far end of the upstream pipe, or at the flange without one.
+    jet_velocity: float  #: m/s.
+    #: recovered_pressure and recovered_head: Pa, m; pressure and head that the jet gives back in a downstream pipe.
     recovered_pressure: float
     recovered_head: float
-    tail_loss: float
-    downstream_head: float
+    tail_loss: float  #: m; head lost in the downstream pipe.
+    downstream_head: float  #: m; static head at its far end, or around a free discharge, over that of the surroundings.
 
     def summary(self) -> dict[str, float]:
         """Plain numbers, SI but for kv and cv."""

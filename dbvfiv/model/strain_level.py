@@ -55,18 +55,9 @@ SOFTLY_CLOSED = CLOSED | {"supports.contact_stiffness": 1e8}
 
 @dataclass(frozen=True)
 class AgreedLevels:
-    """Levels that agree with a state.
+    """Levels that agree with a state."""
 
-    Attributes
-    ----------
-    case : Case
-        With the constants of these levels.
-    state : SteadyState
-    layers : tuple of LayerLevel
-    rounds : int
-    """
-
-    case: Case
+    case: Case  #: With the constants of these levels.
     state: SteadyState
     layers: tuple[LayerLevel, ...]
     rounds: int
@@ -80,20 +71,15 @@ class AgreedLevels:
 def agree_levels(
     case: Case, pressure: float, observer: Observer | None = None, first: Mapping[str, float] | None = None
 ) -> AgreedLevels:
-    """Levels of the built-in rubbers in the layers of a case that agree with its steady state at a pressure, Pa.
+    """Levels of the built-in rubbers in the layers of a case that agree with its steady state at a pressure, Pa. Raises
+    SolveError if a state is not reached, or the levels do not settle.
 
     Parameters
     ----------
-    case : Case
     pressure : float, Pa
     observer : Observer, optional
     first : mapping of str to float, optional
         Levels of the first round by rubber; the lowest tested ones without it.
-
-    Raises
-    ------
-    SolveError
-        If a state is not reached, or the levels do not settle.
     """
     observer = Observer() if observer is None else observer
     load = _Load(pressure, observer)
@@ -112,21 +98,11 @@ def agree_levels(
 
 @dataclass(frozen=True)
 class SettledLevels:
-    """Levels of the rubbers of a case for all that is asked of it.
+    """Levels of the rubbers of a case for all that is asked of it."""
 
-    Attributes
-    ----------
-    levels : dict of str to float
-        Level of each built-in rubber among its layers, to `DIGITS`.
-    where : str
-        The states that they agree with, in words.
-    warnings : tuple of str
-        What should be known about them.
-    """
-
-    levels: dict[str, float]
-    where: str
-    warnings: tuple[str, ...]
+    levels: dict[str, float]  #: Level of each built-in rubber among its layers, to `DIGITS`.
+    where: str  #: The states that they agree with, in words.
+    warnings: tuple[str, ...]  #: What should be known about them.
 
     def __str__(self) -> str:
         return f"Strain levels of the rubbers: {_told(self.levels)} (settled at {self.where})."
@@ -143,7 +119,6 @@ def settle_levels(
 
     Parameters
     ----------
-    case : Case
     pressure : float or None, Pa
         As drive.pressure; None for the operating point of valve and pump.
     back_pressure : float, Pa, optional
@@ -177,38 +152,19 @@ def settle_levels(
 
 @dataclass
 class _Load:
-    """A state that strains the rubbers, solved again with the constants of each round.
+    """A state that strains the rubbers, solved again with the constants of each round."""
 
-    Attributes
-    ----------
-    pressure : float or None, Pa
-        None for that of the operating point.
-    observer : Observer
-    changes : mapping
-        Keys of the case in this state.
-    side : str
-        Words behind its pressure.
-    lower : int
-        How often the pressure may be halved where it is not reached; it stays so for all rounds that follow.
-    path : LoadPath or None
-        Of the last round.
-    state : SteadyState or None
-        Of the last round; None where no pressure was reached, and the valve is at rest.
-    missed : SolveError or None
-        Why the pressure was not reached first.
-    halved : int
-        How often it was halved.
-    """
-
-    pressure: float | None
+    pressure: float | None  #: Pa; none for that of the operating point.
     observer: Observer
-    changes: Mapping[str, Any] = field(default_factory=dict)
-    side: str = ""
+    changes: Mapping[str, Any] = field(default_factory=dict)  #: Keys of the case in this state.
+    side: str = ""  #: Words behind its pressure.
+    #: How often the pressure may be halved where it is not reached; it stays so for all rounds that follow.
     lower: int = 0
-    path: LoadPath | None = None
+    path: LoadPath | None = None  #: Of the last round.
+    #: Of the last round; None where no pressure was reached, and the valve is at rest.
     state: SteadyState | None = None
-    missed: SolveError | None = None
-    halved: int = 0
+    missed: SolveError | None = None  #: Why the pressure was not reached first.
+    halved: int = 0  #: How often it was halved.
 
     def strain(self, case: Case, levels: Mapping[str, float]) -> list[LayerLevel]:
         """Layers of the state with the constants of a case, from that of the last round where that serves."""

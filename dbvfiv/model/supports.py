@@ -38,16 +38,10 @@ def held_rows(case: Case, mesh: ValveMesh) -> np.ndarray:
 class LipStops:
     """One-sided springs against y displacements below zero, as the links of App. A act: on displacement and not on y,
     for each joins a node to a fixed copy of it 10 mm below (Th. 3.5.5 has them reach the plane y = 0).
-
-    Attributes
-    ----------
-    unknowns : (k,) int array
-        Numbers of the free unknowns that the stops act on.
-    stiffness : float or (k,) array, N/m
     """
 
-    unknowns: np.ndarray
-    stiffness: float | np.ndarray
+    unknowns: np.ndarray  #: (k,); numbers of the free unknowns that the stops act on.
+    stiffness: float | np.ndarray  #: float or (k,), N/m.
 
     def energy(self, q: np.ndarray) -> float:
         return 0.5 * float(np.sum(self.stiffness * np.minimum(q[self.unknowns], 0.0) ** 2))

@@ -25,21 +25,12 @@ from ..shell.mesh import DofMap
 
 @dataclass(frozen=True)
 class Symmetry:
-    """A class of motion.
+    """A class of motion."""
 
-    Attributes
-    ----------
-    name : str
-        "SS", "SA", "AS" or "AA"; "S" or "A" on a half.
-    words : str
-        What the valve does.
-    signs : (int, int)
-        +1 where the motion is symmetric about x = 0 and about y = 0, -1 where it is antisymmetric; about x = 0, which
-        is no plane of symmetry of a half, +1 there.
-    """
-
-    name: str
-    words: str
+    name: str  #: "SS", "SA", "AS" or "AA"; "S" or "A" on a half.
+    words: str  #: What the valve does.
+    #: (int, int); +1 where the motion is symmetric about x = 0 and about y = 0, -1 where it is antisymmetric; about x =
+    #: 0, which is no plane of symmetry of a half, +1 there.
     signs: tuple[int, int]
 
     @property
@@ -136,15 +127,9 @@ def chosen_symmetries(name: str, part: Part) -> tuple[Symmetry, ...]:
 
 @dataclass(frozen=True)
 class ClassDofs(DofMap):
-    """Unknowns of a class, counted from a symmetric state that may move where they are fixed.
+    """Unknowns of a class, counted from a symmetric state that may move where they are fixed."""
 
-    Attributes
-    ----------
-    base : (nn, c) array
-        Displacements and rotations of the state.
-    """
-
-    base: np.ndarray
+    base: np.ndarray  #: (nn, c); displacements and rotations of the state.
 
     def expand(self, q: np.ndarray) -> np.ndarray:
         """Nodal array (nn, c) of the state and what the unknowns (n,) add to it."""

@@ -44,25 +44,16 @@ _AT_REST = NewtonOptions(1e-10, 200, "l2")
 
 @dataclass(frozen=True)
 class Tangent:
-    """Residual and exact linearisation of the equilibrium at one state.
+    """Residual and exact linearisation of the equilibrium at one state."""
 
-    Attributes
-    ----------
-    residual : (n,) N, N m
-    structure : (nnz,) values of the structure's own tangent: material, geometric, stops; symmetric
-    stiffness : (nnz,) values of K: structure and contact of faces less follower stiffness of the pressures
-    forces : (nnz of G,) values of G
-    areas_slope : (nnz of J,) values of J
-    pressure_slope : (m, m) D, Pa/m2
-    area, pressure : (m,) m2, Pa
-    """
-
-    residual: np.ndarray
-    structure: np.ndarray
+    residual: np.ndarray  #: (n,) N, N m.
+    structure: np.ndarray  #: (nnz,) values of the structure's own tangent: material, geometric, stops; symmetric.
+    #: (nnz,) values of K: structure and contact of faces less follower stiffness of the pressures.
     stiffness: np.ndarray
-    forces: np.ndarray
-    areas_slope: np.ndarray
-    pressure_slope: np.ndarray
+    forces: np.ndarray  #: (nnz of G,) values of G.
+    areas_slope: np.ndarray  #: (nnz of J,) values of J.
+    pressure_slope: np.ndarray  #: (m, m) D, Pa/m2.
+    #: area and pressure: (m,) m2, Pa.
     area: np.ndarray
     pressure: np.ndarray
 
@@ -72,20 +63,14 @@ GRAZING = 0.1
 
 
 class ValveModel(PressedShell):
-    """The coupled valve of a case.
+    """The coupled valve of a case. Raises ValueError if the case's geometry cannot be meshed.
 
     Parameters
     ----------
-    case : Case
     section : Section, optional
         Wall in place of the one the case describes.
     closed_by : str, optional
         Of a valve that is pressed from outside, `dbvfiv.model.supports.CONTACT` or `HELD_LIPS`.
-
-    Raises
-    ------
-    ValueError
-        If the case's geometry cannot be meshed.
     """
 
     def __init__(self, case: Case, section: Section | None = None, closed_by: str | None = None):
@@ -121,7 +106,6 @@ class ValveModel(PressedShell):
         return found
 
     # -- layout
-    # ----
 
     def __repr__(self) -> str:
         return f"<ValveModel: {self.size} unknowns, {self.case.fluid.continuity}>"
@@ -151,12 +135,7 @@ class ValveModel(PressedShell):
 
     def rest(self) -> np.ndarray:
         """Unknowns (n,) of the wall at rest without load: zeros, or of a bill that is moulded shut those with which its
-        faces hold each other.
-
-        Raises
-        ------
-        SolveError
-            If they do not.
+        faces hold each other. Raises SolveError if they do not.
         """
         return self._rest.copy()
 
@@ -176,7 +155,6 @@ class ValveModel(PressedShell):
         return 0.0 if self.shell.stress_free is None else float(np.linalg.norm(self.shell.force(np.zeros(self.size))))
 
     # -- statics
-    # ----
 
     def residual(self, q: np.ndarray, pressure: float, share: float = 1.0) -> np.ndarray:
         """Unbalanced force (n,) at an inlet pressure, Pa; `share` of what loads the wall, its weight included."""
@@ -392,7 +370,6 @@ class ValveModel(PressedShell):
         return float(np.linalg.norm(self.pressure_force(nodal, p)) + own + self._preset_force)
 
     # -- what faces that are moulded shut leave open
-    # ----
 
     @cached_property
     def _film(self) -> np.ndarray:

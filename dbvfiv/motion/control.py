@@ -17,24 +17,12 @@ from .stepper import MotionState, StepFailure, StepOptions, Stepper, StepResult
 
 @dataclass(frozen=True)
 class ControlOptions:
-    """Options of the step control.
+    """Options of the step control."""
 
-    Attributes
-    ----------
-    step : float
-        Nominal step, s; with `adaptive` the first and the largest one.
-    adaptive : bool
-        Follow the local error.
-    error : float
-        Local error of the displacements, m, that adaptive steps aim at.
-    smallest : float
-        Smallest step over the nominal one.
-    """
-
-    step: float
-    adaptive: bool = False
-    error: float = 1e-6
-    smallest: float = 1.0 / 4096.0
+    step: float  #: Nominal step, s; with `adaptive` the first and the largest one.
+    adaptive: bool = False  #: Follow the local error.
+    error: float = 1e-6  #: Local error of the displacements, m, that adaptive steps aim at.
+    smallest: float = 1.0 / 4096.0  #: Smallest step over the nominal one.
 
 
 class FixedSteps:
@@ -53,13 +41,7 @@ class FixedSteps:
         self.level = self.offset = self.successes = self.halvings = 0
 
     def advance(self, state: MotionState, end: float) -> StepResult:
-        """One accepted step.
-
-        Raises
-        ------
-        StepFailure
-            If the smallest step failed too.
-        """
+        """One accepted step. Raises StepFailure if the smallest step failed too."""
         while True:
             h = self.options.step / 2**self.level
             try:
@@ -100,13 +82,7 @@ class AdaptiveSteps:
         self.halvings = 0
 
     def advance(self, state: MotionState, end: float) -> StepResult:
-        """One accepted step, not beyond `end`.
-
-        Raises
-        ------
-        StepFailure
-            If the smallest step failed too.
-        """
+        """One accepted step, not beyond `end`. Raises StepFailure if the smallest step failed too."""
         smallest = self.options.smallest * self.options.step
         while True:
             h = min(self.h, end - state.time) if end - state.time > 1e-9 * self.options.step else self.h
@@ -145,19 +121,14 @@ def step_control(stepper: Stepper, options: ControlOptions):
 class Drive:
     """Pressure through points in time, linear between them and constant beyond; applied at once before the first point.
 
-    Attributes
-    ----------
-    times : tuple of float, s
-    pressures : tuple of float, Pa
-
     Examples
     --------
     >>> Drive((0.0, 0.1), (0.0, 6e3))(0.05)
     3000.0
     """
 
-    times: tuple[float, ...]
-    pressures: tuple[float, ...]
+    times: tuple[float, ...]  #: s.
+    pressures: tuple[float, ...]  #: Pa.
 
     def __call__(self, time: float) -> float:
         return float(np.interp(time, self.times, self.pressures))
@@ -186,32 +157,16 @@ FEWEST = 20
 
 @dataclass(frozen=True)
 class RunOptions:
-    """Options of a run.
+    """Options of a run."""
 
-    Attributes
-    ----------
-    duration : float, s
-    scheme : Scheme
-    control : ControlOptions
-    step : StepOptions
-    save_every : float
-        Distance in time of full states, s; zero for the first and the last alone.
-    restart_every : int
-        Steps between restart points.
-    stop_when : tuple of str
-        Verdicts that end the run once they are certain.
-    judge_every : int
-        Smallest number of steps between two verdicts.
-    """
-
-    duration: float
+    duration: float  #: s.
     scheme: Scheme
     control: ControlOptions
     step: StepOptions = StepOptions()
-    save_every: float = 0.0
-    restart_every: int = 500
-    stop_when: tuple[str, ...] = ()
-    judge_every: int = 100
+    save_every: float = 0.0  #: Distance in time of full states, s; zero for the first and the last alone.
+    restart_every: int = 500  #: Steps between restart points.
+    stop_when: tuple[str, ...] = ()  #: Verdicts that end the run once they are certain.
+    judge_every: int = 100  #: Smallest number of steps between two verdicts.
 
     @property
     def near(self) -> float:

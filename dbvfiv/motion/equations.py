@@ -145,7 +145,6 @@ class ValveMotion:
 
     Parameters
     ----------
-    model : ValveModel
     mu : Mu, optional
         Density and damping; those of the model's case by default.
     staggered : bool
@@ -191,7 +190,6 @@ class ValveMotion:
         self._rotations = np.flatnonzero(np.broadcast_to(np.arange(free.shape[1]) >= 3, free.shape)[free])
 
     # -- forces
-    # ----
 
     def internal_force(self, q: np.ndarray, step: StepWall | None = None) -> np.ndarray:
         """Force (n,) of shell, stops and weight; `step` for a wall that relaxes."""
@@ -256,7 +254,6 @@ class ValveMotion:
         return float(np.max(np.abs(dq[self._rotations])))
 
     # -- linear algebra
-    # ----
 
     def linearise(
         self,
@@ -271,7 +268,7 @@ class ValveMotion:
         step: StepWall | None = None,
         contact: tuple[ContactStep, float] | None = None,
     ) -> None:
-        """Factor the iteration matrix.
+        """Factor the iteration matrix. Raises SingularShiftError.
 
         Parameters
         ----------
@@ -285,10 +282,6 @@ class ValveMotion:
             The wall at the end of the step, if it relaxes.
         contact : (ContactStep, float), optional
             Contact of faces in the step, and its weight.
-
-        Raises
-        ------
-        SingularShiftError
         """
         model = self.model
         q_load, v_load = (q, v) if q_load is None else (q_load, v_load)
@@ -414,7 +407,6 @@ class ValveMotion:
         return self.fluid.instant(state.fluid, inlet)
 
     # -- energies
-    # ----
 
     def energies(self, q: np.ndarray, v: np.ndarray) -> tuple[float, float, float]:
         """Kinetic energy, strain energy and that of stops or contact, J of the part; the fluid outside is

@@ -99,9 +99,6 @@ class WallSlopes:
 
         Parameters
         ----------
-        model : ValveModel
-        motion : PeriodicMotion
-        mu : mapping
         pressures : (N, m) array
             Pa, at the samples.
         rough : bool
@@ -198,7 +195,6 @@ def inertia_slopes(shell: Shell, nodal: np.ndarray, rate: np.ndarray, accelerati
 
     Parameters
     ----------
-    shell : Shell
     nodal, rate, acceleration : (nn, c) arrays
     """
     _, d1, d2 = shell.directors(nodal)
@@ -267,20 +263,15 @@ CLEAR = 0.15
 
 
 class PeriodicValve:
-    """Equations of a valve's periodic motions, a system of `continuation.cycles.CycleSolver`.
+    """Equations of a valve's periodic motions, a system of `continuation.cycles.CycleSolver`. Raises SolveError if the
+    valve has no flow, or fluid outside.
 
     Parameters
     ----------
     rebuild : callable
         From parameters mu, by the names of `dbvfiv.model.forms.ValveForms`, to the model for them.
-    mu : mapping
     flow : callable, optional
         From parameters to the flow law for them; that of the model without it.
-
-    Raises
-    ------
-    SolveError
-        If the valve has no flow, or fluid outside.
     """
 
     autonomous = True
@@ -311,7 +302,6 @@ class PeriodicValve:
         return self._model(mu)
 
     # -- parts
-    # ----
 
     def _split(self, samples: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         n = self.size - self.inner
@@ -336,7 +326,6 @@ class PeriodicValve:
         return PeriodicMemory(model.shell, branches) if branches else None
 
     # -- the contract
-    # ----
 
     def residual(self, motion: PeriodicMotion, mu: Mapping[str, float]) -> np.ndarray:
         """Residual (N, n + l): forces, N and N m, and the flow's equations by the area of the inlet."""
@@ -430,12 +419,7 @@ class PeriodicValve:
 
 
 def check_periodic(model: ValveModel) -> None:
-    """Refuse a valve whose periodic motions these equations do not cover.
-
-    Raises
-    ------
-    SolveError
-    """
+    """Refuse a valve whose periodic motions these equations do not cover. Raises SolveError."""
     if not model.flow.has_fluid:
         raise SolveError("Without flow nothing feeds an oscillation, so there are no cycles to follow.")
     if model.outside is not None:
@@ -468,7 +452,6 @@ class AveragedSolves:
         Of the flow's equations in the residual.
     stiffening : callable
         Factor on the stiffness of motions exp(s t).
-    workspace : Workspace
     """
 
     def __init__(self, pencil, motion, weight: float, stiffening, workspace: Workspace):
@@ -493,14 +476,9 @@ class AveragedSolves:
 
 @dataclass(frozen=True)
 class BranchFilter:
-    """phi(s) = sum g s tau / (1 + s tau) of the branches of a group.
+    """phi(s) = sum g s tau / (1 + s tau) of the branches of a group."""
 
-    Attributes
-    ----------
-    strengths, times : tuples of float
-        1, s.
-    """
-
+    #: strengths and times: 1, s.
     strengths: tuple[float, ...]
     times: tuple[float, ...]
 
@@ -514,11 +492,6 @@ class PeriodicMemory:
 
     dh/dt + h / tau = g dS/dt makes h_k = g s tau / (1 + s tau) S_k of each harmonic, s = i k omega: the branches of a
     group together are one filter of its slow resultants.
-
-    Parameters
-    ----------
-    shell : Shell
-    branches : Branches
     """
 
     def __init__(self, shell: Shell, branches: Branches):
@@ -551,20 +524,11 @@ class PeriodicMemory:
 
 @dataclass(frozen=True, eq=False)
 class MemoryTerm:
-    """Change of what branches hold with the motion, a term of `continuation.periodic.PeriodicOperator`.
-
-    Attributes
-    ----------
-    memory : PeriodicMemory
-    q : (N, n) array
-        Positions at the samples.
-    size : int
-        Unknowns, those of the flow behind the wall's.
-    """
+    """Change of what branches hold with the motion, a term of `continuation.periodic.PeriodicOperator`."""
 
     memory: PeriodicMemory
-    q: np.ndarray
-    size: int
+    q: np.ndarray  #: (N, n); positions at the samples.
+    size: int  #: Unknowns, those of the flow behind the wall's.
 
     def apply(self, samples: np.ndarray, rates: Rates) -> np.ndarray:
         """Samples (N, size) of forces for those of a change."""

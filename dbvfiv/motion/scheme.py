@@ -20,18 +20,12 @@ SCHEMES = ("generalised-alpha", "hht", "newmark")
 
 @dataclass(frozen=True)
 class Scheme:
-    """Parameters of one member.
+    """Parameters of one member."""
 
-    Attributes
-    ----------
-    alpha_m, alpha_f : float
-        How far accelerations and all else are taken before the end of the step.
-    beta, gamma : float
-        Newmark's parameters.
-    """
-
+    #: alpha_m and alpha_f: how far accelerations and all else are taken before the end of the step.
     alpha_m: float
     alpha_f: float
+    #: beta and gamma: newmark's parameters.
     beta: float
     gamma: float
 
@@ -52,7 +46,8 @@ class Scheme:
 
 
 def scheme(name: str, numerical_damping: float = 0.0) -> Scheme:
-    """Member of the family for a "numerical damping" nd in the thesis's sense (Th. 5.3, 0 to 0.5).
+    """Member of the family for a "numerical damping" nd in the thesis's sense (Th. 5.3, 0 to 0.5). Raises ValueError if
+    the name is unknown or the damping out of range.
 
     nd is the shift of gamma from 1/2. It sets the spectral radius at infinite frequency, r = (1 - nd)/(1 + nd), of
     generalised-alpha and HHT; Newmark takes gamma = 1/2 + nd, beta = (1/2 + gamma)^2 / 4 and is then of first order
@@ -63,11 +58,6 @@ def scheme(name: str, numerical_damping: float = 0.0) -> Scheme:
     name : "generalised-alpha", "hht" or "newmark"
     numerical_damping : float
         0 to 0.5; for "hht" at most 1/3.
-
-    Raises
-    ------
-    ValueError
-        If the name is unknown or the damping out of range.
 
     Examples
     --------

@@ -28,20 +28,12 @@ def first_state(
     motion: ValveMotion, case: Case, inlet: float, observer: Observer
 ) -> tuple[MotionState, complex | None]:
     """State that a case starts from, with inlet pressure (Pa) of the first instant; and the eigenvalue, 1/s, of the
-    mode that it was kicked along, if it was.
+    mode that it was kicked along, if it was. Raises SolveError if the steady state or the mode was not found.
 
     Parameters
     ----------
-    motion : ValveMotion
     case : Case
         Its transient.start is "rest", "steady" or "kick".
-    inlet : float
-    observer : Observer
-
-    Raises
-    ------
-    SolveError
-        If the steady state or the mode was not found.
     """
     model, transient = motion.model, case.transient
     if transient.start == "rest":
@@ -88,11 +80,11 @@ def steady_positions(model: ValveModel, inlet: float, options: SteadyOptions | N
 def kicked(
     motion: ValveMotion, q: np.ndarray, inner: np.ndarray | None, inlet: float, case: Case
 ) -> tuple[MotionState, complex]:
-    """Steady state pushed along one of its leading modes, and the eigenvalue of that, 1/s.
+    """Steady state pushed along one of its leading modes, and the eigenvalue of that, 1/s. Raises SolveError if there
+    is no such mode, or it does not move the lip.
 
     Parameters
     ----------
-    motion : ValveMotion
     q : (n,) array
         The steady state.
     inner : (l,) array or None
@@ -101,11 +93,6 @@ def kicked(
         Its inlet pressure, Pa.
     case : Case
         Its `transient.kick_mode` and `transient.kick_opening` are taken, and `modes` for the search.
-
-    Raises
-    ------
-    SolveError
-        If there is no such mode, or it does not move the lip.
     """
     model = motion.model
     linear = linearise(model, q, max(inlet, model.flow.back))  # below that nothing flows either
@@ -140,7 +127,6 @@ def on_mode(
 
     Parameters
     ----------
-    motion : ValveMotion
     q : (n,) array
         The steady state.
     inner : (l,) array or None

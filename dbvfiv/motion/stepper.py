@@ -38,32 +38,21 @@ from .scheme import scheme as member
 
 @dataclass(frozen=True)
 class MotionState:
-    """All that the next step depends on.
+    """All that the next step depends on."""
 
-    Attributes
-    ----------
-    time : float, s
-    q, v, a : (n,) arrays
-        Unknowns (m, rad), velocities and accelerations; the latter without the part of touching faces, whose impulses
-        belong to single steps.
-    force, force_rate : (n,) arrays
-        Internal force F and the scheme's value of its rate; of a wall that relaxes the rate by its slow law.
-    load : (n,) array
-        Force G p of the fluid where the equations were last met.
-    fluid : FluidState
-    memory : Memory or None
-        What a wall that relaxes remembers.
-    """
-
-    time: float
+    time: float  #: s.
+    #: q, v and a: (n,); unknowns (m, rad), velocities and accelerations; the latter without the part of touching faces,
+    #: whose impulses belong to single steps.
     q: np.ndarray
     v: np.ndarray
     a: np.ndarray
+    #: force and force_rate: (n,); internal force F and the scheme's value of its rate; of a wall that relaxes the rate
+    #: by its slow law.
     force: np.ndarray
     force_rate: np.ndarray
-    load: np.ndarray
+    load: np.ndarray  #: (n,); force G p of the fluid where the equations were last met.
     fluid: FluidState
-    memory: Memory | None = None
+    memory: Memory | None = None  #: What a wall that relaxes remembers.
 
 
 def consistent_state(
@@ -88,30 +77,14 @@ def consistent_state(
 
 @dataclass(frozen=True)
 class Weights:
-    """Weights of the parts of a step's equations: their dependence on the new unknowns.
+    """Weights of the parts of a step's equations: their dependence on the new unknowns."""
 
-    Attributes
-    ----------
-    theta : float
-        Point in the step at which the fluid's equations are met: the share of the new state there.
-    load : float
-        Factor of G p there.
-    inertia : float
-        Factor of M, 1/s2; mass damping included.
-    force : float
-        Factor of the tangent of F.
-    velocity : float
-        Derivative of the new velocities with respect to the new positions, 1/s.
-    outside : float
-        Factor of the added mass of fluid outside, 1/s2: no damping acts on it.
-    """
-
-    theta: float
-    load: float
-    inertia: float
-    force: float
-    velocity: float
-    outside: float = 0.0
+    theta: float  #: Point in the step at which the fluid's equations are met: the share of the new state there.
+    load: float  #: Factor of G p there.
+    inertia: float  #: Factor of M, 1/s2; mass damping included.
+    force: float  #: Factor of the tangent of F.
+    velocity: float  #: Derivative of the new velocities with respect to the new positions, 1/s.
+    outside: float = 0.0  #: Factor of the added mass of fluid outside, 1/s2: no damping acts on it.
 
 
 class Trial:
@@ -274,69 +247,34 @@ DAMPING = 0.2
 
 @dataclass(frozen=True)
 class StepOptions:
-    """Options of the iteration within a step.
+    """Options of the iteration within a step."""
 
-    Attributes
-    ----------
-    tolerance : float
-        Largest correction left, relative to what the accelerations move the wall in a step.
-    floor : float
-        Largest correction left relative to the deflection, where nothing moves.
-    max_iterations : int
-        Corrections of one attempt.
-    refactor_at : float
-        Contraction of the corrections above which the matrix is factored anew.
-    diverged : float
-        Growth of the corrections that ends an attempt.
-    smallest_fraction : float
-        Of a Newton correction in the line search.
-    largest_turn : float
-        Largest change of a rotation in a step, rad. Directors that turn further between two instants can gain energy
-        from stiffness damping.
-    """
-
-    tolerance: float = 1e-4
-    floor: float = 1e-10
-    max_iterations: int = 20
-    refactor_at: float = 0.5
-    diverged: float = 100.0
-    smallest_fraction: float = 1.0 / 16.0
+    tolerance: float = 1e-4  #: Largest correction left, relative to what the accelerations move the wall in a step.
+    floor: float = 1e-10  #: Largest correction left relative to the deflection, where nothing moves.
+    max_iterations: int = 20  #: Corrections of one attempt.
+    refactor_at: float = 0.5  #: Contraction of the corrections above which the matrix is factored anew.
+    diverged: float = 100.0  #: Growth of the corrections that ends an attempt.
+    smallest_fraction: float = 1.0 / 16.0  #: Of a Newton correction in the line search.
+    #: Largest change of a rotation in a step, rad. Directors that turn further between two instants can gain energy
+    #: from stiffness damping.
     largest_turn: float = 0.3
 
 
 @dataclass(frozen=True)
 class StepResult:
-    """A finished step.
-
-    Attributes
-    ----------
-    state : MotionState
-    load : Flow
-        Fluid at the end of the step.
-    work : float
-        Of the pressure on the wall during the step, J of the part.
-    dissipation : float
-        By Rayleigh damping, J.
-    residuals, solves, factorisations : int
-        Work done.
-    error : float
-        Estimated local error of the displacements, m; not a number without a step before.
-    contact_loss : float
-        Energy that touching faces took and did not store, J.
-    numerical_loss : float
-        Energy that the numerical damping took, J; see `dbvfiv.motion.stepper`.
-    """
+    """A finished step."""
 
     state: MotionState
-    load: Flow
-    work: float
-    dissipation: float
+    load: Flow  #: Fluid at the end of the step.
+    work: float  #: Of the pressure on the wall during the step, J of the part.
+    dissipation: float  #: By Rayleigh damping, J.
+    #: residuals, solves and factorisations: work done.
     residuals: int
     solves: int
     factorisations: int
-    error: float
-    contact_loss: float = 0.0
-    numerical_loss: float = 0.0
+    error: float  #: Estimated local error of the displacements, m; not a number without a step before.
+    contact_loss: float = 0.0  #: Energy that touching faces took and did not store, J.
+    numerical_loss: float = 0.0  #: Energy that the numerical damping took, J; see `dbvfiv.motion.stepper`.
 
 
 class StepFailure(ArithmeticError):
@@ -349,10 +287,8 @@ class Stepper:
     Parameters
     ----------
     motion : ValveMotion or anything with its methods
-    scheme : Scheme
     pressure : callable
         Inlet pressure, Pa, from time, s.
-    options : StepOptions
     """
 
     def __init__(
@@ -381,15 +317,9 @@ class Stepper:
         self._past.drop()
 
     # -- the step
-    # ----
 
     def step(self, state: MotionState, h: float) -> StepResult:
-        """Advance a state by h, s.
-
-        Raises
-        ------
-        StepFailure
-        """
+        """Advance a state by h, s. Raises StepFailure."""
         before = (self.residuals, self.solves, self.factorisations)
         speeds = self.motion.fluid.jets(state.fluid)
         outward, momenta = _outward(speeds), self.motion.fluid.momenta(speeds)
@@ -445,7 +375,6 @@ class Stepper:
         return float(trial.push @ way), float(lost)
 
     # -- the iteration
-    # ----
 
     def _iterate(self, trial: Trial) -> None:
         """Correct a trial until the next correction would be below what is allowed.

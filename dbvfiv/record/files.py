@@ -80,19 +80,11 @@ _NO_NAMELESS = (errno.EOPNOTSUPP, errno.EISDIR, errno.EINVAL, errno.ENOENT)
 
 
 class WriterLock:
-    """The right to write a result of some name, held by this process until it is released or the process ends.
+    """The right to write a result of some name, held by this process until it is released or the process ends. Raises
+    CaseError if another process holds it, or the folder cannot be written.
 
     An empty file takes the name where there was none. The lock sits on the file that has the name, so it moves to the
     new file when that takes the old one's place (`move`).
-
-    Parameters
-    ----------
-    path : path
-
-    Raises
-    ------
-    CaseError
-        If another process holds it, or the folder cannot be written.
     """
 
     def __init__(self, path: Path):
@@ -191,12 +183,8 @@ _BROKEN = (OSError, KeyError, RuntimeError, ValueError, TypeError, IndexError, A
 
 @contextmanager
 def reading(path: str | Path) -> Iterator[h5py.File]:
-    """An open result file; also one that another process is still writing.
-
-    Raises
-    ------
-    CaseError
-        If there is no such file, it is no result of this program, comes from a newer version, or is damaged.
+    """An open result file; also one that another process is still writing. Raises CaseError if there is no such file,
+    it is no result of this program, comes from a newer version, or is damaged.
     """
     path = as_path(path, "A result file")
     if path.is_dir():
@@ -260,13 +248,7 @@ def _refuse_empty(path: Path) -> None:
 
 
 def kind_of(path: str | Path) -> str:
-    """Kind of study that a result file is of: "steady", "map", "transient" and so on.
-
-    Raises
-    ------
-    CaseError
-        As `reading`.
-    """
+    """Kind of study of a result file: "steady", "map", "transient" and so on. Raises CaseError: as `reading`."""
     with reading(path) as file:
         return str(file.attrs["dbvfiv_kind"])
 
@@ -303,12 +285,8 @@ def _marked_as_open(path: Path) -> bool:
 
 
 def check_writable(path: str | Path) -> None:
-    """Make sure that a result may take this name, before anything is computed, and leave everything as it is.
-
-    Raises
-    ------
-    CaseError
-        If another process writes it, or the file or its folder cannot be written, or it is no result.
+    """Make sure that a result may take this name, before anything is computed, and leave everything as it is. Raises
+    CaseError if another process writes it, or the file or its folder cannot be written, or it is no result.
     """
     path = as_path(path, "A result file")
     try:
@@ -327,12 +305,8 @@ def check_writable(path: str | Path) -> None:
 
 
 def refuse_foreign(path: Path) -> None:
-    """Check that a result may take this name.
-
-    Raises
-    ------
-    CaseError
-        If it is the name of a folder, of a device, or of a file that is no result.
+    """Check that a result may take this name. Raises CaseError if it is the name of a folder, of a device, or of a file
+    that is no result.
     """
     if path.is_dir():
         raise CaseError(f"{str(path)!r} is a folder; the result needs the name of a file.")
@@ -356,27 +330,15 @@ def _replaceable(path: Path) -> bool:
 
 @dataclass(frozen=True)
 class Attachment:
-    """A file of a case.
+    """A file of a case."""
 
-    Attributes
-    ----------
-    path : str
-        As the case names it.
-    data : bytes
-        Its contents.
-    """
-
-    path: str
-    data: bytes
+    path: str  #: As the case names it.
+    data: bytes  #: Its contents.
 
     def place(self) -> str:
         """Name of a file with these contents: the original one, or a copy in the cache folder. Where that cannot be
-        written the original name stands for a file that has gone.
-
-        Raises
-        ------
-        CaseError
-            Where it cannot be written, and the original one has other contents now.
+        written the original name stands for a file that has gone. Raises CaseError where it cannot be written, and the
+        original one has other contents now.
         """
         now = _contents(Path(self.path))
         if now == self.data:
@@ -418,12 +380,7 @@ def renamed(data: Any, names: Mapping[str, str]) -> Any:
 
 
 def refuse_read(case: Case, path: str | Path | None, what: str = "The result") -> None:
-    """Refuse the name of a file that a case reads, under whatever name.
-
-    Raises
-    ------
-    CaseError
-    """
+    """Refuse the name of a file that a case reads, under whatever name. Raises CaseError."""
     path = None if path is None else as_path(path, "A result file")
     if path is not None and path.exists() and any(named.exists() and path.samefile(named) for named in _paths(case)):
         raise CaseError(f"{what} is given the name {str(path)!r}, a file that the case reads; choose another.")
@@ -459,39 +416,17 @@ _PACKAGES = ("numpy", "scipy", "jax", "jaxlib", "numba", "h5py")
 @shortly
 @dataclass(frozen=True)
 class Header:
-    """Provenance of a result.
+    """Provenance of a result."""
 
-    Attributes
-    ----------
-    kind : str
-        "steady", "modes", ...; see `dbvfiv.studies.KINDS`.
-    case : Case
-        Complete, its defaults included.
-    name : str
-        Name of the case file, without folder and ending.
-    program : str
-        Name and version of the program that wrote the file.
-    created : str
-        ISO 8601, UTC.
-    command : str
-        Command line.
-    versions : dict of str
-    attachments : tuple of Attachment
-        Files that the case names.
-    complete : bool
-        True where the run went to its end.
-    layout : int
-    """
-
-    kind: str
-    case: Case
-    name: str = "case"
-    program: str = f"dbvfiv {__version__}"
-    created: str = field(default_factory=lambda: datetime.now(UTC).isoformat(timespec="seconds"))
-    command: str = field(default_factory=lambda: shlex.join(["dbvfiv", *sys.argv[1:]]))
+    kind: str  #: "steady", "modes", ...; see `dbvfiv.studies.KINDS`.
+    case: Case  #: Complete, its defaults included.
+    name: str = "case"  #: Name of the case file, without folder and ending.
+    program: str = f"dbvfiv {__version__}"  #: Name and version of the program that wrote the file.
+    created: str = field(default_factory=lambda: datetime.now(UTC).isoformat(timespec="seconds"))  #: ISO 8601, UTC.
+    command: str = field(default_factory=lambda: shlex.join(["dbvfiv", *sys.argv[1:]]))  #: Command line.
     versions: dict[str, str] = field(default_factory=lambda: versions())
-    attachments: tuple[Attachment, ...] = ()
-    complete: bool = False
+    attachments: tuple[Attachment, ...] = ()  #: Files that the case names.
+    complete: bool = False  #: True where the run went to its end.
     layout: int = LAYOUT
 
     @classmethod
@@ -575,7 +510,7 @@ def _bytes_of(attached: h5py.Dataset) -> bytes:
 #: Keys that earlier versions wrote with every case and that no study asks for now.
 GONE = {
     "closure": ("contact_depth", "penetration", "balance_tolerance", "start", "open_pressure")
-    + ("reversal_time", "reversal_hold", "reversal_continuity"),
+    + ("reversal_time", "reversal_hold", "reversal_continuity")
 }
 
 

@@ -145,26 +145,13 @@ def _is_optional(declared: Field) -> bool:
 
 @dataclass(frozen=True)
 class WholeValve:
-    """The valve in space and where its nodes and elements come from.
+    """The valve in space and where its nodes and elements come from."""
 
-    Attributes
-    ----------
-    points : (np, 3) m, at rest
-    quads : (nq, 4) int
-        Counter-clockwise seen from outside.
-    node : (np,) int
-        Node of the part behind each point.
-    cell : (nq,) int
-        Element of the part behind each quadrilateral.
-    sign : (np, 3)
-        Mirror signs of vectors at each point.
-    """
-
-    points: np.ndarray
-    quads: np.ndarray
-    node: np.ndarray
-    cell: np.ndarray
-    sign: np.ndarray
+    points: np.ndarray  #: (np, 3) m, at rest.
+    quads: np.ndarray  #: (nq, 4) int; counter-clockwise seen from outside.
+    node: np.ndarray  #: (np,) int; node of the part behind each point.
+    cell: np.ndarray  #: (nq,) int; element of the part behind each quadrilateral.
+    sign: np.ndarray  #: (np, 3); mirror signs of vectors at each point.
 
     @classmethod
     def of(cls, mesh: MeshData, quarter: bool = False) -> WholeValve:

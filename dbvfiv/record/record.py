@@ -51,24 +51,18 @@ _SPARE = 384 * 1024
 
 
 class Journal(AbstractContextManager):
-    """A result file open for writing; a context manager.
+    """A result file open for writing; a context manager. Raises CaseError if the file cannot be written or is being
+    written by another process. Raises DiskFull.
 
     Parameters
     ----------
     path : path
         A result of that name is replaced when the new one has its first contents; any other file is left alone.
-    header : Header
     mesh : MeshData, optional
     tables : iterable of TableSpec
     known : Record, optional
         What an earlier attempt found, which is written first; the file takes its name after that only, so that nothing
         is lost whenever the process ends.
-
-    Raises
-    ------
-    CaseError
-        If the file cannot be written or is being written by another process.
-    DiskFull
     """
 
     def __init__(
@@ -113,12 +107,7 @@ class Journal(AbstractContextManager):
             new.unlink(missing_ok=True)
 
     def extend(self, table: str, columns: Mapping[str, np.ndarray]) -> None:
-        """Add rows to a table, column by column, and see them into the file.
-
-        Raises
-        ------
-        DiskFull
-        """
+        """Add rows to a table, column by column, and see them into the file. Raises DiskFull."""
         spec, group = self._tables[table], self._file[f"tables/{table}"]
         arrays = {c.name: np.asarray(columns[c.name]) for c in spec.columns}
         count = {len(values) for values in arrays.values()}
@@ -146,12 +135,7 @@ class Journal(AbstractContextManager):
         self.write_log(pack_documents(record.log))
 
     def write_log(self, documents: bytes) -> None:
-        """Add documents, packed as lines, to the log.
-
-        Raises
-        ------
-        DiskFull
-        """
+        """Add documents, packed as lines, to the log. Raises DiskFull."""
         text = np.frombuffer(documents, "u1")
         self._require_room(len(text))
         log = self._file["log"]
@@ -204,19 +188,11 @@ def read_log(file: h5py.File) -> list[Any]:
 
 
 class Record(ABC):
-    """Rows and notes of one run, to be read.
-
-    Attributes
-    ----------
-    header : Header
-    mesh : MeshData or None
-    path : Path or None
-        Its file.
-    """
+    """Rows and notes of one run, to be read."""
 
     header: Header
     mesh: MeshData | None
-    path: Path | None
+    path: Path | None  #: Its file.
     _log: list[dict[str, Any]]
 
     @abstractmethod
@@ -278,13 +254,13 @@ class Record(ABC):
 
 
 class GrowingRecord(Record, Observer, AbstractContextManager):
-    """The record of a run that goes on; what it is given it keeps, in its file too if it has one.
+    """The record of a run that goes on; what it is given it keeps, in its file too if it has one. Raises CaseError if
+    the file cannot be written.
 
     It is also the observer of the run: progress, items and warnings go on to whoever watches.
 
     Parameters
     ----------
-    header : Header
     mesh : MeshData, optional
     tables : iterable of TableSpec
     output : path, optional
@@ -292,11 +268,6 @@ class GrowingRecord(Record, Observer, AbstractContextManager):
     watcher : Observer, optional
     known : Record, optional
         An earlier attempt that this one goes on from; its rows and notes are the first of this one.
-
-    Raises
-    ------
-    CaseError
-        If the file cannot be written.
     """
 
     def __init__(
@@ -412,20 +383,14 @@ class GrowingRecord(Record, Observer, AbstractContextManager):
 
 
 class StoredRecord(Record):
-    """A record in a file; its columns are read when they are asked for.
+    """A record in a file; its columns are read when they are asked for. Raises CaseError if the file cannot be read.
 
     Parameters
     ----------
-    path : path
     tables : callable
         From the mesh to the tables that are read.
     case_model : type
         Sections that its case may hold.
-
-    Raises
-    ------
-    CaseError
-        If the file cannot be read.
     """
 
     def __init__(
@@ -477,13 +442,7 @@ class StoredRecord(Record):
 
 
 def copy_record(record: Record, tables: Iterable[TableSpec], path: str | Path) -> None:
-    """Write a record into a file of its own.
-
-    Raises
-    ------
-    CaseError
-        If it cannot be written.
-    """
+    """Write a record into a file of its own. Raises CaseError if it cannot be written."""
     Journal(path, record.header, record.mesh, tables, record).close()
 
 
@@ -495,12 +454,8 @@ def plain(value: Any) -> Any:
 
 
 def tabulate(record: Record, spec: TableSpec, form: str) -> Any:
-    """Table of a record as a pandas DataFrame (columns with one value a row) or an xarray Dataset (all columns).
-
-    Raises
-    ------
-    CaseError
-        For another form, or where the package is not installed.
+    """Table of a record as a pandas DataFrame (columns with one value a row) or an xarray Dataset (all columns). Raises
+    CaseError for another form, or where the package is not installed.
     """
     if form not in ("pandas", "xarray"):
         raise CaseError(f"form is given as {form!r}; it must be 'pandas' or 'xarray'.")

@@ -21,49 +21,28 @@ PRINTED = {"kPa": 1e3, "static kPa": 1e3, "mm": 1e-3, "cm2": 1e-4, "mm2": 1e-6, 
 
 @dataclass(frozen=True)
 class Shown:
-    """Print format of a column.
-
-    Attributes
-    ----------
-    title, unit : str
-    width : int
-    write : str or callable
-        Format of the number in that unit, such as ".3f"; or a function from a row to a text.
-    """
+    """Print format of a column."""
 
     title: str
     unit: str
     width: int
+    #: Format of the number in that unit, such as ".3f"; or a function from a row to a text.
     write: str | Callable[[Any], str]
 
 
 @dataclass(frozen=True)
 class Column:
-    """One quantity of a table.
+    """One quantity of a table."""
 
-    Attributes
-    ----------
-    name : str
-        May hold a slash for a subgroup.
-    units : str
-        SI; empty for plain numbers.
-    description : str
-    dtype : str
-        A numpy type, or ``TEXT``.
-    shown : Shown, optional
-        How it is printed; not at all without.
-    read : callable, optional
-        Its value, from the object that a row is made of; the item or attribute of its name without.
-    shape : tuple of int, or callable
-        Shape of one row, or a function from the mesh to that; None where a result on the mesh has no such column.
-    """
-
-    name: str
-    units: str
+    name: str  #: May hold a slash for a subgroup.
+    units: str  #: SI; empty for plain numbers.
     description: str
-    dtype: str = "f8"
-    shown: Shown | None = None
+    dtype: str = "f8"  #: A numpy type, or ``TEXT``.
+    shown: Shown | None = None  #: How it is printed; not at all without.
+    #: Its value, from the object that a row is made of; the item or attribute of its name without.
     read: Callable[[Any], Any] | None = None
+    #: or callable; shape of one row, or a function from the mesh to that; None where a result on the mesh has no such
+    #: column.
     shape: tuple[int, ...] | Callable[[Any], tuple[int, ...] | None] = ()
 
     def __reduce__(self) -> tuple:
@@ -112,21 +91,13 @@ MARK, TEXT_BYTES = "#", 400
 @shortly
 @dataclass(frozen=True)
 class TableSpec:
-    """Columns that grow together.
-
-    Attributes
-    ----------
-    name : str
-    columns : tuple of Column
-    shapes : mapping of str to tuple of int
-        Shape of one row of the columns that are not scalars, where these do not say it.
-    chunk : int
-        Rows of scalar columns that are stored together; those with a shape are stored row by row up to 64 kB.
-    """
+    """Columns that grow together."""
 
     name: str
     columns: tuple[Column, ...]
+    #: Shape of one row of the columns that are not scalars, where these do not say it.
     shapes: dict[str, tuple[int, ...]] = field(default_factory=dict)
+    #: Rows of scalar columns that are stored together; those with a shape are stored row by row up to 64 kB.
     chunk: int = 64
 
     @classmethod

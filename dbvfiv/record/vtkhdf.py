@@ -27,21 +27,13 @@ _VTK_QUAD = 9
 
 @dataclass(frozen=True)
 class Step:
-    """Fields at one value of "time".
-
-    Attributes
-    ----------
-    value : float
-    point_data, cell_data : mapping of str to array
-        First axis: points or cells; the same names at every step.
-    points : (np, 3) array, optional
-        Positions of the points, where they move.
-    """
+    """Fields at one value of "time"."""
 
     value: float
+    #: point_data and cell_data: mapping of str to; first axis: points or cells; the same names at every step.
     point_data: Mapping[str, np.ndarray]
     cell_data: Mapping[str, np.ndarray] = field(default_factory=dict)
-    points: np.ndarray | None = None
+    points: np.ndarray | None = None  #: (np, 3); positions of the points, where they move.
 
 
 def write_vtkhdf(
@@ -120,7 +112,8 @@ _UNITS = {"displacement": "m", "rotation": "rad", "thickness": "m", "pressure": 
 
 
 def export_result(result: Any, path: str | Path, quarter: bool = False, deformed: bool = False, **choices: Any) -> Path:
-    """Write a result as one VTKHDF file with a step for each state.
+    """Write a result as one VTKHDF file with a step for each state. Raises CaseError if the result has nothing to show
+    in space, cannot be told a choice, the file cannot be written, or its name is taken by a file of another kind.
 
     Parameters
     ----------
@@ -137,12 +130,6 @@ def export_result(result: Any, path: str | Path, quarter: bool = False, deformed
     Returns
     -------
     Path
-
-    Raises
-    ------
-    CaseError
-        If the result has nothing to show in space, cannot be told a choice, the file cannot be written, or its name is
-        taken by a file of another kind.
     """
     valve = WholeValve.of(result.mesh, quarter)
     for name in choices:
@@ -206,7 +193,6 @@ def faces(mesh: MeshData, nodal: np.ndarray | None = None) -> tuple[np.ndarray, 
 
     Parameters
     ----------
-    mesh : MeshData
     nodal : (nn, c) array, optional
         Displacements, m, and rotations of the nodes; at rest without it.
 

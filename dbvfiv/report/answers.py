@@ -30,22 +30,11 @@ _FLOW = "flow 6 % high against three dimensions (12-inch valve)"
 
 @dataclass(frozen=True)
 class Answer:
-    """Answer to one question.
-
-    Attributes
-    ----------
-    question : str
-    answer : str
-        "yes", "no" or "not examined".
-    text : str
-        What was found, or why nothing was.
-    margin : str
-    uncertainty : tuple of str
-    """
+    """Answer to one question."""
 
     question: str
-    answer: str
-    text: str
+    answer: str  #: "yes", "no" or "not examined".
+    text: str  #: What was found, or why nothing was.
     margin: str = ""
     uncertainty: tuple[str, ...] = ()
 

@@ -43,27 +43,13 @@ _LEVELS, _LENGTHS = (0.10, 0.20), (0.2, 5.0, 6)
 
 @dataclass(frozen=True)
 class Run:
-    """A study that is asked for.
+    """A study that is asked for."""
 
-    Attributes
-    ----------
-    name : str
-        Of its file.
-    kind : str
-        Of the study.
-    label : str
-        For the bar.
-    changes : dict
-        Keys of the case.
-    share : float
-        Processor time it is expected to take, s on 28 x 48 elements.
-    """
-
-    name: str
-    kind: str
-    label: str
-    changes: dict[str, Any]
-    share: float
+    name: str  #: Of its file.
+    kind: str  #: Of the study.
+    label: str  #: For the bar.
+    changes: dict[str, Any]  #: Keys of the case.
+    share: float  #: Processor time it is expected to take, s on 28 x 48 elements.
 
     @property
     def part(self) -> str:
@@ -73,36 +59,18 @@ class Run:
 
 @dataclass
 class Gathered:
-    """Results of a case by the names of their runs, and what is missing.
+    """Results of a case by the names of their runs, and what is missing."""
 
-    Attributes
-    ----------
-    case : Case
-        With settled strain levels, and the sealing pressure of a cracking head.
-    name : str
-    heads : tuple of float, Pa
-        Pressures at which the valve was examined.
-    sizes : ValveSizes
-    results : dict of StudyResult
-    missing : dict of str
-        Runs that gave no result, and why, in a sentence.
-    not_asked : set of str
-        Those among them that were left out, or have nothing to say of this valve.
-    seconds : float
-        Processor time that it took.
-    levels : str
-        Strain levels that were settled, in a sentence.
-    """
-
-    case: Case
+    case: Case  #: With settled strain levels, and the sealing pressure of a cracking head.
     name: str
-    heads: tuple[float, ...]
+    heads: tuple[float, ...]  #: Pa; pressures at which the valve was examined.
     sizes: ValveSizes
     results: dict[str, Any] = field(default_factory=dict)
-    missing: dict[str, str] = field(default_factory=dict)
+    missing: dict[str, str] = field(default_factory=dict)  #: Runs that gave no result, and why, in a sentence.
+    #: Those among them that were left out, or have nothing to say of this valve.
     not_asked: set[str] = field(default_factory=set)
-    seconds: float = 0.0
-    levels: str = ""
+    seconds: float = 0.0  #: Processor time that it took.
+    levels: str = ""  #: Strain levels that were settled, in a sentence.
 
     def get(self, name: str) -> Any:
         """A result by the name of its run; None without one."""
@@ -275,11 +243,11 @@ def cycle_run(found: Gathered) -> Iterator[Run]:
 def gather(
     case: Case, name: str, folder: Path, leave_out: tuple[str, ...] = (), workers: int = 1, quiet: bool = False
 ) -> Gathered:
-    """Run the studies, or take them from the files of an earlier report of the same case.
+    """Run the studies, or take them from the files of an earlier report of the same case. Raises CaseError if the case
+    gives no model, or the folder cannot be written.
 
     Parameters
     ----------
-    case : Case
     name : str
         For titles.
     folder : path
@@ -290,11 +258,6 @@ def gather(
         Processes that share the runs.
     quiet : bool
         Show no bar.
-
-    Raises
-    ------
-    CaseError
-        If the case gives no model, or the folder cannot be written.
     """
     session = Session(case, name)
     session.mesh  # a case that gives no model is told before anything runs

@@ -27,13 +27,7 @@ from .parts import MAKERS, Part, first_pictures
 
 
 def write_page(found: Gathered, path: Path) -> Path:
-    """Write the report of a valve.
-
-    Raises
-    ------
-    CaseError
-        If the file cannot be written.
-    """
+    """Write the report of a valve. Raises CaseError if the file cannot be written."""
     told = answers(found)
     first = {
         "sheet": sheet(found),
@@ -58,11 +52,10 @@ def _in_units(found: Gathered, parts: list[Part]) -> list[Part]:
 def write_parts(
     path: Path, title: str, setting: str, parts: Sequence[Part], case: str = "", first: Mapping[str, Any] | None = None
 ) -> Path:
-    """Write a page of parts.
+    """Write a page of parts. Raises CaseError if the file cannot be written.
 
     Parameters
     ----------
-    path : path
     title, setting : str
         Its heading, and what it is about, in a line.
     parts : sequence of Part
@@ -70,11 +63,6 @@ def write_parts(
         Text of a case file that stands at the end.
     first : mapping, optional
         The first page: its sheet, answers, trade and pictures, and what is open, each with its reason.
-
-    Raises
-    ------
-    CaseError
-        If the file cannot be written.
     """
     environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
     template = environment.from_string(files(__package__).joinpath("page.html").read_text(encoding="utf-8"))
@@ -145,13 +133,7 @@ _BROWSERS = ("chromium", "chromium-browser", "google-chrome", "chrome")
 
 
 def write_pdf(page: Path, path: Path) -> Path:
-    """Print a page on A4.
-
-    Raises
-    ------
-    CaseError
-        If neither a browser nor WeasyPrint is there, or neither wrote the file.
-    """
+    """Print a page on A4. Raises CaseError if neither a browser nor WeasyPrint is there, or neither wrote the file."""
     browser, weasyprint = next(filter(None, map(shutil.which, _BROWSERS)), None), find_spec("weasyprint") is not None
     if browser is None and not weasyprint:
         raise CaseError(

@@ -31,16 +31,9 @@ from .gather import Gathered, is_on_own_mesh
 
 @dataclass(frozen=True)
 class Table:
-    """A table for people.
+    """A table for people."""
 
-    Attributes
-    ----------
-    head : tuple of str
-        Titles of the columns, with units.
-    rows : tuple of tuple of str
-    """
-
-    head: tuple[str, ...]
+    head: tuple[str, ...]  #: Titles of the columns, with units.
     rows: tuple[tuple[str, ...], ...]
 
     @classmethod
@@ -51,22 +44,12 @@ class Table:
 
 @dataclass(frozen=True)
 class Picture:
-    """A figure, and where it helps one that answers to the pointer, which stands in its place on screens.
-
-    Attributes
-    ----------
-    name : str
-    caption : str
-    png : bytes
-        What is printed.
-    live : str
-        HTML of the interactive figure; empty where there is none.
-    """
+    """A figure, and where it helps one that answers to the pointer, which stands in its place on screens."""
 
     name: str
     caption: str
-    png: bytes
-    live: str = ""
+    png: bytes  #: What is printed.
+    live: str = ""  #: HTML of the interactive figure; empty where there is none.
 
     @property
     def source(self) -> str:
@@ -76,29 +59,15 @@ class Picture:
 
 @dataclass(frozen=True)
 class Part:
-    """A part of a report.
+    """A part of a report."""
 
-    Attributes
-    ----------
-    name : str
-        Its place on the page.
-    title : str
-    sentences : tuple of str
-    tables : tuple of Table
-    pictures : tuple of Picture
-    trust : tuple of str
-        How far to trust it: residuals, counts, uncertainties, warnings.
-    listing : tuple of str
-        Lines as the command prints them, in columns.
-    """
-
-    name: str
+    name: str  #: Its place on the page.
     title: str
     sentences: tuple[str, ...] = ()
     tables: tuple[Table, ...] = ()
     pictures: tuple[Picture, ...] = ()
-    trust: tuple[str, ...] = ()
-    listing: tuple[str, ...] = ()
+    trust: tuple[str, ...] = ()  #: How far to trust it: residuals, counts, uncertainties, warnings.
+    listing: tuple[str, ...] = ()  #: Lines as the command prints them, in columns.
 
 
 def picture(name: str, caption: str, draw: Callable[[], Figure], live: str = "", units: Units | None = None) -> Picture:
@@ -283,10 +252,7 @@ def pipe_part(found: Gathered) -> Part | None:
     lengths = list(next(iter(sweeps.values())).values)
     head = (f"{_pressure_title(found)}", *(f"pipe of {length:.3g} m" for length in lengths))
     rows = tuple(
-        (
-            units.pressure(p, 3),
-            *(", ".join((v.outcome, *_ratio(v.damping_ratio))) for v in r.verdicts),
-        )
+        (units.pressure(p, 3), *(", ".join((v.outcome, *_ratio(v.damping_ratio))) for v in r.verdicts))
         for p, r in sweeps.items()
     )
     caption = "Least damping ratio over the length of the pipe."

@@ -77,27 +77,16 @@ def rest_products(x: np.ndarray, d: np.ndarray) -> np.ndarray:
 
 @dataclass(frozen=True)
 class AssumedStrains:
-    """Assumed strain fields of the elements, as constant arrays.
+    """Assumed strain fields of the elements, as constant arrays."""
 
-    Attributes
-    ----------
-    inplane : (ne, 4, 6, 12) array
-        Covariant strain coefficients c0 (3) and c1 (3) at the points from `rest_products`.
-    products : (ne, 12) array
-        The products at rest.
-    """
-
+    #: (ne, 4, 6, 12); covariant strain coefficients c0 (3) and c1 (3) at the points from `rest_products`.
     inplane: np.ndarray
-    products: np.ndarray
+    products: np.ndarray  #: (ne, 12); the products at rest.
 
 
 def assumed_strains(mesh, geometry: ReferenceGeometry, section, element: str) -> AssumedStrains:
-    """Assumed strain fields on a mesh for an element by its name (one of `ELEMENTS`).
-
-    Raises
-    ------
-    ValueError
-        If there is no element of that name.
+    """Assumed strain fields on a mesh for an element by its name (one of `ELEMENTS`). Raises ValueError if there is no
+    element of that name.
     """
     if element not in ELEMENTS:
         raise ValueError(f"The element is '{element}', but only {', '.join(ELEMENTS)} exist.")

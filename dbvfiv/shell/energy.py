@@ -24,12 +24,7 @@ import numpy as np
 
 from ..materials.energy import LINEAR_ELASTIC, MOONEY_RIVLIN, linear_elastic_energy, rubber_energy
 from .assumed_strain import FACTORS, PAIRS, VECTORS, AssumedStrains
-from .reference import (
-    SHEAR_EDGES,
-    SHEAR_WEIGHTS,
-    ReferenceGeometry,
-    shifted_layers,
-)
+from .reference import SHEAR_EDGES, SHEAR_WEIGHTS, ReferenceGeometry, shifted_layers
 from .rotation import director
 from .section import Section
 

@@ -113,17 +113,7 @@ def _workspace():
 
 
 @numba.njit(cache=True, fastmath=FAST)
-def shell_force(
-    quads,
-    nodes,
-    q,
-    director,
-    director1,
-    reference,
-    wall,
-    held,
-    out,
-):
+def shell_force(quads, nodes, q, director, director1, reference, wall, held, out):
     """Add the internal force to out (nn, 5); unknowns q (nn, 5).
 
     Parameters
@@ -264,21 +254,7 @@ def _add_geometric(quad, w, fd, director1, director2, k):
 
 
 @numba.njit(cache=True, fastmath=FAST)
-def shell_tangent(
-    quads,
-    nodes,
-    q,
-    director,
-    director1,
-    director2,
-    reference,
-    wall,
-    held,
-    geometric,
-    slots,
-    out,
-    data,
-):
+def shell_tangent(quads, nodes, q, director, director1, director2, reference, wall, held, geometric, slots, out, data):
     """Add the internal force to out (nn, 5) and the tangent to the matrix values data (nnz,).
 
     Parameters

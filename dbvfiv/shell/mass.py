@@ -17,11 +17,11 @@ MASSES = (CONSISTENT, AVERAGED)
 
 
 def mass_integrals(geometry: ReferenceGeometry, section: Section | WallParts, mass: str = CONSISTENT) -> np.ndarray:
-    """Integrals of rho t^k N_a N_b over each element, k = 0, 1, 2, from which all inertia of a shell follows.
+    """Integrals of rho t^k N_a N_b over each element, k = 0, 1, 2, from which all inertia of a shell follows. Raises
+    ValueError if there is no mass of that name.
 
     Parameters
     ----------
-    geometry : ReferenceGeometry
     section : Section or WallParts
     mass : "consistent" or "averaged"
         The integrals, or the mean of them and of their sums over b on the diagonal: the higher-order mass of Goudreau
@@ -31,11 +31,6 @@ def mass_integrals(geometry: ReferenceGeometry, section: Section | WallParts, ma
     -------
     (ne, 3, 4, 4) array
         kg, kg m and kg m2.
-
-    Raises
-    ------
-    ValueError
-        If there is no mass of that name.
     """
     if mass not in MASSES:
         raise ValueError(f"The mass is {mass!r}, but only {' and '.join(map(repr, MASSES))} exist.")

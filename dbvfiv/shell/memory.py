@@ -35,37 +35,26 @@ from .shell import Shell, StepWall
 
 @dataclass(frozen=True)
 class Memory:
-    """Internal variables (Maxwell branches) of the wall at one state, and their energy.
+    """Internal variables (Maxwell branches) of the wall at one state, and their energy."""
 
-    Attributes
-    ----------
-    branches : (ne, 4, b, 8) array
-        Resultants of each branch: N/m, N, N/m.
-    stretch : (ne, 4, j, 8) array
-        Section strains that the springs of branches of each relaxation time hold.
-    work, loss : (g,) arrays
-        Work done against the branches of each group since the start, and the dissipated part of it, J.
-    stored : (g,) array
-        Energy stored in the branches, J.
-    strain, slow : (ne, 4, 8), (ne, 4, g, 8) arrays
-        Section strains and slow resultants of each group at the state; they follow from its positions.
-    ahead : tuple of float and array, optional
-        Length of a step, s, and the resultants (ne, 4, 8) of the branches that such a step starts with, where they are
-        known.
-    """
-
-    branches: np.ndarray
-    stretch: np.ndarray
+    branches: np.ndarray  #: (ne, 4, b, 8); resultants of each branch: N/m, N, N/m.
+    stretch: np.ndarray  #: (ne, 4, j, 8); section strains that the springs of branches of each relaxation time hold.
+    #: work and loss: (g,); work done against the branches of each group since the start, and the dissipated part of it,
+    #: J.
     work: np.ndarray
     loss: np.ndarray
-    stored: np.ndarray
+    stored: np.ndarray  #: (g,); energy stored in the branches, J.
+    #: strain and slow: (ne, 4, 8), (ne, 4, g, 8); section strains and slow resultants of each group at the state; they
+    #: follow from its positions.
     strain: np.ndarray
     slow: np.ndarray
+    #: tuple of float and; length of a step, s, and the resultants (ne, 4, 8) of the branches that such a step starts
+    #: with, where they are known.
     ahead: tuple[float, np.ndarray] | None = None
 
 
 class WallMemory:
-    """Branches of the groups of a shell's layers.
+    """Branches of the groups of a shell's layers. Raises CaseError if the shell's metric has no compiled loops.
 
     Energies: the work that a step does against a branch is that of its resultants, weighed between both ends as forces
     are in the step's equations, over the change of strains; so is that of the slow law of linear layers. What the
@@ -75,16 +64,10 @@ class WallMemory:
 
     Parameters
     ----------
-    shell : Shell
     strengths : (g, j) array
         Of each group of `shell.section.relaxing` at each relaxation time.
     times : (j,) array
         s.
-
-    Raises
-    ------
-    CaseError
-        If the shell's metric has no compiled loops.
     """
 
     def __init__(self, shell: Shell, strengths: np.ndarray, times: np.ndarray):
@@ -216,18 +199,7 @@ class WallMemory:
 
 @numba.njit(cache=True, fastmath=FAST)
 def slow_resultants(
-    quads,
-    nodes,
-    q,
-    director,
-    reference,
-    stiffness,
-    points,
-    constants,
-    scales,
-    member,
-    strain_out,
-    slow_out,
+    quads, nodes, q, director, reference, stiffness, points, constants, scales, member, strain_out, slow_out
 ):
     """Fill strains (ne, 4, 8) and the slow law's resultants (ne, 4, g, 8) of each group; unknowns q (nn, 5).
 

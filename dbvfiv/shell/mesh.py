@@ -22,32 +22,20 @@ def shape_functions(xi: float, eta: float) -> tuple[np.ndarray, np.ndarray]:
 
 @dataclass(frozen=True)
 class ShellMesh:
-    """Mid-surface of a shell.
+    """Mid-surface of a shell."""
 
-    Attributes
-    ----------
-    nodes : (nn, 3) float array, m
-    quads : (ne, 4) int array
-        Counter-clockwise seen from the outside: the normal points from the first layer to the last.
-    directors : (nn, 3) float array
-        Unit vectors through the wall.
-    frames : (nn, 2, 3) float array
-        Two unit vectors at each node that span the plane normal to the director; the two rotation unknowns turn
-        the director towards them.
-    thickness : (ne,) float array, m
-    material_axis : (3,) or (ne, 3) float array
-        Direction from which layer angles are measured, projected into each tangent plane.
-    mirrored : (ne,) bool array, optional
-        Elements whose layers lie at mirrored angles: measured to the right of that direction seen from outside, to the
-        left elsewhere. None by default.
-    """
-
-    nodes: np.ndarray
+    nodes: np.ndarray  #: (nn, 3), m.
+    #: (ne, 4); counter-clockwise seen from the outside: the normal points from the first layer to the last.
     quads: np.ndarray
-    directors: np.ndarray
+    directors: np.ndarray  #: (nn, 3); unit vectors through the wall.
+    #: (nn, 2, 3); two unit vectors at each node that span the plane normal to the director; the two rotation unknowns
+    #: turn the director towards them.
     frames: np.ndarray
-    thickness: np.ndarray
+    thickness: np.ndarray  #: (ne,), m.
+    #: (3,) or (ne, 3); direction from which layer angles are measured, projected into each tangent plane.
     material_axis: np.ndarray = field(default_factory=lambda: np.array([0.0, 0.0, 1.0]))
+    #: (ne,); elements whose layers lie at mirrored angles: measured to the right of that direction seen from outside,
+    #: to the left elsewhere. None by default.
     mirrored: np.ndarray | None = None
 
     def __post_init__(self):
@@ -161,17 +149,10 @@ UNKNOWNS_PER_NODE = 5
 
 @dataclass(frozen=True)
 class DofMap:
-    """Numbering of the free unknowns.
+    """Numbering of the free unknowns."""
 
-    Attributes
-    ----------
-    free : (nn, 5) bool array
-        Three displacements and two rotations of each node.
-    quads : (ne, 4) int array
-    """
-
-    free: np.ndarray
-    quads: np.ndarray
+    free: np.ndarray  #: (nn, 5); three displacements and two rotations of each node.
+    quads: np.ndarray  #: (ne, 4).
 
     @cached_property
     def index(self) -> np.ndarray:

@@ -141,7 +141,6 @@ class Weight:
 
     Parameters
     ----------
-    shell : Shell
     gravity : (3,) array, m/s2
     displaced : float
         Density of what the wall displaces, kg/m3.
@@ -218,10 +217,6 @@ def _moment_form(turn, directions, moment, reference, frames):
 
 class OuterFace:
     """Nodes of the mid-surface moved out by half the wall along their directors, joined bilinearly.
-
-    Parameters
-    ----------
-    shell : Shell
 
     Attributes
     ----------

@@ -17,26 +17,13 @@ from .shell import Shell
 @shortly
 @dataclass(frozen=True)
 class LayerFields:
-    """Element values of each layer: means over the in-plane and layer points of an element, extremes for von Mises.
+    """Element values of each layer: means over the in-plane and layer points of an element, extremes for von Mises."""
 
-    Attributes
-    ----------
-    names : tuple of str, inside to outside
-    strain : (ne, nl, 5) array
-        Green-Lagrange strain [E11, E22, 2 E12, 2 E13, 2 E23] in the layer's axes.
-    stress : (ne, nl, 5) array, Pa
-        Second Piola-Kirchhoff stress conjugate to it.
-    von_mises : (ne, nl) array, Pa
-        Of the Cauchy stress; the largest in the element's part of the layer.
-    stretch : (ne, nl, 2) array
-        Smallest and largest principal stretch in the plane of the layer.
-    """
-
-    names: tuple[str, ...]
-    strain: np.ndarray
-    stress: np.ndarray
-    von_mises: np.ndarray
-    stretch: np.ndarray
+    names: tuple[str, ...]  #: inside to outside.
+    strain: np.ndarray  #: (ne, nl, 5); Green-Lagrange strain [E11, E22, 2 E12, 2 E13, 2 E23] in the layer's axes.
+    stress: np.ndarray  #: (ne, nl, 5), Pa; second Piola-Kirchhoff stress conjugate to it.
+    von_mises: np.ndarray  #: (ne, nl), Pa; of the Cauchy stress; the largest in the element's part of the layer.
+    stretch: np.ndarray  #: (ne, nl, 2); smallest and largest principal stretch in the plane of the layer.
 
 
 def layer_fields(shell: Shell, q: np.ndarray) -> LayerFields:

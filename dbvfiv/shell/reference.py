@@ -27,32 +27,20 @@ class ReferenceGeometry:
 
     Strains are ordered [11, 22, 2 * 12]. With covariant strain coefficients c0 and c1 and mixed curvature kappa the
     local strain at thickness coordinate t is E = q c0 + t (q c1 - qk c0), qk standing for sym(kappa c0).
-
-    Attributes
-    ----------
-    area : (ne, 4) m2
-    thickness : (ne,) m
-    q : (ne, 4, 3, 3), qk : (ne, 4, 3, 3)
-    p : (ne, 4, 2, 2)
-        Transverse shear: gamma_local[a] = p[a, alpha] gamma[alpha].
-    shear0 : (ne, 4)
-        Reference values of the shears at the edges.
-    curvature : (ne, 4, 2, 2)
-        Mixed curvature kappa[gamma, beta]: covariant derivative beta of the director against basis vector gamma.
-    axes : (ne, 4, 3, 3)
-        Local axes (rows): material axis in the tangent plane, the direction across, the normal.
-    position : (ne, 4, 3) m
     """
 
-    area: np.ndarray
-    thickness: np.ndarray
-    q: np.ndarray
+    area: np.ndarray  #: (ne, 4) m2.
+    thickness: np.ndarray  #: (ne,) m.
+    q: np.ndarray  #: (ne, 4, 3, 3), qk : (ne, 4, 3, 3).
     qk: np.ndarray
-    p: np.ndarray
-    shear0: np.ndarray
+    p: np.ndarray  #: (ne, 4, 2, 2); transverse shear: gamma_local[a] = p[a, alpha] gamma[alpha].
+    shear0: np.ndarray  #: (ne, 4); reference values of the shears at the edges.
+    #: (ne, 4, 2, 2); mixed curvature kappa[gamma, beta]: covariant derivative beta of the director against basis vector
+    #: gamma.
     curvature: np.ndarray
+    #: (ne, 4, 3, 3); local axes (rows): material axis in the tangent plane, the direction across, the normal.
     axes: np.ndarray
-    position: np.ndarray
+    position: np.ndarray  #: (ne, 4, 3) m.
 
 
 def strain_map(p: np.ndarray) -> np.ndarray:
@@ -83,12 +71,8 @@ def curvature_map(kappa: np.ndarray) -> np.ndarray:
 
 
 def reference_geometry(mesh: ShellMesh) -> ReferenceGeometry:
-    """Evaluate the reference geometry of a mesh at the 2 x 2 points of every element.
-
-    Raises
-    ------
-    ValueError
-        If an element has no area or its material axis stands normal to the surface.
+    """Evaluate the reference geometry of a mesh at the 2 x 2 points of every element. Raises ValueError if an element
+    has no area or its material axis stands normal to the surface.
     """
     x = mesh.nodes[mesh.quads]
     d = mesh.directors[mesh.quads]
@@ -152,7 +136,6 @@ def shifted_layers(geometry: ReferenceGeometry, points: np.ndarray) -> tuple[np.
 
     Parameters
     ----------
-    geometry : ReferenceGeometry
     points : (np, 2) or, for zones, (ne, np, 2) array
         Normalised coordinate and weight of every layer point.
 

@@ -16,46 +16,24 @@ LINEAR, RUBBER = 0, 1
 
 @dataclass(frozen=True)
 class Layer:
-    """One layer.
-
-    Attributes
-    ----------
-    law : constitutive law of `dbvfiv.materials`
-    thickness : float
-        Nominal thickness, m; a section scales all layers so that they fill the local wall.
-    angle : float
-        Angle of the first material direction from the mesh's material axis, degrees, counter-clockwise about the
-        outward normal.
-    shear_correction : float
-        Factor on the transverse shear energy.
-    name : str
-    relaxation : `dbvfiv.materials.prony.Prony`, optional
-        How it relaxes beyond its slow law; not at all without one.
-    """
+    """One layer."""
 
     law: object
-    thickness: float
+    thickness: float  #: Nominal thickness, m; a section scales all layers so that they fill the local wall.
+    #: Angle of the first material direction from the mesh's material axis, degrees, counter-clockwise about the outward
+    #: normal.
     angle: float = 0.0
-    shear_correction: float = 1.0
+    shear_correction: float = 1.0  #: Factor on the transverse shear energy.
     name: str = ""
-    relaxation: Prony | None = None
+    relaxation: Prony | None = None  #: How it relaxes beyond its slow law; not at all without one.
 
 
 @dataclass(frozen=True)
 class RelaxingGroup:
-    """Layers of a wall that relax alike.
+    """Layers of a wall that relax alike."""
 
-    Attributes
-    ----------
-    name : str
-        Their materials.
-    layers : tuple of int
-        From inside to outside.
-    series : `dbvfiv.materials.prony.Prony`
-    """
-
-    name: str
-    layers: tuple[int, ...]
+    name: str  #: Their materials.
+    layers: tuple[int, ...]  #: From inside to outside.
     series: Prony
 
 
@@ -65,18 +43,12 @@ class Section:
 
     Through-thickness coordinate and weights are normalised: zeta in (-1/2, 1/2), weights summing to one; a wall of
     thickness h has t = h zeta.
-
-    Attributes
-    ----------
-    layers : tuple of Layer
-    points_per_layer : int
-    present : tuple of bool
-        Which of the layers are there; all by default. Those that are not have points without weight, so that layers are
-        numbered alike wherever a wall has how many.
     """
 
     layers: tuple[Layer, ...]
     points_per_layer: int = 2
+    #: Which of the layers are there; all by default. Those that are not have points without weight, so that layers are
+    #: numbered alike wherever a wall has how many.
     present: tuple[bool, ...] = ()
 
     def __post_init__(self):
@@ -230,27 +202,15 @@ class Section:
     def rubber_points(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Points (k, 2), constants (k, 8 + 2 n) and shear scale (k,) of the points that carry rubber."""
         chosen = self.kinds == RUBBER
-        return (
-            self.points[chosen],
-            self.parameters[chosen],
-            self.shear_scale[chosen],
-        )
+        return (self.points[chosen], self.parameters[chosen], self.shear_scale[chosen])
 
 
 @dataclass(frozen=True)
 class Zones:
-    """Zones of the wall: elements that have the same layers.
+    """Zones of the wall: elements that have the same layers."""
 
-    Attributes
-    ----------
-    presence : (nz, nl) bool array
-        True where a zone has a layer.
-    of_element : (ne,) int array
-        Zone of each element.
-    """
-
-    presence: np.ndarray
-    of_element: np.ndarray
+    presence: np.ndarray  #: (nz, nl); true where a zone has a layer.
+    of_element: np.ndarray  #: (ne,); zone of each element.
 
     @classmethod
     def of(cls, present: np.ndarray) -> Zones:
@@ -261,16 +221,9 @@ class Zones:
 
 @dataclass(frozen=True)
 class WallParts:
-    """A wall zone by zone.
+    """A wall zone by zone."""
 
-    Attributes
-    ----------
-    section : Section
-        All its layers.
-    zones : Zones
-    """
-
-    section: Section
+    section: Section  #: All its layers.
     zones: Zones
 
     @cached_property

@@ -42,18 +42,10 @@ class _Part:
 
 @dataclass(frozen=True)
 class StepWall:
-    """A wall as one instant of a motion sees it.
+    """A wall as one instant of a motion sees it."""
 
-    Attributes
-    ----------
-    wall : tuple of tuples
-        Laws of its layers, zone by zone, see `Section.wall`.
-    held : (ne, 4, 8) array
-        Resultants at each Gauss point that come on top of those of the layers.
-    """
-
-    wall: tuple
-    held: np.ndarray
+    wall: tuple  #: Laws of its layers, zone by zone, see `Section.wall`.
+    held: np.ndarray  #: (ne, 4, 8); resultants at each Gauss point that come on top of those of the layers.
 
 
 class Shell:
@@ -61,8 +53,6 @@ class Shell:
 
     Parameters
     ----------
-    mesh : ShellMesh
-    section : Section
     free : (nn, 5) bool array, optional
         Free unknowns of each node; all by default.
     metric : "first-order" or "shifted"
@@ -303,7 +293,6 @@ def relaxed_force_form(energies: EnergyFunctions, unknowns, directions, factors)
 
     Parameters
     ----------
-    energies : EnergyFunctions
     unknowns : (ne, 4, c) array
         The state about which it is taken.
     directions : sequence of k complex (ne, 4, c) arrays

@@ -126,7 +126,8 @@ THESIS = {
 
 
 def load_case(path: str | Path | None = None, overrides: Iterable[str] = ()) -> Case:
-    """Read and check a case file.
+    """Read and check a case file. Raises CaseError: one sentence: which key, in which line, what was given, what is
+    allowed.
 
     Parameters
     ----------
@@ -138,11 +139,6 @@ def load_case(path: str | Path | None = None, overrides: Iterable[str] = ()) -> 
     Returns
     -------
     Case
-
-    Raises
-    ------
-    CaseError
-        One sentence: which key, in which line, what was given, what is allowed.
     """
     overrides = tuple(overrides)
     case = read_case_file(Case, path, overrides)
@@ -164,7 +160,6 @@ def thesis_case(changes: Mapping[str, Any] | Iterable[str] = ()) -> Case:
 
 
 # -- contradictions between keys that are each allowed, found before minutes are spent on them
-# ----
 
 #: Studies that need a flow at drive.pressure, unless a parameter that they vary is the pressure.
 _AT_DRIVE = ("modes", "sweep", "onset", "map", "cycle", "sensitivity", "response")
@@ -175,7 +170,6 @@ def contradictions(case: Case, kind: str | None = None) -> Iterator[str]:
 
     Parameters
     ----------
-    case : Case
     kind : str, optional
         Study that is about to run; what does not concern it is left out.
     """
@@ -190,12 +184,8 @@ def _contradictions(case: Case, kind: str | None) -> Iterator[str]:
 
 
 def require_consistent(case: Case, kind: str | None = None) -> None:
-    """Refuse a case whose keys contradict each other, for a study or for any.
-
-    Raises
-    ------
-    CaseError
-        With the first contradiction.
+    """Refuse a case whose keys contradict each other, for a study or for any. Raises CaseError with the first
+    contradiction.
     """
     for sentence in contradictions(case, kind):
         raise CaseError(sentence)

@@ -55,64 +55,34 @@ def _text(value: Any) -> str:
 
 
 # -- numbers
-# ----
 
 
 @dataclass(frozen=True)
 class Compared:
-    """A quantity in which runs are compared.
+    """A quantity in which runs are compared."""
 
-    Attributes
-    ----------
-    column : str
-        Its name in results and in JSON.
-    factor : float
-        From SI to the unit of the table.
-    title, unit : str
-        Of its table; without a title the unit stands in the head of the columns, without both there is no table.
-    share : bool
-        Differences are shares of the first run's number, and not numbers less that.
-    key : str
-        Of the differences in JSON; empty where they are not there.
-    """
-
-    column: str
-    factor: float = 1.0
+    column: str  #: Its name in results and in JSON.
+    factor: float = 1.0  #: From SI to the unit of the table.
+    #: title and unit: of its table; without a title the unit stands in the head of the columns, without both there is
+    #: no table.
     title: str = ""
     unit: str = ""
-    share: bool = False
-    key: str = ""
+    share: bool = False  #: Differences are shares of the first run's number, and not numbers less that.
+    key: str = ""  #: Of the differences in JSON; empty where they are not there.
 
 
 @dataclass(frozen=True)
 class Comparison:
-    """Numbers of several runs at the pressures of the first.
-
-    Attributes
-    ----------
-    results : sequence of StudyResult
-    labels : list of str
-        What tells the runs apart.
-    quantities : tuple of Compared
-    picture : callable
-        Draws the figure of the runs.
-    pressure : (k,) array, Pa
-    values : dict of (runs, k) arrays, SI
-        By columns; NaN where a run has nothing.
-    notes : list of str
-        Sentences below the tables.
-    remark : str
-        What stands in the way of comparing; empty if nothing does.
-    """
+    """Numbers of several runs at the pressures of the first."""
 
     results: Sequence[StudyResult]
-    labels: list[str]
+    labels: list[str]  #: What tells the runs apart.
     quantities: tuple[Compared, ...]
-    picture: Callable[[Sequence[StudyResult]], Figure]
-    pressure: np.ndarray
-    values: dict[str, np.ndarray]
-    notes: list[str] = field(default_factory=list)
-    remark: str = ""
+    picture: Callable[[Sequence[StudyResult]], Figure]  #: Draws the figure of the runs.
+    pressure: np.ndarray  #: (k,), Pa.
+    values: dict[str, np.ndarray]  #: dict of (runs, k), SI; by columns; NaN where a run has nothing.
+    notes: list[str] = field(default_factory=list)  #: Sentences below the tables.
+    remark: str = ""  #: What stands in the way of comparing; empty if nothing does.
 
     @classmethod
     def of(
@@ -124,12 +94,8 @@ class Comparison:
         notes: Iterable[str] = (),
         remark: str = "",
     ) -> Comparison:
-        """Hold results with `states` and ``at(pressure, column)`` against the first.
-
-        Raises
-        ------
-        CaseError
-            If one of them has no state.
+        """Hold results with `states` and ``at(pressure, column)`` against the first. Raises CaseError if one of them
+        has no state.
         """
         for result in results:
             if not result.states:
@@ -215,7 +181,6 @@ def tabulate_deviations(runs: Sequence[Iterable[Any]]) -> list[str]:
 
 
 # -- figures
-# ----
 
 #: How measured points look, and most sections that one figure shows.
 MEASURED, _MOST = {"ls": "", "marker": "x", "mew": 1.6, "ms": 7}, 6
@@ -368,13 +333,7 @@ def _centre_line(shapes: MeasuredShapes) -> Figure:
 
 
 def save_figure(draw: Callable[[], Figure], path: Path, units: Units) -> Path:
-    """Draw into a file, in the units of a case.
-
-    Raises
-    ------
-    CaseError
-        If the file cannot be written.
-    """
+    """Draw into a file, in the units of a case. Raises CaseError if the file cannot be written."""
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         with style():

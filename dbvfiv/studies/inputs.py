@@ -50,32 +50,15 @@ CONFIDENCE = 0.95
 
 @dataclass(frozen=True)
 class Input:
-    """One uncertain number.
+    """One uncertain number."""
 
-    Attributes
-    ----------
-    name : str
-        Of a parameter of the table, or a key of the case.
-    distribution : Distribution
-        SI; angles in degrees.
-    quantity : Quantity
-    source : str
-        Why it is as uncertain as that.
-    surrounding : bool
-        Whether steady states and structure stay as they are.
-    own : float, optional
-        Number of the case; None where it has no one.
-    limits : tuple of float
-        Least and largest number that there can be.
-    """
-
-    name: str
-    distribution: Distribution
+    name: str  #: Of a parameter of the table, or a key of the case.
+    distribution: Distribution  #: SI; angles in degrees.
     quantity: Quantity
-    source: str
-    surrounding: bool
-    own: float | None = None
-    limits: tuple[float, float] = (-np.inf, np.inf)
+    source: str  #: Why it is as uncertain as that.
+    surrounding: bool  #: Whether steady states and structure stay as they are.
+    own: float | None = None  #: Number of the case; None where it has no one.
+    limits: tuple[float, float] = (-np.inf, np.inf)  #: Least and largest number that there can be.
 
     @property
     def title(self) -> str:
@@ -99,13 +82,8 @@ class Input:
 
 def inputs_of(case: Case, over: Sequence[str] = (), by: str = "uncertainty.over") -> list[Input]:
     """Uncertain inputs of a case, without those over which their effect is asked, which none may be that it names; `by`
-    says what moves these.
-
-    Raises
-    ------
-    CaseError
-        For a name that is no number of the case, a distribution that cannot be read, or one of which more than
-        `ALLOWED` lies where the number cannot be.
+    says what moves these. Raises CaseError for a name that is no number of the case, a distribution that cannot be
+    read, or one of which more than `ALLOWED` lies where the number cannot be.
     """
     asked = case.uncertainty
     varied = over or ([asked.axis.parameter] if asked.axis is not None else [])
@@ -141,12 +119,8 @@ def inputs_of(case: Case, over: Sequence[str] = (), by: str = "uncertainty.over"
 
 
 def correlation_of(case: Case, inputs: Sequence[Input]) -> np.ndarray:
-    """Lower triangle (d, d) that turns independent standard normal scores into those of the inputs.
-
-    Raises
-    ------
-    CaseError
-        For a name that is no input, or correlations that no numbers can have.
+    """Lower triangle (d, d) that turns independent standard normal scores into those of the inputs. Raises CaseError
+    for a name that is no input, or correlations that no numbers can have.
     """
     names = [one.name for one in inputs]
     matrix = np.eye(len(names))
@@ -189,18 +163,11 @@ def quasi_random(count: int, dimension: int, seed: int) -> np.ndarray:
 
 @dataclass(frozen=True)
 class Probability:
-    """Probability of an outcome with its interval.
+    """Probability of an outcome with its interval."""
 
-    Attributes
-    ----------
-    value : float
-        Among the decided samples.
-    low, high : float
-        Interval of `CONFIDENCE`; undecided samples count as not being of the outcome for the lower end, as being of it
-        for the upper one.
-    """
-
-    value: float
+    value: float  #: Among the decided samples.
+    #: low and high: interval of `CONFIDENCE`; undecided samples count as not being of the outcome for the lower end, as
+    #: being of it for the upper one.
     low: float
     high: float
 
@@ -220,20 +187,12 @@ def counted(hits: int, undecided: int, count: int) -> Probability:
 
 @dataclass(frozen=True)
 class Plan:
-    """Inputs of a case, and places where their effect is asked.
-
-    Attributes
-    ----------
-    case : Case
-    moved : tuple of str
-        Parameters over which the inputs are asked; that of `uncertainty.over` where none is named.
-    by : str
-        What moves these.
-    """
+    """Inputs of a case, and places where their effect is asked."""
 
     case: Case
+    #: Parameters over which the inputs are asked; that of `uncertainty.over` where none is named.
     moved: tuple[str, ...] = ()
-    by: str = "uncertainty.over"
+    by: str = "uncertainty.over"  #: What moves these.
 
     @cached_property
     def inputs(self) -> list[Input]:
@@ -287,23 +246,13 @@ class Plan:
         return self.point(case, row, **({} if is_input else {self.parameter: value}))
 
     def redescribed(self, row: np.ndarray) -> Case:
-        """Case of a sample, without the parameters of the table.
-
-        Raises
-        ------
-        CaseError
-            For numbers that do not go together.
-        """
+        """Case of a sample without the parameters of the table. Raises CaseError for numbers that do not match."""
         keys = {one.name: float(x) for one, x in zip(self.inputs, row) if one.name not in PARAMETERS}
         return redesigned(self.case, keys)
 
     def walk(self, row: np.ndarray, solver: ColumnSolver) -> StabilityWalk:
-        """Walk of a sample, which keeps the symbolic factorisations of a solver.
-
-        Raises
-        ------
-        CaseError, SolveError
-            For numbers that do not go together.
+        """Walk of a sample, which keeps the symbolic factorisations of a solver. Raises CaseError, SolveError for
+        numbers that do not go together.
         """
         return StabilityWalk(self.redescribed(row), solver=solver)
 

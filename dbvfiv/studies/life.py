@@ -53,22 +53,11 @@ TAKES = {"cycle": ("--at",), "transient": ("--since", "--per-day"), "steady": ("
 
 @dataclass(frozen=True, eq=False)
 class Motion:
-    """A motion that repeats.
-
-    Attributes
-    ----------
-    shell : Shell
-    states : sequence of (n,) arrays
-        Full states over one block of it.
-    hours : float
-        From the start of a block to that of the next.
-    words : str
-    remarks : tuple of str
-    """
+    """A motion that repeats."""
 
     shell: Shell
-    states: Sequence[np.ndarray]
-    hours: float
+    states: Sequence[np.ndarray]  #: sequence of (n,); full states over one block of it.
+    hours: float  #: From the start of a block to that of the next.
     words: str
     remarks: tuple[str, ...] = ()
 
@@ -76,7 +65,8 @@ class Motion:
 def motion_of(
     result: Any, value: float | None = None, since: float | None = None, per_day: float | None = None
 ) -> Motion:
-    """Motion of a result of `cycle`, `transient`, `steady` or `closure`.
+    """Motion of a result of `cycle`, `transient`, `steady` or `closure`. Raises CaseError if the result holds no
+    motion.
 
     Parameters
     ----------
@@ -87,11 +77,6 @@ def motion_of(
         none.
     per_day : float, optional
         How often in a day a run takes place, or the way to the last state and back.
-
-    Raises
-    ------
-    CaseError
-        If the result holds no motion.
     """
     name = f"The {result.kind} result of {result.header.name!r}"
     given = {"--at": value, "--since": since, "--per-day": per_day}
@@ -166,28 +151,17 @@ def _swings(lip: np.ndarray) -> float:
 
 @dataclass(frozen=True, eq=False)
 class Part:
-    """A rubber layer, or its bond to a ply, and how long it lasts.
-
-    Attributes
-    ----------
-    name, rubber : str
-    layers : list of int
-        Of the wall, inside to outside from 1: one, or the two that are bonded.
-    all_hours, all_cuts : (ne,) arrays
-        By the middles of the constants: hours to the crack, and length, m, from which a flaw grows.
-    all_releases : (ne,) array, J/m2
-        Largest energy release rate of a flaw of the middle length.
-    element : int
-        The one that fails first, of which the columns of `COLUMNS` are.
-    """
+    """A rubber layer, or its bond to a ply, and how long it lasts."""
 
     name: str
     rubber: str
-    layers: list[int]
+    layers: list[int]  #: Of the wall, inside to outside from 1: one, or the two that are bonded.
+    #: all_hours and all_cuts: (ne,); by the middles of the constants: hours to the crack, and length, m, from which a
+    #: flaw grows.
     all_hours: np.ndarray
     all_cuts: np.ndarray
-    all_releases: np.ndarray
-    element: int
+    all_releases: np.ndarray  #: (ne,), J/m2; largest energy release rate of a flaw of the middle length.
+    element: int  #: The one that fails first, of which the columns of `COLUMNS` are.
     hours: float
     interval: list[float]
     without_growth: float
@@ -226,12 +200,11 @@ COLUMNS = (
 
 
 class Life:
-    """Life of a valve under a motion.
+    """Life of a valve under a motion. Raises CaseError if no layer is a rubber, constants of one are not known, or
+    nothing moves.
 
     Parameters
     ----------
-    result : StudyResult
-    motion : Motion
     keys : dbvfiv.case.project.Life, optional
         In place of those of the case.
 
@@ -241,11 +214,6 @@ class Life:
         Rubber layers inside to outside, then their bonds to plies.
     first : Part
         The one that fails first.
-
-    Raises
-    ------
-    CaseError
-        If no layer is a rubber, constants of one are not known, or nothing moves.
     """
 
     def __init__(self, result: Any, motion: Motion, keys: Any = None):

@@ -31,21 +31,16 @@ def keep_measured(
     record: GrowingRecord, key: str, files: Sequence[Path], kinds: Collection[str], density: float
 ) -> None:
     """Put the tables of a case into a record that has none yet, so that a result has them when their files have gone.
+    Raises CaseError if a file has gone or holds something else.
 
     Parameters
     ----------
-    record : GrowingRecord
     key : str
         Of the case, for messages.
     files : sequence of Path
     kinds : collection of str
         What they may hold, see `dbvfiv.case.measured`.
     density : float, kg/m3
-
-    Raises
-    ------
-    CaseError
-        If a file has gone or holds something else.
     """
     if record.notes(NOTE):
         return
@@ -87,32 +82,17 @@ def _count(number: int, word: str) -> str:
 
 
 # -- curves and taps
-# ----
 
 
 @dataclass(frozen=True)
 class Quantity:
-    """A quantity measured over the pressure.
+    """A quantity measured over the pressure."""
 
-    Attributes
-    ----------
-    what : str
-        For people.
-    key : str
-        Its name in measured tables and in JSON.
-    column : str
-        Its name in results.
-    unit : str
-        In which people are told of it.
-    factor : float
-        From SI to that.
-    """
-
-    what: str
-    key: str
-    column: str
-    unit: str
-    factor: float = 1.0
+    what: str  #: For people.
+    key: str  #: Its name in measured tables and in JSON.
+    column: str  #: Its name in results.
+    unit: str  #: In which people are told of it.
+    factor: float = 1.0  #: From SI to that.
 
 
 FLOW = Quantity("flow", "mass_flow", "mass_flow", "kg/s")
@@ -171,25 +151,15 @@ def static_pressure(state: Any, case: Any, z: np.ndarray) -> np.ndarray:
 
 @dataclass(frozen=True)
 class MeasuredTaps:
-    """Static pressures measured along the axis, and those computed there.
+    """Static pressures measured along the axis, and those computed there."""
 
-    Attributes
-    ----------
-    pressure : (k,) array, Pa
-        As drive.pressure has it.
-    z : (k,) array, m
-        From the lip, where the valve is at rest.
-    measured, computed : (k,) arrays, Pa
-        Over that of the surroundings; NaN where there is no state of that pressure, and beyond the valve.
-    without : str
-        Clause on pressures that were not computed.
-    """
-
-    pressure: np.ndarray
-    z: np.ndarray
+    pressure: np.ndarray  #: (k,), Pa; as drive.pressure has it.
+    z: np.ndarray  #: (k,), m; from the lip, where the valve is at rest.
+    #: measured and computed: (k,), Pa; over that of the surroundings; NaN where there is no state of that pressure, and
+    #: beyond the valve.
     measured: np.ndarray
     computed: np.ndarray
-    without: str = ""
+    without: str = ""  #: Clause on pressures that were not computed.
 
     @classmethod
     def of(cls, columns: Sequence[Sequence[float]], result: Any) -> MeasuredTaps:
@@ -248,7 +218,6 @@ def lacking(states: Sequence[Any], pressures: Iterable[float]) -> str:
 
 
 # -- sections of the wall
-# ----
 
 
 @dataclass(frozen=True, eq=False)
@@ -328,25 +297,14 @@ def _inside(points: np.ndarray, polygon: np.ndarray) -> np.ndarray:
 
 @dataclass(frozen=True)
 class MeasuredSection:
-    """Measured points of one section at one pressure.
+    """Measured points of one section at one pressure."""
 
-    Attributes
-    ----------
-    pressure : float, Pa
-    z : float or None, m
-        Of the plane, from the lip where the valve is at rest; None at the edge of the lip, wherever it has moved.
-    face : str
-        "inner", "outer" or "middle".
-    points : (k, 2) array, m
-    curve : (c, 2) array or None, m
-        The computed section of a part; None without a state there or beyond the valve.
-    part : Part
-    """
-
-    pressure: float
+    pressure: float  #: Pa.
+    #: m; of the plane, from the lip where the valve is at rest; None at the edge of the lip, wherever it has moved.
     z: float | None
-    face: str
-    points: np.ndarray
+    face: str  #: "inner", "outer" or "middle".
+    points: np.ndarray  #: (k, 2), m.
+    #: (c, 2) or None, m; the computed section of a part; None without a state there or beyond the valve.
     curve: np.ndarray | None
     part: Part = QUARTER
 
@@ -431,7 +389,6 @@ class MeasuredShapes:
 
 
 # -- beside a result
-# ----
 
 #: Keys of the JSON document.
 _KEYS = {DISCHARGE: "measured", AREA: "measured_area", SHAPE: "measured_sections", TAPS: "measured_taps"}

@@ -33,23 +33,12 @@ MODES = 6
 
 @dataclass(frozen=True, eq=False)
 class Onset:
-    """An onset with an oscillation.
+    """An onset with an oscillation."""
 
-    Attributes
-    ----------
-    value : float
-        Of the parameter.
-    place : Mu
-    spectrum : eigen.Spectrum
-        Leading modes there.
-    index : int
-        Of the neutral one among them.
-    """
-
-    value: float
+    value: float  #: Of the parameter.
     place: Mu
-    spectrum: object
-    index: int
+    spectrum: object  #: Leading modes there.
+    index: int  #: Of the neutral one among them.
 
     @property
     def eigenvalue(self) -> complex:
@@ -61,11 +50,8 @@ class Onset:
 
 
 def onset_at(walk: StabilityWalk, place: Mu, value: float, expected: complex) -> Onset | None:
-    """The onset at a place where an eigenvalue is known to be neutral; None if that does not oscillate.
-
-    Raises
-    ------
-    SolveError
+    """The onset at a place where an eigenvalue is known to be neutral; None if that does not oscillate. Raises
+    SolveError.
     """
     spectrum = walk.spectrum(place, MODES)
     index = int(np.argmin(np.abs(spectrum.eigenvalues - expected)))
@@ -80,18 +66,10 @@ INSTANTS, FULL = 240, 64
 
 @dataclass(frozen=True, eq=False)
 class Orbit:
-    """A cycle of a valve, looked at over one period.
-
-    Attributes
-    ----------
-    model : ValveModel
-    mu : dict
-        Parameters by the names of `Mu.for_system`.
-    motion : PeriodicMotion
-    """
+    """A cycle of a valve, looked at over one period."""
 
     model: ValveModel
-    mu: dict
+    mu: dict  #: Parameters by the names of `Mu.for_system`.
     motion: PeriodicMotion
 
     @cached_property
@@ -198,24 +176,19 @@ def _refusing(models: Callable[[Mapping[str, float]], ValveModel]) -> Callable[[
 
 
 class Follower:
-    """Follows cycles of a case along one parameter.
+    """Follows cycles of a case along one parameter. Raises SolveError if the equations of periodic motions do not cover
+    the case.
 
     Parameters
     ----------
     case : Case
         Its section `cycle` says how.
-    walk : StabilityWalk
     place : Mu
         Parameters at the start.
     parameter : str
         The one to move.
     spectrum : eigen.Spectrum
         Leading modes of a steady state near the start, of which the basis of the corrections is made.
-
-    Raises
-    ------
-    SolveError
-        If the equations of periodic motions do not cover the case.
     """
 
     def __init__(self, case: Case, walk: StabilityWalk, place: Mu, parameter: str, spectrum):
@@ -235,12 +208,7 @@ class Follower:
 
     def _flow(self, mu: Mapping[str, float]) -> FlowLaw:
         """Flow law behind a pump, with the static lift that makes the pressure that of the steady state, as spectra
-        have it.
-
-        Raises
-        ------
-        OutOfDomain
-            If there is no steady state.
+        have it. Raises OutOfDomain if there is no steady state.
         """
         value, model = float(mu[self.name]), self.system.model(mu)
         if value not in self._flows:
@@ -255,12 +223,7 @@ class Follower:
         return self._flows[value]
 
     def at_rest(self, onset: Onset) -> Cycle:
-        """The steady state at an onset, as a cycle at rest.
-
-        Raises
-        ------
-        SolveError
-        """
+        """The steady state at an onset, as a cycle at rest. Raises SolveError."""
         mu, q = onset.place.for_system(), self.walk.equilibrium(onset.place)
         model = self.system.model(mu)
         rest = np.concatenate([q, model.flow.steady_inner(model.rows.areas(model.nodal(q)), mu)])
@@ -270,11 +233,7 @@ class Follower:
     def from_onset(self, onset: Onset, values: Sequence[float]) -> tuple[Cycle, Cycle, Cycle, bool]:
         """The steady state at an onset, as a cycle at rest, and two small cycles beside it, of the amplitude asked for
         and somewhat more, or of as much less as it takes that they lie within ascending values; and whether the branch
-        goes on from the onset without a fold up to the second one.
-
-        Raises
-        ------
-        SolveError
+        goes on from the onset without a fold up to the second one. Raises SolveError.
         """
         for amplitude in self.case.cycle.amplitude * 0.5 ** np.arange(HALVINGS):
             why = "cycles lie beyond the range"
@@ -293,12 +252,8 @@ class Follower:
         )
 
     def _beside_rest(self, onset: Onset, amplitude: float) -> tuple[Cycle, Cycle, Cycle, bool]:
-        """As `from_onset`, with the amplitude, m, of the first cycle, wherever cycles lie.
-
-        Raises
-        ------
-        SolveError
-        ContinuationError
+        """As `from_onset`, with the amplitude, m, of the first cycle, wherever cycles lie. Raises SolveError. Raises
+        ContinuationError.
         """
         mu, mode = onset.place.for_system(), onset.mode
         still = self.at_rest(onset).motion.coefficients[0]
@@ -319,12 +274,7 @@ class Follower:
 
     def amplitude(self, onset: Onset) -> tuple[AmplitudeEquation, float]:
         """Amplitude equation of the mode of an onset, or of a nearly neutral one beside it, for the displacement of the
-        lip, m; and that displacement at rest.
-
-        Raises
-        ------
-        SolveError
-            If the mode does not move the middle of the lips.
+        lip, m; and that displacement at rest. Raises SolveError if the mode does not move the middle of the lips.
         """
         mu, n = onset.place.for_system(), self.system.size - self.system.inner
         forms = ValveForms(self.system.model(mu), self.walk.equilibrium(onset.place), mu)
@@ -345,11 +295,7 @@ class Follower:
 
     def beside(self, onset: Onset, first: Cycle, value: float) -> Cycle:
         """The cycle at a value between an onset and the first cycle of its branch, guessed by the root of the distance
-        from the onset.
-
-        Raises
-        ------
-        SolveError
+        from the onset. Raises SolveError.
         """
         share = np.sqrt((value - onset.value) / (first.mu[self.name] - onset.value))
         coefficients = first.motion.coefficients.copy()
@@ -357,12 +303,7 @@ class Follower:
         return self.near(PeriodicMotion(first.motion.harmonics, coefficients, first.motion.omega), value)
 
     def near(self, guess: PeriodicMotion, value: float) -> Cycle:
-        """The cycle near a motion, at a value of the parameter.
-
-        Raises
-        ------
-        SolveError
-        """
+        """The cycle near a motion, at a value of the parameter. Raises SolveError."""
         try:
             found = self.solver.solve(guess, self.place.for_system() | {self.name: value})
         except ContinuationError as error:

@@ -30,20 +30,13 @@ _DAMPING = 5.0
 
 @dataclass(frozen=True)
 class Candidate:
-    """A computed oscillation.
-
-    Attributes
-    ----------
-    name : str
-    frequency, frequency_interval : float, Hz
-        With half its 95 % interval.
-    damping_ratio, damping_ratio_interval : float
-        Zero and NaN of what keeps its amplitude.
-    """
+    """A computed oscillation."""
 
     name: str
+    #: frequency and frequency_interval: Hz; with half its 95 % interval.
     frequency: float
     frequency_interval: float
+    #: damping_ratio and damping_ratio_interval: zero and NaN of what keeps its amplitude.
     damping_ratio: float = 0.0
     damping_ratio_interval: float = np.nan
 
@@ -70,18 +63,12 @@ class Candidate:
 
 
 def candidates_of(result: StudyResult, error: float) -> list[Candidate]:
-    """Oscillations of a result of modes, cycle or transient.
+    """Oscillations of a result of modes, cycle or transient. Raises CaseError if the result holds none.
 
     Parameters
     ----------
-    result : StudyResult
     error : float
         Half the 95 % interval of computed frequencies, relative: stiffness, mesh, water outside.
-
-    Raises
-    ------
-    CaseError
-        If the result holds none.
     """
     if result.kind == "modes":
         found = [
@@ -123,7 +110,6 @@ class Recognition:
     Parameters
     ----------
     signals : sequence of JudgedSignal
-    result : StudyResult
     error : float
         See `candidates_of`.
     """

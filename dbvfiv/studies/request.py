@@ -24,24 +24,14 @@ def is_sheet(path: Path | None) -> bool:
 
 
 def require_gif(path: Path | None) -> Path | None:
-    """Refuse a name of an animation that is none of a GIF.
-
-    Raises
-    ------
-    CaseError
-    """
+    """Refuse a name of an animation that is none of a GIF. Raises CaseError."""
     if path is not None and path.suffix.lower() != ".gif":
         raise CaseError(f"An animation is given as {str(path)!r}; it must be a .gif file.")
     return path
 
 
 def with_unit(option: typer.CallbackParam, given: str | list[str] | None) -> str | list[str] | None:
-    """Refuse a bare number where a command takes a pressure, or several, or ranges of it.
-
-    Raises
-    ------
-    CaseError
-    """
+    """Refuse a bare number where a command takes a pressure, or several, or ranges of it. Raises CaseError."""
     for text in given if isinstance(given, list) else [given or ""]:
         for part in text.split(":")[:2]:
             if isinstance(number := number_or_text(part), float) and number != 0:
@@ -57,13 +47,7 @@ LAWS = ("quasi-steady", "storage", "both")
 
 
 def law_changes(law: str | None, study: str) -> dict[str, str | None]:
-    """Keys of the case that a law asked for on the command line changes.
-
-    Raises
-    ------
-    CaseError
-        For a word that is no choice.
-    """
+    """Keys that a law asked for on the command line changes. Raises CaseError for a word that is no choice."""
     if law is not None and law not in LAWS:
         raise CaseError(f"--law is given as {law!r}; it must be {', '.join(LAWS[:-1])} or {LAWS[-1]}.")
     if law == "both":
@@ -78,11 +62,8 @@ def ranged_changes(study: str, over: str | None, pressure: str | None, density: 
 
 
 def require_start_file(start: str, word: str, path: Path | None) -> None:
-    """Refuse a `start_file` of a study without the `start` that is called by a word, and that without a file.
-
-    Raises
-    ------
-    BrokenRule
+    """Refuse a `start_file` of a study without the `start` that is called by a word, and that without a file. Raises
+    BrokenRule.
     """
     if (start == word) != (path is not None):
         given = f"none with start = {word!r}" if path is None else f"{str(path)!r} with start = {start!r}"
@@ -135,24 +116,13 @@ WorkersOption = Annotated[str | None, typer.Option("--workers", "-w", "--on", me
 
 @dataclass(frozen=True)
 class Request:
-    """A study as the command line wants it.
+    """A study as the command line wants it."""
 
-    Attributes
-    ----------
-    changes : dict
-        Keys of the case and what takes their place; those with None are left as they are.
-    choices : dict
-        What the study takes that is no key of the case; likewise.
-    further : callable, optional
-        From the result to further files, such as an animation.
-    sheet : callable, optional
-        From results to a table that takes the place of the result file.
-    variants : tuple of dict
-        Changes of the case with which the study is made again, for the same sheet.
-    """
-
+    #: Keys of the case and what takes their place; those with None are left as they are.
     changes: dict[str, Any] = field(default_factory=dict)
-    choices: dict[str, Any] = field(default_factory=dict)
-    further: Callable[[Any], list[Path]] | None = None
+    choices: dict[str, Any] = field(default_factory=dict)  #: What the study takes that is no key of the case; likewise.
+    further: Callable[[Any], list[Path]] | None = None  #: From the result to further files, such as an animation.
+    #: From results to a table that takes the place of the result file.
     sheet: Callable[[Sequence[Any]], Path] | None = None
+    #: Changes of the case with which the study is made again, for the same sheet.
     variants: tuple[dict[str, Any], ...] = ()

@@ -37,46 +37,29 @@ from .case import Case, oddities, require_consistent
 
 @dataclass(frozen=True)
 class Study:
-    """One analysis that the program offers.
+    """One analysis that the program offers."""
 
-    Attributes
-    ----------
-    kind : str
-        Name of the command, of the section of the case file and of the result.
-    tables : callable
-        From the mesh of a valve to the tables of a result.
-    run : callable
-        ``run(session, record, **choices)`` finds what is asked for and keeps it in the record, a `GrowingRecord`. What
-        the record holds already, from an interrupted attempt, is not computed again. Ctrl-C may end it at any point.
-    result : type
-        `StudyResult` of its records.
-    check : callable, optional
-        Raises the `CaseError` or `SolveError` of a case that the study cannot answer, before anything is solved.
-    rows_to_keep : callable, optional
-        From what an earlier attempt kept and the case as it is to go on, to how many rows of each table the run goes on
-        from. Without it a run goes on from all rows.
-    extends : bool, optional
-        A complete run can go on, to a later end; ``rows_to_keep`` refuses one without it by a `CaseError`. Other
-        studies that are complete are refused.
-    live : callable, optional
-        From the case to what writes an item that was found as a line of a table, as soon as it is; the first line has
-        the head of the table above it. Without it everything is printed at the end.
-    compare : callable, optional
-        From results to what tells them apart: ``labels``, ``lines()``, ``document()`` and the figure, ``draw()``.
-    files : mapping
-        Choices that are names of what a run writes besides its result: of a file, with an empty text, or of a folder,
-        with a pattern of the files in it.
-    """
-
-    kind: str
-    tables: Callable[[MeshData], tuple[TableSpec, ...]]
+    kind: str  #: Name of the command, of the section of the case file and of the result.
+    tables: Callable[[MeshData], tuple[TableSpec, ...]]  #: From the mesh of a valve to the tables of a result.
+    #: ``run(session, record, **choices)`` finds what is asked for and keeps it in the record, a `GrowingRecord`. What
+    #: the record holds already, from an interrupted attempt, is not computed again. Ctrl-C may end it at any point.
     run: Callable[..., None]
-    result: type[Any]
+    result: type[Any]  #: `StudyResult` of its records.
+    #: Raises the `CaseError` or `SolveError` of a case that the study cannot answer, before anything is solved.
     check: Callable[[Case], Any] = lambda _case: None
+    #: From what an earlier attempt kept and the case as it is to go on, to how many rows of each table the run goes on
+    #: from. Without it a run goes on from all rows.
     rows_to_keep: Callable[[Record, Case], Mapping[str, int]] | None = None
+    #: A complete run can go on, to a later end; ``rows_to_keep`` refuses one without it by a `CaseError`. Other studies
+    #: that are complete are refused.
     extends: bool = False
+    #: From the case to what writes an item that was found as a line of a table, as soon as it is; the first line has
+    #: the head of the table above it. Without it everything is printed at the end.
     live: Callable[[Case], Callable[[Any], str]] | None = None
+    #: From results to what tells them apart: ``labels``, ``lines()``, ``document()`` and the figure, ``draw()``.
     compare: Callable[[Sequence[Any]], Any] | None = None
+    #: Choices that are names of what a run writes besides its result: of a file, with an empty text, or of a folder,
+    #: with a pattern of the files in it.
     files: Mapping[str, str] = field(default_factory=dict)
 
 
@@ -97,13 +80,7 @@ def print_rows(columns: Iterable[Column]) -> Callable[[Any], str]:
 
 
 def find_study(kind: str) -> Study:
-    """The study of a kind; its folder is imported when it is first asked for.
-
-    Raises
-    ------
-    KeyError
-        If there is none.
-    """
+    """The study of a kind; its folder is imported when it is first asked for. Raises KeyError if there is none."""
     if kind not in KINDS:
         raise KeyError(kind)
     return import_module(f"{__package__}.{kind}.study").STUDY
@@ -115,12 +92,7 @@ KEYWORDS = {row.name: row.key for row in PARAMETERS.values() if row.swept} | {"c
 
 def named_changes(given: Mapping[str, Any], kind: str = "") -> dict[str, Any]:
     """Changes of a case from keyword arguments, those of every study and the keys of the section of the one asked;
-    those that are None are left out.
-
-    Raises
-    ------
-    CaseError
-        For a name that is nothing to choose.
+    those that are None are left out. Raises CaseError for a name that is nothing to choose.
     """
     own = Case.model_fields[kind].annotation.model_fields if kind else ()
     band = {"max_frequency": "modes.max_frequency"} if kind else {}  # up to which all of them search
@@ -149,7 +121,6 @@ class Session:
 
     Parameters
     ----------
-    case : Case
     name : str
         For titles and file names.
     start : SteadyState, optional
@@ -180,13 +151,7 @@ class Session:
 
     @cached_property
     def model(self) -> ValveModel:
-        """The coupled model of the case.
-
-        Raises
-        ------
-        CaseError
-            If the case gives no model.
-        """
+        """The coupled model of the case. Raises CaseError if the case gives no model."""
         if self.case.seeks_levels:
             return self.settle().model
         return self.at_cracking().model if self.case.valve.cracking_head else self.described
@@ -204,11 +169,7 @@ class Session:
     @cached_property
     def described(self) -> ValveModel:
         """The model before anything is solved: rubbers whose strain levels are sought have the lowest tested ones.
-
-        Raises
-        ------
-        CaseError
-            If the case gives no model, or asks for a pressure that no wall like it bears.
+        Raises CaseError if the case gives no model, or asks for a pressure that no wall like it bears.
         """
         free_memory()
         model = attempt(lambda: ValveModel(self.case))
@@ -244,13 +205,9 @@ class Session:
         return session
 
     def prepared(self, kind: str, changes: Mapping[str, Any]) -> Session:
-        """The session with what a study is asked for put into its case; None stands for nothing given.
-
-        Raises
-        ------
-        CaseError
-            For a key that cannot be used, and for a value of a parameter that the range of the study moves; where
-            records are identified, they were taken at that value.
+        """The session with what a study is asked for put into its case; None stands for nothing given. Raises CaseError
+        for a key that cannot be used, and for a value of a parameter that the range of the study moves; where records
+        are identified, they were taken at that value.
         """
         given = {key: value for key, value in changes.items() if value is not None}
         for name in ("over", "x", "y") if kind != "identify" else ():
@@ -280,14 +237,10 @@ class Session:
         return self._at_levels
 
     def equilibrium(self, observer: Observer, known: Sequence[SteadyState] = ()) -> SteadyState:
-        """The steady state at drive.pressure: one known already, the valve at rest, or by load steps.
+        """The steady state at drive.pressure: one known already, the valve at rest, or by load steps. Raises SolveError
+        if it is not reached.
 
         What is worth knowing about the state is told to the observer, again where it is known.
-
-        Raises
-        ------
-        SolveError
-            If it is not reached.
         """
         model, pressure = self.model, self.case.drive.pressure
         starts = known or [start for start in [self.start] if start is not None and start.pressure == pressure]
@@ -301,7 +254,8 @@ class Session:
     def perform(
         self, kind: str, output: str | Path | None = None, observer: Observer | None = None, **choices: Any
     ) -> Any:
-        """Run a study of the case.
+        """Run a study of the case. Raises CaseError if the case or the file cannot be used. Raises SolveError if
+        nothing can be found at all.
 
         Parameters
         ----------
@@ -318,13 +272,6 @@ class Session:
         -------
         StudyResult
             Of an interrupted or failed run too: with what it found.
-
-        Raises
-        ------
-        CaseError
-            If the case or the file cannot be used.
-        SolveError
-            If nothing can be found at all.
         """
         require_consistent(self.case, kind)
         study = find_study(kind)
@@ -339,11 +286,8 @@ class Session:
         return self._run(kind, header, output, observer, None, choices)
 
     def asked(self, kind: str, observer: Observer | None = None) -> Session:
-        """The session that a study runs on: what its case leaves to be found is found; itself where nothing is.
-
-        Raises
-        ------
-        CaseError, SolveError
+        """The session that a study runs on: what its case leaves to be found is found; itself where nothing is. Raises
+        CaseError, SolveError.
         """
         settled = self if kind == "levels" else self.settle(observer)
         return settled.at_cracking(observer)._at_operating_point(kind, observer)
@@ -393,16 +337,12 @@ _FILES = "files"
 
 
 def _require_new(path: Path | None, pattern: str) -> None:
-    """Refuse a name that is taken or cannot be written, before anything is computed.
+    """Refuse a name that is taken or cannot be written, before anything is computed. Raises CaseError.
 
     Parameters
     ----------
     pattern : str
         Of the files that are written into it, of a folder, which may be there.
-
-    Raises
-    ------
-    CaseError
     """
     if path is None:
         return
@@ -448,7 +388,8 @@ def load_result(path: str | Path) -> Any:
 
 
 def resume_result(path: str | Path, observer: Observer | None = None, changes: Mapping[str, Any] = {}, **choices: Any):
-    """Go on with an interrupted or killed study in its file.
+    """Go on with an interrupted or killed study in its file. Raises CaseError if the file cannot be read or there is
+    nothing left to do.
 
     Parameters
     ----------
@@ -460,11 +401,6 @@ def resume_result(path: str | Path, observer: Observer | None = None, changes: M
     Returns
     -------
     StudyResult
-
-    Raises
-    ------
-    CaseError
-        If the file cannot be read or there is nothing left to do.
     """
     check_writable(path)  # what another process is about to add must not be missed
     study, known = _find(path), _read(path)
@@ -477,24 +413,18 @@ def resume_result(path: str | Path, observer: Observer | None = None, changes: M
 
 
 def kept_run(kind: str, session: Session, path: Path, observer: Observer | None = None, **choices: Any) -> Any:
-    """The result of a study: from its file where that holds the same case, else computed into it.
+    """The result of a study: from its file where that holds the same case, else computed into it. Raises
+    KeyboardInterrupt if the run was interrupted; what was found is in the file. Raises CaseError, SolveError.
 
     Parameters
     ----------
     kind : str
         Of the study.
-    session : Session
     path : path
         Result file. One of another case is written over.
     observer : Observer, optional
     choices
         What the study takes that is no key of the case.
-
-    Raises
-    ------
-    KeyboardInterrupt
-        If the run was interrupted; what was found is in the file.
-    CaseError, SolveError
     """
     session = session.asked(kind, observer)
     kept = _load_if_readable(path)

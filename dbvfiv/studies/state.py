@@ -223,7 +223,6 @@ def reach_states(
 
     Parameters
     ----------
-    model : ValveModel
     case : Case
         With the options of the walk.
     record, table : GrowingRecord, str

@@ -43,20 +43,11 @@ def _number_or_address(given: Any) -> int | str:
 
 _ALLOWED = f"a number of processes from 1 to {MOST}, or the address of a Dask scheduler such as tcp://host:8786"
 #: A key that says who does the work.
-WorkersKey = Annotated[
-    int | str,
-    BeforeValidator(_number_or_address),
-    Described("integer or address", _ALLOWED),
-]
+WorkersKey = Annotated[int | str, BeforeValidator(_number_or_address), Described("integer or address", _ALLOWED)]
 
 
 def read_workers(given: Any) -> int | str:
-    """Number of processes, or address of a scheduler, that is given beside a case.
-
-    Raises
-    ------
-    CaseError
-    """
+    """Number of processes, or address of a scheduler, that is given beside a case. Raises CaseError."""
     try:
         return _number_or_address(given)
     except ValueError as error:
@@ -142,10 +133,10 @@ class Workers:
 
     def share(self, tasks: Iterable[Hashable], ask: Callable[[Any], Any]) -> Iterator[tuple[Any, Any]]:
         """Tasks with their results as they are finished: in any order, in their own where this process does them.
+        Raises CaseError if a scheduler does not answer.
 
         Parameters
         ----------
-        tasks : iterable
         ask : callable
             From a task to its `Work`, or to its result where nobody has to work for it; asked in the order of the
             tasks, shortly before a worker is free.
@@ -154,11 +145,6 @@ class Workers:
         ------
         task, result
             `Lost` is the result where nobody could do the task.
-
-        Raises
-        ------
-        CaseError
-            If a scheduler does not answer.
         """
         if self._works_alone:
             for task in tasks:
@@ -282,24 +268,13 @@ _LOSSES = ("KilledWorker", "CancelledError", "FutureCancelledError")
 
 
 def require_answer(count: int | str) -> None:
-    """Refuse the address of a scheduler that does not answer, before anything is computed for it.
-
-    Raises
-    ------
-    CaseError
-    """
+    """Refuse the address of a scheduler that does not answer, before anything is computed for it. Raises CaseError."""
     if isinstance(count, str):
         _connected(count).close()
 
 
 def _connected(address: str) -> Any:
-    """Client of a Dask scheduler.
-
-    Raises
-    ------
-    CaseError
-        If nobody answers, or the package is not installed.
-    """
+    """Client of a Dask scheduler. Raises CaseError if nobody answers, or the package is not installed."""
     try:
         from distributed import Client
     except ImportError:
@@ -356,11 +331,7 @@ def share_samples(
 
 def share_all(team: Workers, tasks: Iterable, ask: Callable[[Any], Any], told: Callable[[Any], str]) -> Iterator:
     """`Workers.share`, with what is lost as the end, when all else is known, so that another attempt does it again.
-
-    Raises
-    ------
-    SolveError
-        If workers died over a task, with `told` of it.
+    Raises SolveError if workers died over a task, with `told` of it.
     """
     lost = []
     for task, found in team.share(tasks, ask):

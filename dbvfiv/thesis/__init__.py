@@ -17,13 +17,7 @@ __all__ = ["ENTRIES", "Entry", "Number", "Workshop", "choose_entries"]
 
 
 def choose_entries(names: Sequence[str]) -> list[Entry]:
-    """Entries by their names, all without names.
-
-    Raises
-    ------
-    CaseError
-        For a name that there is no entry of.
-    """
+    """Entries by their names, all without names. Raises CaseError for a name that there is no entry of."""
     known = {entry.name: entry for entry in ENTRIES}
     for name in names:
         if name not in known:

@@ -20,15 +20,7 @@ _HEAD = ("", "ours", "thesis", "difference")
 
 @dataclass(frozen=True)
 class Number:
-    """A number of ours, and the one that the thesis's text gives, if it gives one.
-
-    Attributes
-    ----------
-    what : str
-    ours : float
-    published : float or None
-    unit : str
-    """
+    """A number of ours, and the one that the thesis's text gives, if it gives one."""
 
     what: str
     ours: float
@@ -60,37 +52,20 @@ Found = str | Number | Picture
 
 @dataclass(frozen=True)
 class Outcome:
-    """Findings of an entry.
+    """Findings of an entry."""
 
-    Attributes
-    ----------
-    sentences : tuple of str
-        Agreements, disagreements, and their reasons as far as these are known.
-    numbers : tuple of Number
-    pictures : tuple of Picture
-    """
-
-    sentences: tuple[str, ...]
+    sentences: tuple[str, ...]  #: Agreements, disagreements, and their reasons as far as these are known.
     numbers: tuple[Number, ...]
     pictures: tuple[Picture, ...]
 
 
 @dataclass(frozen=True)
 class Entry:
-    """A figure or table of the thesis and how it is made again.
+    """A figure or table of the thesis and how it is made again."""
 
-    Attributes
-    ----------
-    name : str
-        "7-4", or "T3-5" for a table.
-    title : str
-    tell : callable
-        From a `Workshop` to sentences, numbers and pictures, in any order.
-    """
-
-    name: str
+    name: str  #: "7-4", or "T3-5" for a table.
     title: str
-    tell: Callable[[Workshop], Iterable[Found]]
+    tell: Callable[[Workshop], Iterable[Found]]  #: From a `Workshop` to sentences, numbers and pictures, in any order.
 
     def make(self, workshop: Workshop) -> Outcome:
         """Findings, sorted by what they are."""

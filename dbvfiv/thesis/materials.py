@@ -114,11 +114,7 @@ def layers(angle: float = 54.0, shear: float = SHEAR) -> tuple[Layer, ...]:
 
 def deflections(elements: tuple[int, int], loads=LOADS, stack: tuple[Layer, ...] | None = None) -> np.ndarray:
     """Deflection at the load over that at the supports, m, at loads in N; of the layers given, or those of the thesis.
-
-    Raises
-    ------
-    SolveError
-        If Newton's method does not converge.
+    Raises SolveError if Newton's method does not converge.
     """
     along, across = elements
     nodes, index = _patch(along, across)

@@ -33,35 +33,17 @@ from .series import (
 
 @dataclass(frozen=True)
 class JudgeOptions:
-    """Options of a verdict.
+    """Options of a verdict."""
 
-    Attributes
-    ----------
-    steady : float
-        Largest change, over the last fifth and still to come, of a steady signal relative to its size.
-    residual : float
-        Largest residual of a steady state, where a residual is known.
-    cycles : int
-        Cycles that a limit cycle must have kept.
-    periodic : float
-        Largest periodicity error of a limit cycle without noise.
-    noisy : float
-        Largest periodicity error of a limit cycle with noise on it.
-    drift : float
-        Largest relative change of the amplitude over the cycles looked at, and still to come.
-    band : float
-        Relative band within which amplitudes count as equal.
-    noise : float
-        Largest root mean square of noise, relative to the level it lies on, within which a signal counts as steady.
-    """
-
+    #: Largest change, over the last fifth and still to come, of a steady signal relative to its size.
     steady: float = 1e-4
-    residual: float = 1e-3
-    cycles: int = 10
-    periodic: float = 0.02
-    noisy: float = 0.4
-    drift: float = 2e-3
-    band: float = 0.02
+    residual: float = 1e-3  #: Largest residual of a steady state, where a residual is known.
+    cycles: int = 10  #: Cycles that a limit cycle must have kept.
+    periodic: float = 0.02  #: Largest periodicity error of a limit cycle without noise.
+    noisy: float = 0.4  #: Largest periodicity error of a limit cycle with noise on it.
+    drift: float = 2e-3  #: Largest relative change of the amplitude over the cycles looked at, and still to come.
+    band: float = 0.02  #: Relative band within which amplitudes count as equal.
+    #: Largest root mean square of noise, relative to the level it lies on, within which a signal counts as steady.
     noise: float = 0.02
 
 
@@ -72,70 +54,39 @@ RECORDED = ("decayed", "modulated", "several lines", "mains")
 
 @dataclass(frozen=True)
 class Verdict:
-    """Final behaviour of a time series.
+    """Final behaviour of a time series."""
 
-    Attributes
-    ----------
-    name : str
-        One of `NAMES`, of a measured record also of `RECORDED`.
-    decided : bool
-        True where a longer series would not change the verdict.
-    reason : str
-        One sentence.
-    mean : float
-        Over whole cycles where there are cycles, over the end of the series otherwise.
-    amplitude : float
-        Half the distance between the extremes of the last cycles, or of the end of the series; of a record with
-        lines that of the first, at the end where it grows and at the start where it rings down.
-    period : float
-        s; not a number without cycles.
-    cycles : int
-        Cycles that the verdict rests on.
-    periodicity_error : float
-        Root mean square of x(t + T) - x(t) over that of two unrelated signals of the same variance: 0 periodic, 1
-        unrelated.
-    periodicity_trend : float
-        Factor of the periodicity error from one cycle to the next; below 1 while a cycle is being approached.
-    amplitude_trend : float
-        Relative change of the amplitude from one cycle to the next.
-    harmonics : (k, 2) array
-        Amplitude and phase, rad, of the first multiples of the frequency: sum a_k cos(2 pi k t / T + phase), t from the
-        start of the series.
-    rms : float
-        Root mean square about the mean, of the same part of the series.
-    smallest, largest : float
-        Extremes of the whole series.
-    noise : float
-        Root mean square of white noise about a constant level, where the end of the series is such noise; not a number
-        otherwise.
-    judged : tuple of float, s
-        Beginning and end of the part that the verdict is about: the whole series, or its longest part between gaps.
-    notes : tuple of str
-        Sentences on the samples: gaps, uneven steps.
-    lines : tuple of dict
-        Oscillations of a measured record, with half their 95 % intervals, for JSON; the one of the verdict first.
-    modulation : dict
-        Frequency, Hz, of the modulation of a measured record, with half its interval; empty without.
-    """
-
-    name: str
-    decided: bool
-    reason: str
-    mean: float = np.nan
+    name: str  #: One of `NAMES`, of a measured record also of `RECORDED`.
+    decided: bool  #: True where a longer series would not change the verdict.
+    reason: str  #: One sentence.
+    mean: float = np.nan  #: Over whole cycles where there are cycles, over the end of the series otherwise.
+    #: Half the distance between the extremes of the last cycles, or of the end of the series; of a record with lines
+    #: that of the first, at the end where it grows and at the start where it rings down.
     amplitude: float = np.nan
-    period: float = np.nan
-    cycles: int = 0
+    period: float = np.nan  #: s; not a number without cycles.
+    cycles: int = 0  #: Cycles that the verdict rests on.
+    #: Root mean square of x(t + T) - x(t) over that of two unrelated signals of the same variance: 0 periodic, 1
+    #: unrelated.
     periodicity_error: float = np.nan
+    #: Factor of the periodicity error from one cycle to the next; below 1 while a cycle is being approached.
     periodicity_trend: float = np.nan
-    amplitude_trend: float = np.nan
+    amplitude_trend: float = np.nan  #: Relative change of the amplitude from one cycle to the next.
+    #: (k, 2); amplitude and phase, rad, of the first multiples of the frequency: sum a_k cos(2 pi k t / T + phase), t
+    #: from the start of the series.
     harmonics: np.ndarray = field(default_factory=lambda: np.zeros((0, 2)))
-    rms: float = np.nan
+    rms: float = np.nan  #: Root mean square about the mean, of the same part of the series.
+    #: smallest and largest: extremes of the whole series.
     smallest: float = np.nan
     largest: float = np.nan
+    #: Root mean square of white noise about a constant level, where the end of the series is such noise; not a number
+    #: otherwise.
     noise: float = np.nan
+    #: s; beginning and end of the part that the verdict is about: the whole series, or its longest part between gaps.
     judged: tuple[float, float] = (np.nan, np.nan)
-    notes: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()  #: Sentences on the samples: gaps, uneven steps.
+    #: Oscillations of a measured record, with half their 95 % intervals, for JSON; the one of the verdict first.
     lines: tuple[dict[str, Any], ...] = ()
+    #: Frequency, Hz, of the modulation of a measured record, with half its interval; empty without.
     modulation: dict[str, float] = field(default_factory=dict)
 
     @property
@@ -270,14 +221,13 @@ def judge(
     closed_below: float | None = None,
     gaps: bool = True,
 ) -> Verdict:
-    """Verdict on a signal.
+    """Verdict on a signal. Raises ValueError if the samples are no series.
 
     Parameters
     ----------
     time, values : (k,) arrays
         Samples at increasing times; uneven ones are interpolated. Of a record with gaps the longest part between
         them is judged, and a note says so.
-    options : JudgeOptions
     residual : float, optional
         How far from equilibrium the system is at the end, relative; a signal that stands still while its system does
         not is not steady.
@@ -290,11 +240,6 @@ def judge(
     Returns
     -------
     Verdict
-
-    Raises
-    ------
-    ValueError
-        If the samples are no series.
 
     Examples
     --------
@@ -314,11 +259,7 @@ def judge(
 
 def longest_samples(time, values, gaps: bool) -> tuple[np.ndarray, np.ndarray, dict[str, Any]]:
     """Times and values (k,) of the longest part of a record without a gap, and what a verdict on it says of the whole.
-
-    Raises
-    ------
-    ValueError
-        If the samples are no series.
+    Raises ValueError if the samples are no series.
     """
     time, values = check_samples(time, values)
     part, notes = longest_part(time, gaps)

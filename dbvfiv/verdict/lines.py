@@ -81,20 +81,11 @@ class Line:
 
 @dataclass(frozen=True)
 class Fit:
-    """Oscillations and level fitted to samples.
-
-    Attributes
-    ----------
-    lines : tuple of Line
-    left : (k,) array
-        What is left of the samples.
-    level : (k,) array
-        The polynomial below the oscillations.
-    """
+    """Oscillations and level fitted to samples."""
 
     lines: tuple[Line, ...]
-    left: np.ndarray
-    level: np.ndarray
+    left: np.ndarray  #: (k,); what is left of the samples.
+    level: np.ndarray  #: (k,); the polynomial below the oscillations.
 
 
 def density(values: np.ndarray, step: float) -> tuple[np.ndarray, np.ndarray]:
@@ -190,7 +181,6 @@ def fit(
 
     Parameters
     ----------
-    series : Series
     lines : sequence of Line
         Frequencies, and rates where they are not zero, to start from.
     level : int

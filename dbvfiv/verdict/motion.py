@@ -175,37 +175,18 @@ _DIED = 0.02
 
 @dataclass(frozen=True)
 class Motion:
-    """Motion in a record.
+    """Motion in a record."""
 
-    Attributes
-    ----------
-    name, reason : str
-        As in a verdict.
-    lines : tuple of Line
-        The one that the verdict is about first.
-    modulation : (float, float), Hz
-        Frequency and half its 95 % interval.
-    start : float, s
-        Beginning of what was fitted.
-    noise : float
-        Root mean square of the noise.
-    returns : bool
-        True where oscillations die and come back.
-    base : float, Hz
-        Frequency of a limit cycle, of which its lines are multiples.
-    level : float or (k,) array
-        What the lines of a limit cycle lie on, at all samples.
-    """
-
+    #: name and reason: as in a verdict.
     name: str
     reason: str
-    lines: tuple[Line, ...] = ()
-    modulation: tuple[float, float] = (np.nan, np.nan)
-    start: float = np.nan
-    noise: float = np.nan
-    returns: bool = False
-    base: float = np.nan
-    level: float | np.ndarray = 0.0
+    lines: tuple[Line, ...] = ()  #: The one that the verdict is about first.
+    modulation: tuple[float, float] = (np.nan, np.nan)  #: (float, float), Hz; frequency and half its 95 % interval.
+    start: float = np.nan  #: s; beginning of what was fitted.
+    noise: float = np.nan  #: Root mean square of the noise.
+    returns: bool = False  #: True where oscillations die and come back.
+    base: float = np.nan  #: Hz; frequency of a limit cycle, of which its lines are multiples.
+    level: float | np.ndarray = 0.0  #: float or (k,); what the lines of a limit cycle lie on, at all samples.
 
 
 #: Cycles a sample beyond which an oscillation is none.
@@ -232,7 +213,7 @@ def judge_record(
     mains: Sequence[float] = MAINS,
 ) -> Verdict:
     """Verdict on a measured record: what oscillates under its noise, on a level that may drift; of what has no line the
-    level, as `judge` has it.
+    level, as `judge` has it. Raises ValueError if the samples are no series.
 
     Parameters
     ----------
@@ -242,11 +223,6 @@ def judge_record(
         Take a polynomial level off.
     mains : sequence of float, Hz
         Frequencies that may be picked up; none in what is computed.
-
-    Raises
-    ------
-    ValueError
-        If the samples are no series.
     """
     judged = partial(judge, time, values, options, closed_below=closed_below, gaps=gaps)
     time, values, facts = longest_samples(time, values, gaps)
@@ -330,7 +306,6 @@ def find_motion(series: Series, detrend: bool = True, mains: Sequence[float] = (
 
     Parameters
     ----------
-    series : Series
     detrend : bool
         Take a polynomial level off.
     mains : sequence of float, Hz

@@ -24,37 +24,18 @@ PLAIN = {"rows": "; take such rows out", "unit": "", "rate": ""}
 
 @dataclass(frozen=True)
 class Reading:
-    """Options for reading the signals of a file.
+    """Options for reading the signals of a file."""
 
-    Attributes
-    ----------
-    columns : sequence of str
-        Columns by name or number from 1; all where empty.
-    time : str
-        Column of the times, by name or number; the first where empty.
-    rate : float, optional, Hz
-        Sampling rate, where no column holds times.
-    unit : str, optional
-        Unit of the times; else as the header says.
-    skip_bad : bool
-        Leave out rows that hold no number.
-    since, until : float, optional, s
-        Times before and after which samples are left out.
-    detrend : bool
-        Take the level off a measured record.
-    hints : mapping
-        `OPTIONS` or `PLAIN`.
-    """
-
-    columns: Sequence[str] = ()
-    time: str = ""
-    rate: float | None = None
-    unit: str | None = None
-    skip_bad: bool = False
+    columns: Sequence[str] = ()  #: Columns by name or number from 1; all where empty.
+    time: str = ""  #: Column of the times, by name or number; the first where empty.
+    rate: float | None = None  #: optional, Hz; sampling rate, where no column holds times.
+    unit: str | None = None  #: Unit of the times; else as the header says.
+    skip_bad: bool = False  #: Leave out rows that hold no number.
+    #: since and until: optional, s; times before and after which samples are left out.
     since: float | None = None
     until: float | None = None
-    detrend: bool = True
-    hints: Mapping[str, str] = field(default_factory=lambda: OPTIONS)
+    detrend: bool = True  #: Take the level off a measured record.
+    hints: Mapping[str, str] = field(default_factory=lambda: OPTIONS)  #: `OPTIONS` or `PLAIN`.
 
 
 @dataclass(frozen=True)
@@ -134,12 +115,8 @@ def _line_of(line: dict[str, Any]) -> str:
 def judge_file(
     file: Path, reading: Reading, options: JudgeOptions = JudgeOptions(), closed_below: float | None = None
 ) -> list[JudgedSignal]:
-    """Judge the columns of a text file.
-
-    Raises
-    ------
-    CaseError
-        For a file that cannot be read, or whose columns are no time series.
+    """Judge the columns of a text file. Raises CaseError for a file that cannot be read, or whose columns are no time
+    series.
     """
     if not file.is_file():
         raise CaseError(f"The file {str(file)!r} does not exist.")
@@ -161,13 +138,7 @@ def judge_signals(
     options: JudgeOptions = JudgeOptions(),
     closed_below: float | None = None,
 ) -> list[JudgedSignal]:
-    """Judge signals of a file within the times asked for.
-
-    Raises
-    ------
-    CaseError
-        For one that is no time series.
-    """
+    """Judge signals of a file within the times asked for. Raises CaseError for one that is no time series."""
     found = []
     start = -math.inf if reading.since is None else reading.since
     end = math.inf if reading.until is None else reading.until

@@ -70,27 +70,16 @@ def longest_part(time: np.ndarray, gaps: bool = True) -> tuple[slice, tuple[str,
 
 @dataclass(frozen=True)
 class Series:
-    """Even samples of a signal.
+    """Even samples of a signal."""
 
-    Attributes
-    ----------
-    start : float, s
-    step : float, s
-    values : (k,) array
-    """
-
-    start: float
-    step: float
-    values: np.ndarray
+    start: float  #: s.
+    step: float  #: s.
+    values: np.ndarray  #: (k,).
 
     @classmethod
     def of(cls, time, values) -> Series:
         """From samples at increasing times; uneven ones are interpolated by a cubic spline at their typical distance.
-
-        Raises
-        ------
-        ValueError
-            If lengths differ, times do not increase, or numbers are not finite.
+        Raises ValueError if lengths differ, times do not increase, or numbers are not finite.
         """
         time, values = check_samples(time, values)
         gaps = np.diff(time)
@@ -129,12 +118,8 @@ class Series:
 
 
 def check_samples(time, values) -> tuple[np.ndarray, np.ndarray]:
-    """Times and values as arrays (k,), k at least 2.
-
-    Raises
-    ------
-    ValueError
-        If lengths differ, times do not increase, or numbers are not finite.
+    """Times and values as arrays (k,), k at least 2. Raises ValueError if lengths differ, times do not increase, or
+    numbers are not finite.
     """
     time, values = np.asarray(time, float), np.asarray(values, float)
     if time.ndim != 1 or time.shape != values.shape:
@@ -198,32 +183,17 @@ def swings(series: Series) -> int:
 
 
 # -- cycles
-# ----
 
 
 @dataclass(frozen=True)
 class Trend:
-    """Straight line through the logarithms of a sequence.
+    """Straight line through the logarithms of a sequence."""
 
-    Attributes
-    ----------
-    slope : float
-        From one to the next, of the logarithm.
-    error : float
-        Standard error of the slope, widened for residuals that hang together.
-    change : float
-        Over the whole sequence.
-    scatter : float
-        Root mean square about the line.
-    smooth : bool
-        Whether what is left about the line is smooth rather than scattered (von Neumann's ratio).
-    """
-
-    slope: float
-    error: float
-    change: float
-    scatter: float
-    smooth: bool
+    slope: float  #: From one to the next, of the logarithm.
+    error: float  #: Standard error of the slope, widened for residuals that hang together.
+    change: float  #: Over the whole sequence.
+    scatter: float  #: Root mean square about the line.
+    smooth: bool  #: Whether what is left about the line is smooth rather than scattered (von Neumann's ratio).
 
     @property
     def significant(self) -> bool:
@@ -371,26 +341,16 @@ _PER_CYCLE = 128
 
 @dataclass(frozen=True)
 class Cycles:
-    """Cycles from the first to the last one.
+    """Cycles from the first to the last one."""
 
-    Attributes
-    ----------
-    period : float, s
-    shape : (k, 128) array
-        The signal over each cycle.
-    spread : (k,) array
-        sqrt(2) times the root mean square about the cycle's own mean: the amplitude of a sine, and far less touched by
-        noise than extremes.
-    mean : (k,) array
-    error : (k - 1,) array
-        Root mean square of the difference of two neighbours about their means, over sqrt(2) times their root mean
-        square.
-    """
-
-    period: float
-    shape: np.ndarray
+    period: float  #: s.
+    shape: np.ndarray  #: (k, 128); the signal over each cycle.
+    #: (k,); sqrt(2) times the root mean square about the cycle's own mean: the amplitude of a sine, and far less
+    #: touched by noise than extremes.
     spread: np.ndarray
-    mean: np.ndarray
+    mean: np.ndarray  #: (k,).
+    #: (k - 1,); root mean square of the difference of two neighbours about their means, over sqrt(2) times their root
+    #: mean square.
     error: np.ndarray
 
     @classmethod
@@ -469,21 +429,14 @@ _REGULAR = 4.0
 
 @dataclass(frozen=True)
 class Shuttings:
-    """Shuttings in even or uneven samples.
+    """Shuttings in even or uneven samples."""
 
-    Attributes
-    ----------
-    shut, opened : (k,) int arrays
-        Samples at which the valve was found shut, and those at which it had last been found open again before.
-    intervals : (k - 1,) array, s
-    goes_on : bool
-        True where the series ends before a further one is overdue.
-    """
-
+    #: shut and opened: (k,); samples at which the valve was found shut, and those at which it had last been found open
+    #: again before.
     shut: np.ndarray
     opened: np.ndarray
-    intervals: np.ndarray
-    goes_on: bool
+    intervals: np.ndarray  #: (k - 1,), s.
+    goes_on: bool  #: True where the series ends before a further one is overdue.
 
     @classmethod
     def of(cls, time: np.ndarray, values: np.ndarray, level: float) -> Shuttings:

@@ -34,17 +34,12 @@ _TRAILING = re.compile(r"[\s_.\-]([^\s_.\-]+)$")
 
 
 def seconds_in(unit: str) -> float:
-    """Seconds in a unit of time.
+    """Seconds in a unit of time. Raises ValueError: one clause, if the unit is none of time.
 
     Parameters
     ----------
     unit : str
         Such as "ms"; brackets around it and its case do not matter.
-
-    Raises
-    ------
-    ValueError
-        One clause, if the unit is none of time.
 
     Examples
     --------
@@ -106,35 +101,18 @@ _LOOKED_AT = 400
 
 @dataclass(frozen=True)
 class Table:
-    """Columns of numbers.
+    """Columns of numbers."""
 
-    Attributes
-    ----------
-    names : tuple of str
-        From the header, or "column 1", ...
-    values : (rows, columns) array
-        NaN where a cell holds no number.
-    units : tuple of str
-        From a row of units under the header; empty where there is none.
-    lines : (rows,) array of int
-        Line of the file that each row stands in.
-    texts : dict
-        What stood in cells that hold no number, by row and column.
-    """
-
-    names: tuple[str, ...]
-    values: np.ndarray
-    units: tuple[str, ...] = ()
+    names: tuple[str, ...]  #: From the header, or "column 1", ...
+    values: np.ndarray  #: (rows, columns); NaN where a cell holds no number.
+    units: tuple[str, ...] = ()  #: From a row of units under the header; empty where there is none.
+    #: (rows,) array of int; line of the file that each row stands in.
     lines: np.ndarray = field(default_factory=lambda: np.zeros(0, int))
+    #: What stood in cells that hold no number, by row and column.
     texts: dict[tuple[int, int], str] = field(default_factory=dict, repr=False)
 
     def index(self, wanted: str) -> int:
-        """Column by name, part of a name or number from 1.
-
-        Raises
-        ------
-        ValueError
-        """
+        """Column by name, part of a name or number from 1. Raises ValueError."""
         exact = [i for i, name in enumerate(self.names) if name.lower() == wanted.lower()]
         part = [i for i, name in enumerate(self.names) if wanted.lower() in name.lower()]
         if exact or (len(part) == 1 and not wanted.isdigit()):
@@ -145,11 +123,7 @@ class Table:
 
     def seconds(self, column: int) -> float:
         """Seconds in the unit that a column of times is given in; 1 where neither the header nor a row of units says.
-
-        Raises
-        ------
-        ValueError
-            If what the header says is no unit of time.
+        Raises ValueError if what the header says is no unit of time.
         """
         unit = (self.units[column] if self.units else "") or unit_in_name(self.names[column])
         return seconds_in(unit) if unit.strip() else 1.0
@@ -172,23 +146,13 @@ class Table:
 
 
 def read_table(path: str | Path) -> Table:
-    """Read a text file of numbers; text after ``#`` and empty lines are skipped.
-
-    Parameters
-    ----------
-    path : path
+    """Read a text file of numbers; text after ``#`` and empty lines are skipped. Raises ValueError: one clause: what
+    does not fit. Raises OSError if the file cannot be read.
 
     Returns
     -------
     Table
         Cells that hold no number, such as "NaN", blanks or text, are NaN: see `Table.bad_rows`.
-
-    Raises
-    ------
-    ValueError
-        One clause: what does not fit.
-    OSError
-        If the file cannot be read.
     """
     lines = re.split(r"\r\n|\r|\n", _decoded(Path(path).read_bytes()))
     bodies = [(number, line) for number, line in enumerate(lines, 1) if _REMARK.sub("", line).strip(" \t,;")]

@@ -14,17 +14,7 @@ from hypothesis import strategies as st
 
 from dbvfiv.app.ask import AskPanel
 from dbvfiv.app.see import RECORD, RunsPanel, arguments_of, map_figure
-from dbvfiv.app.sheet import (
-    bring,
-    change,
-    check,
-    data_files,
-    given,
-    read_sheet,
-    stay_inside,
-    usual_value,
-    write_sheet,
-)
+from dbvfiv.app.sheet import bring, change, check, data_files, given, read_sheet, stay_inside, usual_value, write_sheet
 from dbvfiv.app.worker import text_for_page
 from dbvfiv.case.quantity import GRAVITY
 from dbvfiv.case.valve import Valve

@@ -11,12 +11,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from continuation.conditions import (
-    BogdanovTakensCondition,
-    BranchPointCondition,
-    FoldCondition,
-    HopfCondition,
-)
+from continuation.conditions import BogdanovTakensCondition, BranchPointCondition, FoldCondition, HopfCondition
 from continuation.jax_system import JaxSystem
 from continuation.problem import Local, Problem
 

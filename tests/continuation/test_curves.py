@@ -4,15 +4,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from continuation import (
-    Branch,
-    ContinuationOptions,
-    NotABifurcation,
-    Reason,
-    continue_fold,
-    continue_hopf,
-    resume,
-)
+from continuation import Branch, ContinuationOptions, NotABifurcation, Reason, continue_fold, continue_hopf, resume
 from continuation.jax_system import JaxSystem
 from tests.continuation.known import bautin, bogdanov_takens, brusselator, cusp
 from tests.systems.following import follow, hopf_of

@@ -143,10 +143,7 @@ def test_poles_of_the_fluid_in_the_right_half_plane_are_no_trouble():
     assert unstable_count(pencil).number == 1
 
 
-@pytest.mark.parametrize(
-    "velocity, storage, density",
-    [(3.0, True, 10.0), (8.0, False, 2.0), (5.0, True, 1000.0)],
-)
+@pytest.mark.parametrize("velocity, storage, density", [(3.0, True, 10.0), (8.0, False, 2.0), (5.0, True, 1000.0)])
 def test_large_pencils_by_basis(velocity, storage, density):
     pencil = plate_over_channel(5, 10, inlet_velocity=velocity, storage=storage, density=density)
     result = certified_spectrum(pencil, 4, dense=100)

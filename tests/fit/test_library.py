@@ -85,10 +85,7 @@ def test_strain_level_and_fibre_constants():
             {"kind": "shipped", "rubber": "EPDM", "strain_level": "40 %", "density": 1150.0},
             rubber("EPDM", 0.4, density=1150.0),
         ),
-        (
-            {"kind": "shipped", "rubber": "CR", "constants": "published"},
-            published_rubber("CR", 0.1, density=1300.0),
-        ),
+        ({"kind": "shipped", "rubber": "CR", "constants": "published"}, published_rubber("CR", 0.1, density=1300.0)),
         (
             {"kind": "softening", "mu_0": "1 MPa", "x_0": 0.01, "c": 2e6, "density": 1150.0},
             SofteningRubber(0.0, 1e6, 0.01, 2e6, 1150.0),

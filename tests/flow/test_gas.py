@@ -164,7 +164,6 @@ def test_a_fluid_of_unit_density_that_is_compressed_alike():
 
 
 # -- in time
-# ----
 
 
 def march(law, area_at, inner, inlet, step, count, rate=1.5):
@@ -277,7 +276,6 @@ def test_what_lips_draw_in_is_no_faster_than_sound():
 
 
 # -- a liquid that boils
-# ----
 
 LIQUID, WAVES, BOILS = 1000.0, 1000.0, -100e3
 

@@ -91,7 +91,6 @@ def test_a_law_tells_its_length_apart_from_that_of_others():
 
 
 # -- a valve of one degree behind a pipe: (m s^2 + c s + k)(s + r) = B (s + d)
-# ----
 
 LIP, INLET, WIDTH, LENGTH = 1e-3, 6e-3, 0.2, 4.0
 MASS, DAMPING, STIFFNESS = 1.3, 2.0, 900.0

@@ -17,10 +17,7 @@ from tests.flow.test_pump import DENSITY, FLOWS, HEADS, SUPPLY
 TERMS = {
     "line": lambda copies: [Line(20.0, 0.25, 0.02, loss=1.0, copies=copies)],
     "line as wide as the flange": lambda copies: [Line(20.0, None, 0.02, copies=copies)],
-    "line and pump": lambda copies: [
-        Line(5.0, 0.3, copies=copies),
-        Pump(FLOWS, HEADS, DENSITY, SUPPLY, copies=copies),
-    ],
+    "line and pump": lambda copies: [Line(5.0, 0.3, copies=copies), Pump(FLOWS, HEADS, DENSITY, SUPPLY, copies=copies)],
     "tail": lambda copies: [Tail(0.4, 3.0, 0.7, copies=copies)],
 }
 

@@ -111,7 +111,6 @@ def test_flow_that_runs_back_gets_nothing_from_a_jet():
 
 
 # -- a valve of one degree with a pipe behind
-# ----
 
 PIPE, FACE = 9e-3, 2e-6
 

@@ -181,7 +181,6 @@ def test_bodies_of_a_half_are_closed(quarter, half, name):
 
 
 # -- a bill with a flat bottom
-# ----
 
 
 @pytest.fixture(scope="module")

@@ -35,12 +35,7 @@ def homogeneous(shell: Shell, gradient) -> np.ndarray:
     return shell.dofs.restrict(nodal)
 
 
-STATES = {
-    "uniaxial": (1.6, 1.6**-0.5),
-    "equibiaxial": (1.4, 1.4),
-    "pure shear": (1.5, 1.0),
-    "compressed": (0.7, 0.9),
-}
+STATES = {"uniaxial": (1.6, 1.6**-0.5), "equibiaxial": (1.4, 1.4), "pure shear": (1.5, 1.0), "compressed": (0.7, 0.9)}
 
 
 @pytest.mark.parametrize("name", sorted(STATES))

@@ -75,7 +75,6 @@ def test_a_pipe_behind_is_in_the_table(command_line):
 
 
 # -- measured points
-# ----
 
 
 def test_measured_points_in_any_units(tmp_path):
@@ -133,7 +132,6 @@ def test_measured_points_at_one_pressure():
 
 
 # -- the line's curve, and runs beside each other
-# ----
 
 
 def test_a_sealed_bill_has_no_operating_point():

@@ -20,7 +20,6 @@ from dbvfiv.studies.steady import study as steady
 from tests.small_valves import SMALL, load_small
 
 # -- tables
-# ----
 
 
 @pytest.mark.parametrize(
@@ -135,7 +134,6 @@ def test_several_files(tmp_path):
 
 
 # -- sections
-# ----
 
 
 @settings(max_examples=40)
@@ -161,7 +159,6 @@ def test_a_cone_is_cut_where_its_plane_is():
 
 
 # -- beside states
-# ----
 
 PRESSURES = (4e3, 8e3, 16e3)
 
@@ -259,7 +256,6 @@ def test_steady_runs_are_compared_with_measured_data(runs, command_line, tmp_pat
 
 
 # -- back pressure
-# ----
 
 
 @pytest.fixture(scope="module")

@@ -126,11 +126,7 @@ def test_the_number_asked_for_changes_nothing(model, state, conditions):
 
 def test_another_shift_gives_the_same(model, state, flutter):
     keys = Keys(count=4, shift=250.0, shift_frequency=75.0 / np.pi)
-    assert np.allclose(
-        run_modes(model, state, LIGHT, keys).eigenvalues[:3],
-        flutter.eigenvalues[:3],
-        rtol=1e-8,
-    )
+    assert np.allclose(run_modes(model, state, LIGHT, keys).eigenvalues[:3], flutter.eigenvalues[:3], rtol=1e-8)
 
 
 def test_in_vacuo_at_rest(model):

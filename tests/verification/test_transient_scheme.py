@@ -33,7 +33,6 @@ def run(motion, state, step: float, count: int, pressure=lambda t: 0.0, nd: floa
 
 
 # -- order
-# ----
 
 
 @pytest.mark.parametrize(
@@ -70,7 +69,6 @@ def test_order_of_the_coupled_scheme(law, nd, finest):
 
 
 # -- energy
-# ----
 
 
 def free_swing(count: int, changes=MappingProxyType({})) -> tuple[np.ndarray, np.ndarray]:
@@ -119,7 +117,6 @@ def test_a_free_swing_with_the_averaged_mass_keeps_its_energy():
 
 
 # -- one unknown
-# ----
 
 
 def oscillator_start(motion, q: float, v: float):

@@ -192,7 +192,6 @@ def influence(
 
     Parameters
     ----------
-    targets, sources : Panels
     signs : (4,) array
         Of the images, see `image_signs`.
     shift : int, optional

@@ -18,28 +18,16 @@ SAME = 1e-9
 
 @dataclass(frozen=True)
 class Panels:
-    """Panels with corners in their mean plane.
+    """Panels with corners in their mean plane."""
 
-    Attributes
-    ----------
-    corners : (k, 4, 3) array, m
-        Counter-clockwise seen from the fluid; two may coincide.
-    centres : (k, 3) array, m
-        Centroids, where the boundary conditions hold.
-    normals : (k, 3) array
-        Unit vectors into the fluid.
-    areas : (k,) array, m2
-    bend : (k,) array
-        Normal velocity at its centre that a source panel has from its own curvature, see `own_bend`.
-    beside : (k, 4) array of int
-        Panel across each side, from corner a to a + 1; `EDGE`, `IMAGE_X` or `IMAGE_Y` where there is none.
-    """
-
-    corners: np.ndarray
-    centres: np.ndarray
-    normals: np.ndarray
-    areas: np.ndarray
+    corners: np.ndarray  #: (k, 4, 3), m; counter-clockwise seen from the fluid; two may coincide.
+    centres: np.ndarray  #: (k, 3), m; centroids, where the boundary conditions hold.
+    normals: np.ndarray  #: (k, 3); unit vectors into the fluid.
+    areas: np.ndarray  #: (k,), m2.
+    #: (k,); normal velocity at its centre that a source panel has from its own curvature, see `own_bend`.
     bend: np.ndarray
+    #: (k, 4) array of int; panel across each side, from corner a to a + 1; `EDGE`, `IMAGE_X` or `IMAGE_Y` where there
+    #: is none.
     beside: np.ndarray
 
     def __len__(self) -> int:
@@ -48,18 +36,13 @@ class Panels:
     @classmethod
     def of(cls, corners: np.ndarray, corner_normals: np.ndarray | None = None) -> Panels:
         """Panels of quadrilaterals (k, 4, 3), which need not be flat: their corners move to the mean plane, normal to
-        the area vector.
+        the area vector. Raises ValueError if one has no area.
 
         Parameters
         ----------
         corners : (k, 4, 3) array, m
         corner_normals : (k, 4, 3) array, optional
             Unit normals of the true surface at the corners, for its curvature; flat without.
-
-        Raises
-        ------
-        ValueError
-            If one has no area.
         """
         corners = np.asarray(corners, float).reshape(-1, 4, 3)
         first, second = corners[:, 2] - corners[:, 0], corners[:, 3] - corners[:, 1]

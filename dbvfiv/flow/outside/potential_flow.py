@@ -23,18 +23,10 @@ from .panels import EDGE, IMAGE_X, IMAGE_Y, Panels
 
 @dataclass(frozen=True)
 class Surroundings:
-    """Surfaces that stay where they are.
+    """Surfaces that stay where they are."""
 
-    Attributes
-    ----------
-    rigid : Panels or None
-        No flow passes them.
-    open : Panels or None
-        No pressure acts on them.
-    """
-
-    rigid: Panels | None = None
-    open: Panels | None = None
+    rigid: Panels | None = None  #: No flow passes them.
+    open: Panels | None = None  #: No pressure acts on them.
 
     @property
     def panels(self) -> Panels | None:
@@ -115,7 +107,6 @@ class PotentialFlow:
 
     Parameters
     ----------
-    surroundings : Surroundings
     symmetry : {"SS", "SA", "AS", "AA", "S", "A"}
         Motions symmetric (S) or antisymmetric (A) about x = 0, then about y = 0; all panels lie in x > 0, y > 0. Of a
         half, whose panels lie in y > 0, about y = 0 alone.
@@ -152,7 +143,6 @@ class PotentialFlow:
 
         Parameters
         ----------
-        moving : Panels
         wet : int, optional
             Number of panels, the first ones, whose motion and pressure matter; the others are rigid. All by default.
         open_count : int
@@ -222,11 +212,7 @@ class PotentialFlow:
 
 
 def smooth_influence(
-    targets: Panels,
-    sources: Panels,
-    signs: np.ndarray,
-    own: bool = False,
-    frozen: tuple[Panels, Panels] | None = None,
+    targets: Panels, sources: Panels, signs: np.ndarray, own: bool = False, frozen: tuple[Panels, Panels] | None = None
 ) -> tuple[np.ndarray, np.ndarray]:
     """Potential and normal velocity at the centres of panels, of sources of unit strength at the centres of others.
 
@@ -263,7 +249,6 @@ def panel_strength(panels: Panels, signs: np.ndarray) -> sp.csr_array:
 
     Parameters
     ----------
-    panels : Panels
     signs : (4,) array
         Of the images, see `image_signs`.
     """

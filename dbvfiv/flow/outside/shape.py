@@ -116,7 +116,6 @@ class ShapeDerivative:
     ----------
     flow : PotentialFlow
         Of a closed boundary, in motions symmetric about both planes.
-    moving : Panels
     wet, open_count : int
         See `PotentialFlow.impedance`.
     a, b : (wet, m) complex arrays
@@ -189,12 +188,8 @@ class ShapeDerivative:
         return np.concatenate(found)
 
     def between(self, below: Panels, above: Panels) -> complex:
-        """Difference of the sum between two shapes next to this one, of all panels.
-
-        Raises
-        ------
-        ValueError
-            If they have another number of panels.
+        """Difference of the sum between two shapes next to this one, of all panels. Raises ValueError if they have
+        another number of panels.
         """
         if not len(below) == len(above) == len(self.panels):
             raise ValueError("Panels of the surroundings come or go where the shape changes.")

@@ -41,18 +41,11 @@ _REFUSALS = 6
 
 @dataclass(frozen=True, eq=False)
 class StiffnessSpectrum:
-    """Lowest eigenvalues at one state, ascending.
+    """Lowest eigenvalues at one state, ascending."""
 
-    Attributes
-    ----------
-    values : (k,) complex array, 1/s2
-        Of the whole tangent, by real part.
-    vectors : (n, k) complex array
-    stiffness, mass : (n, n) sparse matrices
-    """
-
-    values: np.ndarray
-    vectors: np.ndarray
+    values: np.ndarray  #: (k,), 1/s2; of the whole tangent, by real part.
+    vectors: np.ndarray  #: (n, k).
+    #: stiffness and mass: (n, n) sparse matrices.
     stiffness: Any
     mass: Any
 
@@ -103,15 +96,11 @@ def _matrices(model: Any, q: np.ndarray, pressure: float):
 
 def spectrum_of(stiffness, mass, pressure: float, count: int = 4, tolerance: float = 1e-8) -> StiffnessSpectrum:
     """Lowest eigenvalues of two sparse matrices (n, n) by shift-and-invert Arnoldi (ARPACK) with sparse LU factors.
+    Raises SolveError if the eigenvalues did not converge, or did not to the accuracy asked for.
 
     Those nearest to zero are found, and what lies below them is looked for until nothing more is found: negative ones
     may be farther from zero than many positive ones. It is a search and no proof: next to a shift, what lies below it
     by more than the others above is not seen.
-
-    Raises
-    ------
-    SolveError
-        If the eigenvalues did not converge, or did not to the accuracy asked for.
     """
     nearest = partial(_nearest, stiffness, mass)
     try:
@@ -179,25 +168,15 @@ def _inverse(matrix) -> spla.LinearOperator:
 
 
 class Buckling(NamedTuple):
-    """A state in which the tangent stiffness is singular.
+    """A state in which the tangent stiffness is singular."""
 
-    Attributes
-    ----------
-    kind : str
-        "limit point": the pressure can rise no further on this path; "bifurcation": another path crosses.
-    pressure : float, Pa
-        Critical pressure.
-    q, shape : (n,) arrays
-        The state, and the shape it buckles into, largest entry one; the shape in the unknowns of its class of motion.
-    eigenvalue : float, 1/s2
-        Lowest stiffness eigenvalue in magnitude there.
-    """
-
-    kind: str
-    pressure: float
+    kind: str  #: "limit point": the pressure can rise no further on this path; "bifurcation": another path crosses.
+    pressure: float  #: Pa; critical pressure.
+    #: q and shape: (n,); the state, and the shape it buckles into, largest entry one; the shape in the unknowns of its
+    #: class of motion.
     q: np.ndarray
     shape: np.ndarray
-    eigenvalue: float
+    eigenvalue: float  #: 1/s2; lowest stiffness eigenvalue in magnitude there.
 
 
 @dataclass
@@ -213,18 +192,13 @@ class BucklingWatch:
     steps : LoadStepOptions
     spectrum : callable
         From unknowns (n,) and pressure, Pa, to the eigenvalues of the class that is watched.
-
-    Attributes
-    ----------
-    found : list of Buckling
-    before : (pressure, unknowns) or None
-        Last equilibrium, of those seen, before the first that was found by this watch.
     """
 
     model: Any
     steps: LoadStepOptions
     spectrum: Callable[[np.ndarray, float], StiffnessSpectrum]
     found: list[Buckling] = field(default_factory=list)
+    #: (pressure, unknowns) or None; last equilibrium, of those seen, before the first that was found by this watch.
     before: tuple[float, np.ndarray] | None = None
     _stable: _Known | None = field(default=None, repr=False)
 
@@ -301,34 +275,19 @@ class _Known(NamedTuple):
 
 
 class LimitPath(NamedTuple):
-    """Equilibria followed by arc length.
+    """Equilibria followed by arc length."""
 
-    Attributes
-    ----------
-    points : list of (pressure, unknowns)
-        From the start on; the last one is where the path ended.
-    limits : list of Buckling
-        Limit points on it.
-    reached : bool
-        The path came to the target pressure.
-    reason : str
-        Why it ended.
-    """
-
+    #: (pressure, unknowns); from the start on; the last one is where the path ended.
     points: list[tuple[float, np.ndarray]]
-    limits: list[Buckling]
-    reached: bool
-    reason: str
+    limits: list[Buckling]  #: Limit points on it.
+    reached: bool  #: The path came to the target pressure.
+    reason: str  #: Why it ended.
 
 
 def follow_past_limits(curve: LoadCurve, target: float) -> LimitPath:
     """Follow a curve of equilibria until the pressure is `target`, Pa, or falls to zero; one that stops at limit points
     to the last point before the first. Of one without limit points those points are told that go on towards the target.
-
-    Raises
-    ------
-    SolveError
-        If no curve leaves its start.
+    Raises SolveError if no curve leaves its start.
     """
     curve.extend(target)
     found, limits = curve.limit_states(), []
@@ -343,12 +302,7 @@ def follow_past_limits(curve: LoadCurve, target: float) -> LimitPath:
 
 
 def _least_in_magnitude(model: Any, q: np.ndarray, pressure: float) -> float:
-    """Stiffness eigenvalue nearest to zero, 1/s2, of a state (n,) at a pressure, Pa.
-
-    Raises
-    ------
-    SolveError
-    """
+    """Stiffness eigenvalue nearest to zero, 1/s2, of a state (n,) at a pressure, Pa. Raises SolveError."""
     stiffness, mass = _matrices(model, q, pressure)
     try:
         values = _about_zero(partial(_nearest, stiffness, mass), _among(1, stiffness))[0]

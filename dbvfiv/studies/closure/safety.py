@@ -26,40 +26,20 @@ OWN, EVERY = "within the symmetry of the model", "in any symmetry class"
 
 @dataclass(frozen=True)
 class SafetyFactor:
-    """A factor of safety against the first limit, within what the model can show.
+    """A factor of safety against the first limit, within what the model can show."""
 
-    Attributes
-    ----------
-    factor : float
-        `limit_pressure` over `rated_pressure`; with no limit met, how far it was looked, over the rated pressure.
-    at_least : bool
-        No limit was met, so the factor is a lower bound.
-    limit : str or None
-        "buckling", "loss of seal", "faces crossing", "end of the path".
-    limit_pressure : float or None, Pa
-        For a loss of seal the last pressure on the path at which some section was shut; 0 if none ever was. For faces
-        that cross the last at which they had not.
-    rated_pressure : float, Pa
-        That of the case, else the largest one asked for.
-    followed_to : float, Pa
-        Largest back pressure of an equilibrium before arclength takes over.
-    seal_assumed : bool
-        The supports hold the lips shut, so that a loss of seal cannot be seen.
-    is_rated : bool
-        The case names a rated back pressure.
-    watched : str
-        Motions among which buckling was looked for: `OWN` or `EVERY`.
-    """
-
+    #: `limit_pressure` over `rated_pressure`; with no limit met, how far it was looked, over the rated pressure.
     factor: float
-    at_least: bool
-    limit: str | None
+    at_least: bool  #: No limit was met, so the factor is a lower bound.
+    limit: str | None  #: "buckling", "loss of seal", "faces crossing", "end of the path".
+    #: Pa; for a loss of seal the last pressure on the path at which some section was shut; 0 if none ever was. For
+    #: faces that cross the last at which they had not.
     limit_pressure: float | None
-    rated_pressure: float
-    followed_to: float
-    seal_assumed: bool = False
-    is_rated: bool = False
-    watched: str = OWN
+    rated_pressure: float  #: Pa; that of the case, else the largest one asked for.
+    followed_to: float  #: Pa; largest back pressure of an equilibrium before arclength takes over.
+    seal_assumed: bool = False  #: The supports hold the lips shut, so that a loss of seal cannot be seen.
+    is_rated: bool = False  #: The case names a rated back pressure.
+    watched: str = OWN  #: Motions among which buckling was looked for: `OWN` or `EVERY`.
 
     def summary(self) -> dict[str, Any]:
         """Plain SI numbers for JSON."""
@@ -225,21 +205,13 @@ def _last_before(rising: list[Any], reached: np.ndarray) -> list[float]:
 
 @dataclass(frozen=True)
 class ClassBuckling:
-    """Buckling of the wall in one symmetry class.
-
-    Attributes
-    ----------
-    symmetry : str
-    pressures, lowest : tuples of float, Pa, 1/s2
-        Lowest stiffness eigenvalue along the path.
-    buckling : tuple of dict
-        kind, pressure, eigenvalue of the states that buckle, by pressure.
-    """
+    """Buckling of the wall in one symmetry class."""
 
     symmetry: str
+    #: pressures and lowest: Pa, 1/s2; lowest stiffness eigenvalue along the path.
     pressures: tuple[float, ...]
     lowest: tuple[float, ...]
-    buckling: tuple[dict[str, Any], ...]
+    buckling: tuple[dict[str, Any], ...]  #: kind, pressure, eigenvalue of the states that buckle, by pressure.
 
     @property
     def critical_pressure(self) -> float | None:

@@ -372,7 +372,6 @@ class ClosureResult(StudyResult):
         return min(rising_points(self), key=lambda point: point.lowest_eigenvalue, default=None)
 
     # -- for people
-    # ----
 
     def lines(self) -> list[str]:
         columns = self.case.units.columns(SUMMARY)
@@ -388,7 +387,6 @@ class ClosureResult(StudyResult):
         return f"{few or 'Not everything was reached'}{kept}"
 
     # -- in space
-    # ----
 
     def steps(self, valve: WholeValve) -> Sequence[Step]:
         """States in the order of their pressures, as ParaView wants its times."""
@@ -414,13 +412,7 @@ _COMPARED = tuple(
 
 
 def compare(results: Sequence[ClosureResult]) -> Comparison:
-    """Hold several runs against the first.
-
-    Raises
-    ------
-    CaseError
-        If one of them has no state.
-    """
+    """Hold several runs against the first. Raises CaseError if one of them has no state."""
     notes = [""]
     for i, result in enumerate(results, 1):
         at, factor = result.critical_pressure, result.safety and result.safety.factor

@@ -25,13 +25,7 @@ from ...model.symmetry import ALL, Symmetry, symmetries_of, symmetry_named
 from ...record.record import GrowingRecord, Record
 from ...shell.recovery import LayerFields, layer_fields
 from ..case import Case
-from .buckling import (
-    Buckling,
-    BucklingWatch,
-    StiffnessSpectrum,
-    follow_past_limits,
-    spectrum_of,
-)
+from .buckling import Buckling, BucklingWatch, StiffnessSpectrum, follow_past_limits, spectrum_of
 
 
 def film_leak(
@@ -169,14 +163,11 @@ class EnergyLedger:
     for the path is one of equilibria under a pressure P that changes linearly. The path in between is taken as a cubic
     through both ends with the tangents dq/dP where these are known, else as straight. A follower pressure on a surface
     with a free edge has no potential, so that its work is one along the path and not a function of its ends.
-
-    Attributes
-    ----------
-    work, stored, defect : float, J
-        Work of the pressure, energies gained, and the sum of the sizes of what is missing on each stretch.
     """
 
     model: Any
+    #: work, stored and defect: J; work of the pressure, energies gained, and the sum of the sizes of what is missing on
+    #: each stretch.
     work: float = 0.0
     stored: float = 0.0
     defect: float = 0.0
@@ -309,15 +300,9 @@ class ClosureWalk:
         return None
 
     # -- equilibria
-    # ----
 
     def _go_to(self, target: float) -> None:
-        """Find and keep the equilibrium at a back pressure, Pa.
-
-        Raises
-        ------
-        SolveError
-        """
+        """Find and keep the equilibrium at a back pressure, Pa. Raises SolveError."""
         steps, found = self.steps, {"iterations": 0, "load_steps": 0}
         try:
             way = steps.reach(target)
@@ -352,10 +337,7 @@ class ClosureWalk:
 
     def _go_past_limit(self, target: float, error: SolveError) -> None:
         """Arclength from the last equilibrium to the target pressure, or to the first limit point where it is to end.
-
-        Raises
-        ------
-        SolveError
+        Raises SolveError.
         """
         steps, goes_on = self.steps, self.model.case.closure.arclength
         start, q, falls = steps.pressure, steps.q, target < steps.pressure
@@ -407,7 +389,6 @@ class ClosureWalk:
             self.record.warn(f"The last state before a limit, at {pressure:.6g} Pa, was not described: {error}")
 
     # -- the record
-    # ----
 
     def _keep_point(self, pressure: float, q: np.ndarray, lowest: float, arclength: bool = False) -> None:
         point = Pressed(self.model, q, pressure)
@@ -495,7 +476,6 @@ class ClosureWalk:
         return self.record.value(STATES, column, row)
 
     # -- what is worth knowing
-    # ----
 
     def _warn(self, sentences: Iterable[str]) -> None:
         for sentence in sentences:

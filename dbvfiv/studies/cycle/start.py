@@ -32,12 +32,8 @@ LOCATED = 1e-5
 
 
 def find_onset(case: Case, walk: StabilityWalk, observer: Observer) -> Onset:
-    """The onset of `cycle.over` that the branch starts at.
-
-    Raises
-    ------
-    SolveError
-        If the range holds none with an oscillation.
+    """The onset of `cycle.over` that the branch starts at. Raises SolveError if the range holds none with an
+    oscillation.
     """
     axis = case.cycle.axis
     values = [axis.values[i] for i in np.unique(np.linspace(0, len(axis.values) - 1, SCANNED).astype(int))]
@@ -81,33 +77,19 @@ HARMONICS = 8
 
 @dataclass(frozen=True, eq=False)
 class Given:
-    """A motion to start from.
+    """A motion to start from."""
 
-    Attributes
-    ----------
-    value : float
-        Of the parameter.
-    place : Mu
-    motion : PeriodicMotion
-        Near a cycle.
-    """
-
-    value: float
+    value: float  #: Of the parameter.
     place: Mu
-    motion: PeriodicMotion
+    motion: PeriodicMotion  #: Near a cycle.
 
 
 def given_motion(case: Case, walk: StabilityWalk) -> Given:
-    """The motion of `cycle.start_file`: a cycle, or the last period of a run in time that has settled on one.
+    """The motion of `cycle.start_file`: a cycle, or the last period of a run in time that has settled on one. Raises
+    CaseError if the file holds no such motion, or one of another mesh or beyond the range. Raises SolveError if the run
+    does not go on.
 
     Only the value of the parameter is that of the file; all else is that of the case.
-
-    Raises
-    ------
-    CaseError
-        If the file holds no such motion, or one of another mesh or beyond the range.
-    SolveError
-        If the run does not go on.
     """
     path, axis = case.cycle.start_file, case.cycle.axis
     result = load_result(path)

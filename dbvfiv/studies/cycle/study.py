@@ -174,27 +174,14 @@ def read_points(record: Record, mu: dict, name: str, leg: int = 0) -> list[Cycle
 
 @dataclass(frozen=True, eq=False)
 class LayerRanges:
-    """Ranges over a period, means over each element.
+    """Ranges over a period, means over each element."""
 
-    Attributes
-    ----------
-    names : tuple of str
-        Layers, inside to outside.
-    strain : (ne, nl) array
-        Largest range of the five strains in the layer's axes, at its inner or outer face.
-    stress : (ne, nl) array, Pa
-        Largest range of the five stresses there.
-    von_mises : (ne, nl) array, Pa
-        Largest von Mises stress of the period, as `dbvfiv.shell.recovery.LayerFields` has it.
-    place : (ne, 3) array, m
-        Middles of the elements, at rest.
-    """
-
-    names: tuple[str, ...]
-    strain: np.ndarray
-    stress: np.ndarray
+    names: tuple[str, ...]  #: Layers, inside to outside.
+    strain: np.ndarray  #: (ne, nl); largest range of the five strains in the layer's axes, at its inner or outer face.
+    stress: np.ndarray  #: (ne, nl), Pa; largest range of the five stresses there.
+    #: (ne, nl), Pa; largest von Mises stress of the period, as `dbvfiv.shell.recovery.LayerFields` has it.
     von_mises: np.ndarray
-    place: np.ndarray
+    place: np.ndarray  #: (ne, 3), m; middles of the elements, at rest.
 
     def largest(self) -> list[dict[str, Any]]:
         """Largest ranges of strain and of stress of each layer, and their positions."""
@@ -564,12 +551,4 @@ def check(case: Case) -> None:
     require_kept_head(case, case.cycle.axis.parameter)
 
 
-STUDY = Study(
-    "cycle",
-    tables_of,
-    run,
-    CycleResult,
-    check,
-    rows_to_keep,
-    live=lambda case: print_rows(COLUMNS),
-)
+STUDY = Study("cycle", tables_of, run, CycleResult, check, rows_to_keep, live=lambda case: print_rows(COLUMNS))

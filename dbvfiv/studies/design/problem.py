@@ -58,18 +58,10 @@ _PERFORMANCE = {"flow": "flow", "opening": "opening", "loss coefficient": "loss_
 
 @dataclass(frozen=True)
 class Variable:
-    """A number that may change.
+    """A number that may change."""
 
-    Attributes
-    ----------
-    name : str
-        Of a parameter of the table, or a key of the case.
-    low, high, start : float
-        SI; angles in degrees.
-    unit : str
-    """
-
-    name: str
+    name: str  #: Of a parameter of the table, or a key of the case.
+    #: low, high and start: SI; angles in degrees.
     low: float
     high: float
     start: float
@@ -77,12 +69,8 @@ class Variable:
 
 
 def variables_of(case: Case) -> tuple[Variable, ...]:
-    """Variables of a case.
-
-    Raises
-    ------
-    CaseError
-        For a name that is no number of the case, or bounds that cannot be read or do not hold its value.
+    """Variables of a case. Raises CaseError for a name that is no number of the case, or bounds that cannot be read or
+    do not hold its value.
     """
     found = []
     for name, text in case.design.variables.items():
@@ -136,12 +124,8 @@ def _changes_with(case: Case, one: Variable, other: Variable) -> bool:
 
 
 def statements_of(case: Case) -> tuple[Statement, ...]:
-    """Aim and constraints of a case, the aim first.
-
-    Raises
-    ------
-    CaseError
-        If variables or aim are missing, or nothing has a head.
+    """Aim and constraints of a case, the aim first. Raises CaseError if variables or aim are missing, or nothing has a
+    head.
     """
     if not case.design.variables:
         raise CaseError(
@@ -175,7 +159,6 @@ class DesignProblem:
 
     Parameters
     ----------
-    case : Case
     known : mapping, optional
         Found earlier, by values of the variables, pressure and whether modes were asked: what the valve does, or the
         sentence why it does not.
@@ -212,13 +195,7 @@ class DesignProblem:
         return np.array([(value - one.low) / (one.high - one.low) for one, value in zip(self.variables, values)])
 
     def case_at(self, values: Sequence[float]) -> Case:
-        """Case with other values of the variables.
-
-        Raises
-        ------
-        CaseError
-            For values that do not go together.
-        """
+        """Case with other values of the variables. Raises CaseError for values that do not go together."""
         case = self.case
         for one, value in zip(self.variables, values):
             if value != one.start:
@@ -230,12 +207,8 @@ class DesignProblem:
         return StabilityWalk(case.replace({"modes.max_frequency": self.band}) if self.band else case, Observer())
 
     def at(self, values: tuple[float, ...], pressure: float, margin: bool) -> AtHead:
-        """Performance of the valve with these values at a pressure.
-
-        Raises
-        ------
-        SolveError
-            If it does nothing that can be told: no steady state, or one that diverges.
+        """Performance of the valve with these values at a pressure. Raises SolveError if it does nothing that can be
+        told: no steady state, or one that diverges.
         """
         key = (values, pressure, margin)
         if key not in self.known:
@@ -320,14 +293,8 @@ class DesignProblem:
         return AtHead(found, told, reserve)
 
     def _modes(self, walk: StabilityWalk, place: Mu):
-        """Modes that the margin depends on, with left vectors.
-
-        Raises
-        ------
-        NotValidError
-            If the constants of a rubber with loss factors are unstable at this state.
-        SolveError
-            If a motion grows without oscillating.
+        """Modes that the margin depends on, with left vectors. Raises NotValidError if the constants of a rubber with
+        loss factors are unstable at this state. Raises SolveError if a motion grows without oscillating.
         """
         walk.require_valid(place)
         search = walk.search(place)
@@ -343,12 +310,8 @@ class DesignProblem:
 
 
 def margin_spectrum(walk: StabilityWalk, place: Mu, left: bool = False) -> Spectrum:
-    """Leading modes, as many as it takes that those left out in the band have no weight in the margin.
-
-    Raises
-    ------
-    SolveError
-        If they were not found.
+    """Leading modes, as many as it takes that those left out in the band have no weight in the margin. Raises
+    SolveError if they were not found.
     """
     family, search, count = walk.family(place), walk.search(place), walk.case.modes.count
     while True:

@@ -37,23 +37,13 @@ class _Enough(Exception):
 
 @dataclass(frozen=True)
 class Design:
-    """A design that was found.
+    """A design that was found."""
 
-    Attributes
-    ----------
-    values : tuple of float
-        Of the variables, SI.
-    aim : float
-    constraints : tuple of float
-        Least favourable value of each.
-    violation : float
-        Largest share of a bound, or of the value at the start where that is larger, by which it is missed; 0 where all
-        hold, infinite of a valve without a state at one of the heads.
-    """
-
-    values: tuple[float, ...]
+    values: tuple[float, ...]  #: Of the variables, SI.
     aim: float
-    constraints: tuple[float, ...]
+    constraints: tuple[float, ...]  #: Least favourable value of each.
+    #: Largest share of a bound, or of the value at the start where that is larger, by which it is missed; 0 where all
+    #: hold, infinite of a valve without a state at one of the heads.
     violation: float
 
     @property
@@ -71,8 +61,6 @@ class Search:
 
     Parameters
     ----------
-    problem : DesignProblem
-    aim : Statement
     constraints : sequence of Statement
     tried : callable
         Called with each `Design` that was tried, or the sentence why it could not be.
@@ -188,12 +176,8 @@ class Search:
         return best_of(designs, self.aim)
 
     def _begin(self, share: np.ndarray) -> tuple[np.ndarray, float]:
-        """Start and the size of the aim there; one at which no valve can be computed is moved towards the case.
-
-        Raises
-        ------
-        _Enough
-            If there is no valve to start from.
+        """Start and the size of the aim there; one at which no valve can be computed is moved towards the case. Raises
+        _Enough if there is no valve to start from.
         """
         for _ in range(BACK):
             self._latest = self._evaluated(share)

@@ -82,17 +82,13 @@ def check(case: Case) -> None:
 
 
 def run(session: Session, record: GrowingRecord, cases: Path | None = None) -> None:
-    """Designs for the aim and constraints of `design` of the case.
+    """Designs for the aim and constraints of `design` of the case. Raises CaseError for variables or statements that
+    cannot be used.
 
     Parameters
     ----------
     cases : Path, optional
         Folder for the case file of each design.
-
-    Raises
-    ------
-    CaseError
-        For variables or statements that cannot be used.
     """
     case = session.case
     aim, *constraints = statements_of(case)

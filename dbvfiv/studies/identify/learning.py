@@ -35,7 +35,6 @@ def sample_posterior(
     ----------
     log_likelihood : callable
         From scores (n, d) to (n,).
-    dimension, count, seed : int
     """
     random = np.random.default_rng([seed, 2])
     z = quasi_random(count, dimension, seed)
@@ -132,16 +131,10 @@ INFLATED, CORRELATED = 2.0, 0.3
 
 @dataclass(frozen=True)
 class Learned:
-    """Knowledge of inputs, whose prior is normal with unit variances, by samples of their posterior.
+    """Knowledge of inputs, whose prior is normal with unit variances, by samples of their posterior."""
 
-    Attributes
-    ----------
-    scores : (n, d) array
-    root : (d, d) array, optional
-        Lower triangle of the correlation that they have before anything is measured; none without it.
-    """
-
-    scores: np.ndarray
+    scores: np.ndarray  #: (n, d).
+    #: (d, d); lower triangle of the correlation that they have before anything is measured; none without it.
     root: np.ndarray | None = None
 
     @property
@@ -228,30 +221,19 @@ def _coordinate(distribution: Distribution, scores: np.ndarray) -> np.ndarray:
 
 @dataclass
 class Learning:
-    """Modes of sampled valves and measured oscillations.
-
-    Attributes
-    ----------
-    scores : (n, d) array
-        Independent scores of the samples.
-    rounds : (n,) array
-    modes : dict
-        From place to eigenvalues (n, MODES) and likeness (n, MODES, MODES) of all samples; NaN where not asked.
-    begins : (n, 2) array
-        Values of the range at which flutter begins below and above the last record; NaN where it does not, or nobody
-        asked.
-    left_out : tuple of int
-        Numbers of measured oscillations that are none of the modes.
-    """
+    """Modes of sampled valves and measured oscillations."""
 
     plan: Plan
     places: Places
     lines: Sequence[Measured]
-    scores: np.ndarray
-    rounds: np.ndarray
+    scores: np.ndarray  #: (n, d); independent scores of the samples.
+    rounds: np.ndarray  #: (n,).
+    #: From place to eigenvalues (n, MODES) and likeness (n, MODES, MODES) of all samples; NaN where not asked.
     modes: dict[int, tuple[np.ndarray, np.ndarray]]
+    #: (n, 2); values of the range at which flutter begins below and above the last record; NaN where it does not, or
+    #: nobody asked.
     begins: np.ndarray
-    left_out: tuple[int, ...] = ()
+    left_out: tuple[int, ...] = ()  #: Numbers of measured oscillations that are none of the modes.
     _fits: dict[int, Modal] = field(default_factory=dict)
 
     @property
@@ -448,17 +430,13 @@ def _spread(left: np.ndarray) -> np.ndarray:
 
 @dataclass(frozen=True)
 class Modal:
-    """Emulated frequency and damping of the modes of one place.
+    """Emulated frequency and damping of the modes of one place."""
 
-    Attributes
-    ----------
-    emulators : list of (modes, Emulator)
-        Modes of the case that the same samples have share one: logarithms of frequencies, then damping ratios.
-    error : (MODES, 2) array
-        Standard errors of the logarithm of the frequency, and of the damping ratio; infinite where a mode is unknown.
-    """
-
+    #: (modes, Emulator); modes of the case that the same samples have share one: logarithms of frequencies, then
+    #: damping ratios.
     emulators: list[tuple[np.ndarray, Emulator]]
+    #: (MODES, 2); standard errors of the logarithm of the frequency, and of the damping ratio; infinite where a mode is
+    #: unknown.
     error: np.ndarray
 
     @classmethod

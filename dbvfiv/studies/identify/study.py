@@ -102,12 +102,11 @@ def check(case: Case) -> None:
 
 
 def run(
-    session: Session,
-    record: GrowingRecord,
-    workers: int | str | None = None,
-    posterior: Path | None = None,
+    session: Session, record: GrowingRecord, workers: int | str | None = None, posterior: Path | None = None
 ) -> None:
-    """Posterior of the inputs of `uncertainty` of the case from the records of `identify`.
+    """Posterior of the inputs of `uncertainty` of the case from the records of `identify`. Raises CaseError for records
+    or inputs that cannot be used. Raises SolveError if the valve of the case has no steady state where a record was
+    taken.
 
     Parameters
     ----------
@@ -115,13 +114,6 @@ def run(
         See `dbvfiv.studies.workers.Workers`; those of the case by default.
     posterior : path, optional
         File for the case with what was learned as its uncertainty.
-
-    Raises
-    ------
-    CaseError
-        For records or inputs that cannot be used.
-    SolveError
-        If the valve of the case has no steady state where a record was taken.
     """
     case, places = session.case, Places(session.case)
     plan, asked = places.plan, case.identify
@@ -146,13 +138,7 @@ def run(
         check = search.check(learning, z, rounds + 1)
     table = {"sample": np.repeat(np.arange(len(z)), z.shape[1]), "input": np.tile(np.arange(z.shape[1]), len(z))}
     record.extend(POSTERIOR, table | {"score": z.ravel()})
-    record.note(
-        _FOUND,
-        rounds=rounds,
-        left_out=[*learning.left_out],
-        emulation=learning.emulation(z),
-        check=check,
-    )
+    record.note(_FOUND, rounds=rounds, left_out=[*learning.left_out], emulation=learning.emulation(z), check=check)
     result = IdentifyResult(record, session)
     for sentence in (*result.doubts, *walk.about_rubbers()):
         record.warn(sentence)
@@ -589,11 +575,5 @@ def onset(result: StudyResult) -> Figure:
 
 
 STUDY = Study(
-    "identify",
-    lambda _mesh: TABLES,
-    run,
-    IdentifyResult,
-    check,
-    rows_to_keep=rows_to_keep,
-    files={"posterior": ""},
+    "identify", lambda _mesh: TABLES, run, IdentifyResult, check, rows_to_keep=rows_to_keep, files={"posterior": ""}
 )

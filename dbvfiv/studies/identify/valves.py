@@ -39,32 +39,20 @@ VALUES, BEYOND = 8, 2.5
 
 @dataclass(frozen=True)
 class Measured:
-    """An oscillation that was measured.
+    """An oscillation that was measured."""
 
-    Attributes
-    ----------
-    record : int
-        Number of its record.
-    frequency, frequency_error : float, Hz
-        With half its 95 % interval, as all errors.
-    damping_ratio, damping_error : float
-        NaN where only the frequency is known.
-    """
-
-    record: int
+    record: int  #: Number of its record.
+    #: frequency and frequency_error: Hz; with half its 95 % interval, as all errors.
     frequency: float
     frequency_error: float
+    #: damping_ratio and damping_error: NaN where only the frequency is known.
     damping_ratio: float = np.nan
     damping_error: float = np.nan
 
 
 def measured_of(case: Case, record: int) -> tuple[list[Measured], str]:
-    """Oscillations of a record that are modes, each once, and a sentence on it.
-
-    Raises
-    ------
-    CaseError
-        For a record that cannot be read, or says neither file nor mode, or both.
+    """Oscillations of a record that are modes, each once, and a sentence on it. Raises CaseError for a record that
+    cannot be read, or says neither file nor mode, or both.
     """
     given, name = case.identify.records[record], f"identify.records.{record}"
     if given.file is None:
@@ -213,24 +201,14 @@ class Places:
 
 
 class Modes(NamedTuple):
-    """Leading modes of a sampled valve at one place.
-
-    Attributes
-    ----------
-    sample, place : int
-    eigenvalues : (MODES,) complex array, 1/s
-        NaN where there are fewer.
-    alike : (MODES, MODES) array
-        Modal assurance criterion of the modes of the case itself, in rows, and of these.
-    why : str
-        Why there are none.
-    """
+    """Leading modes of a sampled valve at one place."""
 
     sample: int
     place: int
-    eigenvalues: np.ndarray
+    eigenvalues: np.ndarray  #: (MODES,), 1/s; NaN where there are fewer.
+    #: (MODES, MODES); modal assurance criterion of the modes of the case itself, in rows, and of these.
     alike: np.ndarray
-    why: str = ""
+    why: str = ""  #: Why there are none.
 
     @classmethod
     def none(cls, sample: int, place: int, why: str) -> Modes:
@@ -252,8 +230,6 @@ class Valves:
 
     Parameters
     ----------
-    plan : Plan
-    places : Places
     known : sequence of (q, shapes) or None
         Displacements and shapes of the modes of the case itself at each place.
     """
@@ -337,7 +313,6 @@ def stretch(values: np.ndarray, now: float, known: np.ndarray, least: int = 1) -
     ----------
     known : (n, k) bool array
         Whether a sample has a mode at a value.
-    least : int
 
     Returns
     -------
@@ -369,12 +344,7 @@ def _kept(eigenvalues: np.ndarray, q: np.ndarray, shapes: np.ndarray) -> tuple[n
 
 
 def own_modes(walk: StabilityWalk, point: Mu) -> tuple[np.ndarray, np.ndarray]:
-    """Displacements of a state, and shapes (n, MODES at most) of its leading modes.
-
-    Raises
-    ------
-    SolveError
-    """
+    """Displacements of a state, and shapes (n, MODES at most) of its leading modes. Raises SolveError."""
     q = walk.equilibrium(point)
     return q, walk.spectrum(point, MODES).q[:, :MODES]
 
@@ -415,13 +385,7 @@ def least_damping(eigenvalues: np.ndarray) -> np.ndarray:
 
 
 def records_said(case: Case) -> tuple[list[Measured], list[dict[str, Any]]]:
-    """Oscillations of all records, and what each record is.
-
-    Raises
-    ------
-    CaseError
-        Where none holds a mode.
-    """
+    """Oscillations of all records, and what each record is. Raises CaseError where none holds a mode."""
     found, said = [], []
     for number, record in enumerate(case.identify.records):
         lines, words = measured_of(case, number)
@@ -452,7 +416,6 @@ def onsets(values: np.ndarray, damping: np.ndarray, now: float) -> tuple[np.ndar
         Rising.
     damping : (n, k) array
         Least damping ratio of samples.
-    now : float
 
     Returns
     -------

@@ -43,11 +43,8 @@ class Chances:
         self.inputs = _inputs(self.plan)
 
     def check(self) -> None:
-        """Refuse a map whose columns are not those of one steady state, or inputs that cannot be used.
-
-        Raises
-        ------
-        CaseError
+        """Refuse a map whose columns are not those of one steady state, or inputs that cannot be used. Raises
+        CaseError.
         """
         name, case = self.plan.along.parameter, self.plan.case
         if not is_surrounding(case, name) or case.has_pump:
@@ -60,12 +57,8 @@ class Chances:
         self.inputs.scores_of(np.zeros((1, len(self.inputs.inputs))))
 
     def column(self, value: float) -> dict[str, Any]:
-        """Numbers of samples that flutter and that are undecided in each cell of a column.
-
-        Raises
-        ------
-        SolveError
-            If the valve of the case has no steady state there, or the space could not be made.
+        """Numbers of samples that flutter and that are undecided in each cell of a column. Raises SolveError if the
+        valve of the case has no steady state there, or the space could not be made.
         """
         plan, inputs, count = self.plan, self.inputs, self.plan.case.map.samples
         along, across, law, solver = plan.along, plan.across.parameter, plan.base.storage, ColumnSolver()

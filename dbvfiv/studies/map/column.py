@@ -31,21 +31,11 @@ LOCATED = 1e-10
 
 
 class ColumnTask(NamedTuple):
-    """A column to solve.
+    """A column to solve."""
 
-    Attributes
-    ----------
-    value : float
-        Of the axis across.
-    level : int
-        0 for a column of the grid, more for one that is put between two of them.
-    parts : tuple of int
-        Numbers of the parts of the plan in which it is needed.
-    """
-
-    value: float
-    level: int
-    parts: tuple[int, ...]
+    value: float  #: Of the axis across.
+    level: int  #: 0 for a column of the grid, more for one that is put between two of them.
+    parts: tuple[int, ...]  #: Numbers of the parts of the plan in which it is needed.
 
     @property
     def key(self) -> tuple[float, int]:
@@ -150,35 +140,18 @@ class MapPlan:
 @shortly
 @dataclass(frozen=True)
 class MapColumn:
-    """A finished column.
+    """A finished column."""
 
-    Attributes
-    ----------
-    value : float
-        Of the axis across.
-    level : int
-        0 for a column of the grid, more for one that was put between two of them.
-    samples : dict of tuples of Sample
-        Cells by the number of their part, where it was asked for.
-    onsets : (k, 5) array
-        Number of the family of curves, see `MapPlan.curves`, value along the column, frequency in Hz, +1 where a mode
-        becomes unstable along the column, -1 where it ceases to be, and the growth rate beyond its level over the size
-        of the eigenvalue that the full matrices leave there, NaN where it was not corrected by them.
-    error : float
-        Largest estimated relative error of a leading eigenvalue.
-    failure : str
-        Why there is no column; empty if there is one.
-    seconds : float
-        Processor time.
-    """
-
-    value: float
-    level: int
-    samples: dict[int, Sequence[Sample]]
+    value: float  #: Of the axis across.
+    level: int  #: 0 for a column of the grid, more for one that was put between two of them.
+    samples: dict[int, Sequence[Sample]]  #: Cells by the number of their part, where it was asked for.
+    #: (k, 5); number of the family of curves, see `MapPlan.curves`, value along the column, frequency in Hz, +1 where a
+    #: mode becomes unstable along the column, -1 where it ceases to be, and the growth rate beyond its level over the
+    #: size of the eigenvalue that the full matrices leave there, NaN where it was not corrected by them.
     onsets: np.ndarray
-    error: float = np.nan
-    failure: str = ""
-    seconds: float = 0.0
+    error: float = np.nan  #: Largest estimated relative error of a leading eigenvalue.
+    failure: str = ""  #: Why there is no column; empty if there is one.
+    seconds: float = 0.0  #: Processor time.
 
     @classmethod
     def gap(cls, task: ColumnTask, sentence: str, seconds: float = 0.0) -> MapColumn:
@@ -273,7 +246,6 @@ class ColumnPool(Workers):
 
     Parameters
     ----------
-    plan : MapPlan
     workers : int or str
         1 solves everything here, one after another; see `Workers`.
     warn : callable

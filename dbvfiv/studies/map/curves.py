@@ -72,34 +72,18 @@ class Tip:
 
 @dataclass
 class Web:
-    """Links between the onsets of neighbouring columns under one continuity law.
+    """Links between the onsets of neighbouring columns under one continuity law."""
 
-    Attributes
-    ----------
-    number : int
-        Of the family, see `MapPlan.curves`.
-    law : int
-        Number of the law.
-    columns : list of MapColumn
-        Those solved under it, ascending.
-    place : (columns,) list of float
-        0..1 across.
-    onsets : list of lists of Onset
-    ahead, behind : lists of dicts
-        From the number of an onset to that of the one it is linked with in the next, or last, column.
-    tips : list of Tip
-    gaps : set of int
-        Columns with a gap between them and the next: one without a state, or in which nothing is valid.
-    """
-
-    number: int
-    law: int
-    columns: list[MapColumn]
-    place: list[float]
+    number: int  #: Of the family, see `MapPlan.curves`.
+    law: int  #: Number of the law.
+    columns: list[MapColumn]  #: Those solved under it, ascending.
+    place: list[float]  #: (columns,) list of float; 0..1 across.
     onsets: list[list[Onset]]
+    #: ahead and behind: from the number of an onset to that of the one it is linked with in the next, or last, column.
     ahead: list[dict[int, int]] = field(default_factory=list)
     behind: list[dict[int, int]] = field(default_factory=list)
     tips: list[Tip] = field(default_factory=list)
+    #: Columns with a gap between them and the next: one without a state, or in which nothing is valid.
     gaps: set[int] = field(default_factory=set)
 
     @classmethod
@@ -176,7 +160,6 @@ class Web:
         return found
 
     # -- what is not known yet
-    # ----
 
     def is_known(self, i: int, k: int, side: int) -> bool:
         """True where the neutral curve beside an onset is known.
@@ -287,34 +270,20 @@ def _onset(plan: MapPlan, row) -> Onset:
 @shortly
 @dataclass(frozen=True)
 class OnsetCurve:
-    """A curve in the plane of the map on which a mode is neutral, or has another damping.
+    """A curve in the plane of the map on which a mode is neutral, or has another damping."""
 
-    Attributes
-    ----------
-    law : int
-        Number of the continuity law.
-    x, y : (k,) arrays
-        SI values.
-    frequency : (k,) array, Hz
-    exact : bool
-        Every point is neutral by the full matrices, and no piece of the curve between them, nor its ends, is a guess.
-    mismatch : float
-        Largest growth rate, by the full matrices, over the size of the eigenvalue at its points; NaN if a point was not
-        corrected.
-    reason : str
-        Why it is not exact.
-    level : str
-        Growth rate or damping ratio of the leading mode along it; empty on an onset curve.
-    """
-
-    law: int
+    law: int  #: Number of the continuity law.
+    #: x and y: (k,); SI values.
     x: np.ndarray
     y: np.ndarray
-    frequency: np.ndarray
+    frequency: np.ndarray  #: (k,), Hz.
+    #: Every point is neutral by the full matrices, and no piece of the curve between them, nor its ends, is a guess.
     exact: bool = False
+    #: Largest growth rate, by the full matrices, over the size of the eigenvalue at its points; NaN if a point was not
+    #: corrected.
     mismatch: float = float("nan")
-    reason: str = ""
-    level: str = ""
+    reason: str = ""  #: Why it is not exact.
+    level: str = ""  #: Growth rate or damping ratio of the leading mode along it; empty on an onset curve.
 
     @property
     def title(self) -> str:

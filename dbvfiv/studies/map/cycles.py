@@ -43,26 +43,16 @@ SPEC = TableSpec(ROWS, _COLUMNS, chunk=512)
 
 
 class CycleCells(NamedTuple):
-    """Cycles along one column under one law.
+    """Cycles along one column under one law."""
 
-    Attributes
-    ----------
-    amplitude, frequency, least, residual : (cells,) arrays
-        NaN where no cycle was found.
-    growing : (cells,) int array
-    touching : list of float
-        Values at which the lips of a cycle just touch.
-    said : str
-        Why cells that are unstable have none; empty where all have one.
-    """
-
+    #: amplitude, frequency, least and residual: (cells,); NaN where no cycle was found.
     amplitude: np.ndarray
     frequency: np.ndarray
-    growing: np.ndarray
+    growing: np.ndarray  #: (cells,).
     least: np.ndarray
     residual: np.ndarray
-    touching: list[float]
-    said: str
+    touching: list[float]  #: Values at which the lips of a cycle just touch.
+    said: str  #: Why cells that are unstable have none; empty where all have one.
 
     @classmethod
     def blank(cls, cells: int) -> CycleCells:

@@ -208,7 +208,6 @@ def _variants(plan: MapPlan) -> Iterator[tuple[str, list[int]]]:
 
 
 # -- storage
-# ----
 
 COLUMNS, ONSETS = "columns", "onsets"
 _COLUMNS = (
@@ -293,19 +292,14 @@ def check(case: Case) -> None:
 
 def run(session: Session, record: GrowingRecord, workers: int | None = None) -> None:
     """The map of `map` of the case; every column is kept as it is finished. A run that goes on repeats the decisions of
-    the one before with its columns, so that it ends with the numbers of one that was never interrupted.
+    the one before with its columns, so that it ends with the numbers of one that was never interrupted. Raises
+    CaseError if the case has nothing that a parameter could change. Raises SolveError if the case has no flow, or no
+    column was found at all.
 
     Parameters
     ----------
     workers : int, optional
         Processes that share the columns; those of the case by default. Under ``mpiexec`` with mpi4py all its processes.
-
-    Raises
-    ------
-    CaseError
-        If the case has nothing that a parameter could change.
-    SolveError
-        If the case has no flow, or no column was found at all.
     """
     case, plan = session.case, MapPlan(session.case)
     if case.map.samples:

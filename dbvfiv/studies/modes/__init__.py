@@ -58,8 +58,7 @@ def command(
     in_vacuo: Annotated[
         bool,
         typer.Option(
-            "--in-vacuo",
-            help="Leave the flow out: the structure under its steady pressures, with any fluid outside.",
+            "--in-vacuo", help="Leave the flow out: the structure under its steady pressures, with any fluid outside."
         ),
     ] = False,
     symmetry: Annotated[

@@ -373,12 +373,7 @@ _PICTURES_A_SECOND, _DOTS = 15, 90
 
 def animate_mode(result: StudyResult, mode: ModeShape, path: str | Path, frames: int = 24) -> Path:
     """Write one cycle of a mode, endlessly repeated, growth or decay left out; of a mode that does not oscillate, a
-    slow to and fro.
-
-    Raises
-    ------
-    CaseError
-        If the file cannot be written or there are fewer than 2 frames.
+    slow to and fro. Raises CaseError if the file cannot be written or there are fewer than 2 frames.
     """
     path = Path(path)
     if frames < 2:
@@ -412,19 +407,12 @@ _STANDING, _TRAVELLING = 0.1, 0.6
 
 @dataclass(frozen=True)
 class WaveContent:
-    """Standing and travelling part of a harmonic motion along a line.
+    """Standing and travelling part of a harmonic motion along a line."""
 
-    Attributes
-    ----------
-    travelling : float
-        Short over long axis of the motion in the plane of its real and imaginary shape: 0 where all points swing
-        together, 1 for a pure travelling wave; the travelling index of Feeny, J. Sound Vib. 310 (2008) 77.
-    towards_start : bool
-        Whether what travels goes towards the first point of the line.
-    """
-
+    #: Short over long axis of the motion in the plane of its real and imaginary shape: 0 where all points swing
+    #: together, 1 for a pure travelling wave; the travelling index of Feeny, J. Sound Vib. 310 (2008) 77.
     travelling: float
-    towards_start: bool
+    towards_start: bool  #: Whether what travels goes towards the first point of the line.
 
     def words(self) -> str:
         """One clause, for a valve's line that begins at the lip."""

@@ -72,36 +72,20 @@ class ModeShape:
     """A mode; a conjugate pair is one mode, with frequency >= 0.
 
     Motion: Re(shape exp(eigenvalue t)), of undetermined amplitude.
-
-    Attributes
-    ----------
-    number : int
-        From 1, by falling growth rate.
-    growth_rate : float, 1/s
-    angular_frequency : float, rad/s
-    residual, backward_error : float
-        See `eigen.Spectrum`.
-    shape : (nn, c) complex
-        Displacements and rotations of the nodes, c = 5; the largest displacement is 1 and
-        real.
-    area : (m,) complex, m2 per m
-    pressure : (m,) complex, Pa per m
-        NaN in vacuo.
-    inlet_velocity : complex, m/s per m
-    symmetry : str
-        Class of motion, see `dbvfiv.model.symmetry`.
     """
 
-    number: int
-    growth_rate: float
-    angular_frequency: float
+    number: int  #: From 1, by falling growth rate.
+    growth_rate: float  #: 1/s.
+    angular_frequency: float  #: rad/s.
+    #: residual and backward_error: see `eigen.Spectrum`.
     residual: float
     backward_error: float
+    #: (nn, c) complex; displacements and rotations of the nodes, c = 5; the largest displacement is 1 and real.
     shape: np.ndarray = field(repr=False)
-    area: np.ndarray = field(repr=False)
-    pressure: np.ndarray = field(repr=False)
-    inlet_velocity: complex = field(repr=False)
-    symmetry: str = EQUILIBRIA
+    area: np.ndarray = field(repr=False)  #: (m,) complex, m2 per m.
+    pressure: np.ndarray = field(repr=False)  #: (m,) complex, Pa per m; NaN in vacuo.
+    inlet_velocity: complex = field(repr=False)  #: m/s per m.
+    symmetry: str = EQUILIBRIA  #: Class of motion, see `dbvfiv.model.symmetry`.
 
     def __repr__(self) -> str:
         return f"<{type(self).__name__} {self.number}: growth {self.growth_rate:+.5g} 1/s at {self.frequency:.5g} Hz>"
@@ -175,51 +159,25 @@ CURVE = (
 @shortly
 @dataclass(frozen=True, eq=False)
 class Certificate:
-    """Eigenvalue count by two routes: the list of modes, and the argument principle.
-
-    Attributes
-    ----------
-    agrees : bool
-    unstable_count, unstable_count_independent : int
-        From the list of modes, and from the winding of the determinant; both eigenvalues of a conjugate pair count.
-    statement : str
-        The count and its certainty in a sentence.
-    certain : bool
-        True where the phase of the determinant could be followed everywhere.
-    line : float, 1/s
-        Growth rate above which eigenvalues are counted: 0 but for undamped structures.
-    counted_up_to : float, Hz
-        Frequency at which the independent count ends; infinite but for searches in a band.
-    distance : float
-        Distance of the winding from a whole number.
-    response_error : float
-        Error of log det made by the reduced basis behind the count; NaN if no basis was used.
-    status : str
-        "complete" if no mode was missed among those listed.
-    asked : int
-    complete_above : float, 1/s
-    band : float, Hz
-        Every eigenvalue above this growth rate and up to this frequency was found.
-    rejected : int
-        Pairs thrown away because of their residual.
-    frequency, phase : (k,) Hz, rad
-        Phase of the determinant on the line.
-    """
+    """Eigenvalue count by two routes: the list of modes, and the argument principle."""
 
     agrees: bool
+    #: unstable_count and unstable_count_independent: from the list of modes, and from the winding of the determinant;
+    #: both eigenvalues of a conjugate pair count.
     unstable_count: int
     unstable_count_independent: int
-    statement: str
-    certain: bool
-    line: float
-    counted_up_to: float
-    distance: float
-    response_error: float
-    status: str
+    statement: str  #: The count and its certainty in a sentence.
+    certain: bool  #: True where the phase of the determinant could be followed everywhere.
+    line: float  #: 1/s; growth rate above which eigenvalues are counted: 0 but for undamped structures.
+    counted_up_to: float  #: Hz; frequency at which the independent count ends; infinite but for searches in a band.
+    distance: float  #: Distance of the winding from a whole number.
+    response_error: float  #: Error of log det made by the reduced basis behind the count; NaN if no basis was used.
+    status: str  #: "complete" if no mode was missed among those listed.
     asked: int
-    complete_above: float
-    band: float
-    rejected: int
+    complete_above: float  #: 1/s.
+    band: float  #: Hz; every eigenvalue above this growth rate and up to this frequency was found.
+    rejected: int  #: Pairs thrown away because of their residual.
+    #: frequency and phase: (k,) Hz, rad; phase of the determinant on the line.
     frequency: np.ndarray
     phase: np.ndarray
 
@@ -271,29 +229,15 @@ class Certificate:
 
 @dataclass(frozen=True)
 class FoundModes:
-    """Leading modes of one state in one variant.
+    """Leading modes of one state in one variant."""
 
-    Attributes
-    ----------
-    modes : tuple of ModeShape
-        By falling growth rate.
-    certificate : Certificate
-        Of the eigenvalue count.
-    verdict : Verdict
-        Stability of the state in this symmetry class.
-    notes : tuple of str
-    spectrum : Spectrum, optional
-        Eigenvalues, vectors and residuals, of a run.
-    grazing : dict
-        Where faces are about to part or have just met: how many `faces`, growth rates, 1/s, and frequencies, Hz,
-        with them `parted` and `held`. Empty elsewhere.
-    """
-
-    modes: tuple[ModeShape, ...]
-    certificate: Certificate
-    verdict: Verdict
+    modes: tuple[ModeShape, ...]  #: By falling growth rate.
+    certificate: Certificate  #: Of the eigenvalue count.
+    verdict: Verdict  #: Stability of the state in this symmetry class.
     notes: tuple[str, ...] = ()
-    spectrum: Spectrum | None = None
+    spectrum: Spectrum | None = None  #: Eigenvalues, vectors and residuals, of a run.
+    #: Where faces are about to part or have just met: how many `faces`, growth rates, 1/s, and frequencies, Hz, with
+    #: them `parted` and `held`. Empty elsewhere.
     grazing: dict[str, Any] = field(default_factory=dict)
 
     @property
@@ -325,11 +269,13 @@ def run_modes(
     symmetry: Symmetry = SYMMETRIES[EQUILIBRIA],
     walk: StabilityWalk | None = None,
 ) -> FoundModes:
-    """Leading modes of a steady state in one class of motion.
+    """Leading modes of a steady state in one class of motion. Raises CaseError for a valve at rest with fluid in it:
+    without a pressure its velocity is undetermined. Raises NotValidError if the constants of a rubber with loss factors
+    are unstable at this state. Raises SolveError if the state is no equilibrium, or no shift was found at which the
+    pencil can be factored.
 
     Parameters
     ----------
-    model : ValveModel
     state : SteadyState
         An equilibrium of the model.
     mu : Mu, optional
@@ -341,15 +287,6 @@ def run_modes(
         The class; that of the equilibria by default.
     walk : StabilityWalk, optional
         One that knows the state.
-
-    Raises
-    ------
-    CaseError
-        For a valve at rest with fluid in it: without a pressure its velocity is undetermined.
-    NotValidError
-        If the constants of a rubber with loss factors are unstable at this state.
-    SolveError
-        If the state is no equilibrium, or no shift was found at which the pencil can be factored.
     """
     keys = model.case.modes if keys is None else keys
     observer = Observer() if observer is None else observer
@@ -527,8 +464,6 @@ def critical_damping_factor(walk: StabilityWalk, place: Mu, verdict: Verdict) ->
 
     Parameters
     ----------
-    walk : StabilityWalk
-    place : Mu
     verdict : Verdict
         On the place.
 

@@ -30,10 +30,7 @@ from .search import CURVE, MODE, Certificate, FoundModes, ModeShape, critical_da
 STATE, MODES, COUNT = "state", "modes", "count"
 #: Kinds of notes: on a variant whose rows are all there, and why the constants of the rubber do not hold at the state.
 _FOUND, _REFUSAL = "certificate", "not valid"
-HEAD = (
-    "  mode   growth rate    frequency   damping ratio   residual",
-    "                 1/s           Hz",
-)
+HEAD = ("  mode   growth rate    frequency   damping ratio   residual", "                 1/s           Hz")
 
 
 def tables_of(mesh: MeshData) -> tuple[TableSpec, TableSpec, TableSpec]:
@@ -334,10 +331,7 @@ class ModesResult(StudyResult):
 
 def side_by_side(own: str, modes: Sequence[ModeShape], law: str, others: Sequence[ModeShape]) -> list[str]:
     """Table of the modes under both laws, each by falling growth rate."""
-    lines = [
-        f"{'':6}{own:>40}{law:>40}",
-        f"{'mode':>6}" + 2 * f"{'1/s':>14}{'Hz':>13}{'damping':>13}",
-    ]
+    lines = [f"{'':6}{own:>40}{law:>40}", f"{'mode':>6}" + 2 * f"{'1/s':>14}{'Hz':>13}{'damping':>13}"]
     for i in range(max(len(modes), len(others))):
         lines.append(f"{i + 1:6d}" + "".join(_cells(found[i : i + 1]) for found in (modes, others)))
     return lines

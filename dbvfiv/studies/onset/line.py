@@ -23,23 +23,15 @@ BESIDE = 1e-7
 
 @dataclass(frozen=True)
 class Side:
-    """Stability at a parameter value a little beside an onset, by the full model.
-
-    Attributes
-    ----------
-    value : float
-    growth_rate, frequency : float, 1/s, Hz
-        Of the crossing mode.
-    leading_growth_rate : float, 1/s
-        Of the leading mode.
-    unstable_count, unstable_count_independent : int
-        Unstable eigenvalues by the spectrum and by the argument principle.
-    """
+    """Stability at a parameter value a little beside an onset, by the full model."""
 
     value: float
+    #: growth_rate and frequency: 1/s, Hz; of the crossing mode.
     growth_rate: float
     frequency: float
-    leading_growth_rate: float
+    leading_growth_rate: float  #: 1/s; of the leading mode.
+    #: unstable_count and unstable_count_independent: unstable eigenvalues by the spectrum and by the argument
+    #: principle.
     unstable_count: int
     unstable_count_independent: int
 
@@ -59,57 +51,28 @@ class Side:
 
 @dataclass(frozen=True)
 class OnsetPoint:
-    """One crossing of the imaginary axis.
-
-    Attributes
-    ----------
-    parameter : str
-    value : float
-    frequency : float, Hz
-        0 for a real eigenvalue (divergence).
-    growth_rate : float, 1/s
-        Left over at the value: how well it is located.
-    gains : bool
-        True if the mode becomes unstable as the parameter grows.
-    edge : bool
-        True if no other mode is unstable there, so that the state itself changes between stable and unstable.
-    below, above : Side
-        Direct eigenvalues on both sides.
-    confirmed : bool
-        Both sides agree with the crossing, and both counts agree on each side.
-    bracket : (2,) tuple of float
-        Neighbouring values of the scan that it lies between.
-    ahead : int
-        Modes that grow faster there.
-    criticality : str or None
-        "super", "sub" or "degenerate"; None for a real eigenvalue or where it was not asked for.
-    first_lyapunov_coefficient : float or None
-        Scaled for eigenvectors of unit norm in (q, v, U), 1/s; only its sign carries over to other scalings.
-    crossing_speed : float or None
-        Derivative of the growth rate with respect to the parameter.
-    uncertainty : float or None
-        By Richardson's rule from a second mesh, in units of the parameter.
-    coarse_value : float or None
-        The onset on the second mesh.
-    note : str
-    """
+    """One crossing of the imaginary axis."""
 
     parameter: str
     value: float
-    frequency: float
-    growth_rate: float
-    gains: bool
+    frequency: float  #: Hz; 0 for a real eigenvalue (divergence).
+    growth_rate: float  #: 1/s; left over at the value: how well it is located.
+    gains: bool  #: True if the mode becomes unstable as the parameter grows.
+    #: True if no other mode is unstable there, so that the state itself changes between stable and unstable.
     edge: bool
+    #: below and above: direct eigenvalues on both sides.
     below: Side
     above: Side
-    confirmed: bool
-    bracket: tuple[float, float]
-    ahead: int = 0
+    confirmed: bool  #: Both sides agree with the crossing, and both counts agree on each side.
+    bracket: tuple[float, float]  #: (2,) tuple of float; neighbouring values of the scan that it lies between.
+    ahead: int = 0  #: Modes that grow faster there.
+    #: "super", "sub" or "degenerate"; None for a real eigenvalue or where it was not asked for.
     criticality: str | None = None
+    #: Scaled for eigenvectors of unit norm in (q, v, U), 1/s; only its sign carries over to other scalings.
     first_lyapunov_coefficient: float | None = None
-    crossing_speed: float | None = None
-    uncertainty: float | None = None
-    coarse_value: float | None = None
+    crossing_speed: float | None = None  #: Derivative of the growth rate with respect to the parameter.
+    uncertainty: float | None = None  #: By Richardson's rule from a second mesh, in units of the parameter.
+    coarse_value: float | None = None  #: The onset on the second mesh.
     note: str = ""
 
     @property
@@ -133,27 +96,14 @@ class OnsetPoint:
 @shortly
 @dataclass(frozen=True)
 class FoundOnsets:
-    """Onsets along one parameter in one variant, and the scan that found them.
+    """Onsets along one parameter in one variant, and the scan that found them."""
 
-    Attributes
-    ----------
-    variant : Variant
-        Flow model and symmetry class.
-    samples : tuple of Sample
-        In ascending order of the parameter, those of narrow tongues included.
-    points : tuple of OnsetPoint
-        In ascending order of the parameter.
-    failures, warnings : tuples of str
-    missed : tuple of float
-        Values at which no state was found.
-    """
-
-    variant: Variant
-    samples: tuple[Sample, ...]
-    points: tuple[OnsetPoint, ...]
+    variant: Variant  #: Flow model and symmetry class.
+    samples: tuple[Sample, ...]  #: In ascending order of the parameter, those of narrow tongues included.
+    points: tuple[OnsetPoint, ...]  #: In ascending order of the parameter.
     failures: tuple[str, ...] = ()
     warnings: tuple[str, ...] = ()
-    missed: tuple[float, ...] = ()
+    missed: tuple[float, ...] = ()  #: Values at which no state was found.
 
     @cached_property
     def values(self) -> np.ndarray:

@@ -51,7 +51,6 @@ class OnsetSearch:
 
     Parameters
     ----------
-    case : Case
     variant : Variant, optional
         Flow model and symmetry class; those of the case's equilibria by default. Cycles that leave the symmetry have
         normal forms of their own, not looked for.
@@ -136,12 +135,7 @@ class OnsetSearch:
         return [known[value] for value in sorted({*self.scan.samples, *self.scan.failures}) if value in known]
 
     def point(self, crossing: Crossing) -> OnsetPoint:
-        """Locate, confirm and describe one crossing.
-
-        Raises
-        ------
-        SolveError
-        """
+        """Locate, confirm and describe one crossing. Raises SolveError."""
         key = (crossing.low.value, crossing.high.value, crossing.index)
         point, mode = self._known.get(key), None
         if point is None:
@@ -208,12 +202,8 @@ class OnsetSearch:
         return Sample.of(value, self.walk.cell(self.place(value)))
 
     def critical(self, place: Mu, eigenvalue: complex):
-        """The mode of the full pencil at a place that an eigenvalue found otherwise belongs to.
-
-        Raises
-        ------
-        SolveError
-            If the full pencil has no such mode.
+        """The mode of the full pencil at a place that an eigenvalue found otherwise belongs to. Raises SolveError if
+        the full pencil has no such mode.
         """
         spectrum = self.walk.spectrum(place)
         apart = np.abs(spectrum.eigenvalues - eigenvalue)
@@ -334,11 +324,10 @@ def run_onset(
     known: Iterable[Sample | OnsetPoint] = (),
     walk: StabilityWalk | None = None,
 ) -> FoundOnsets:
-    """All onsets of a case along `onset.over`.
+    """All onsets of a case along `onset.over`. Raises SolveError if no state of the scan was found.
 
     Parameters
     ----------
-    case : Case
     variant : Variant, optional
         Flow model and symmetry class; those of the case's equilibria by default.
     observer : Observer, optional
@@ -348,11 +337,6 @@ def run_onset(
         What an interrupted run had found, in its order; it is not solved again.
     walk : StabilityWalk, optional
         Of a case that differs in load, surroundings and `onset` alone, for steady states it knows.
-
-    Raises
-    ------
-    SolveError
-        If no state of the scan was found.
     """
     observer, known, parameter = observer or Observer(), list(known), case.onset.axis.parameter
     search = OnsetSearch(case, variant, observer, walk, known=known)
@@ -384,12 +368,8 @@ def run_onset(
 
 
 def normal_form(case: Case, walk: StabilityWalk, place: Mu, mode, parameter: str | None = None):
-    """Hopf normal form at a located onset, a `continuation.HopfNormalForm`.
-
-    Raises
-    ------
-    ContinuationError
-        If the eigenvalue is not simple.
+    """Hopf normal form at a located onset, a `continuation.HopfNormalForm`. Raises ContinuationError if the eigenvalue
+    is not simple.
     """
     mu = place.for_system()
     # the levels of a fluid with gravity would be left out, and how the lift of a pump follows a moving steady state

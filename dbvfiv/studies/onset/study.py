@@ -18,14 +18,7 @@ from ...texts import digits
 from ..case import Case
 from ..result import StudyResult
 from ..session import Session, Study
-from ..stability.dimensions import (
-    Variant,
-    certified_in_all,
-    compare_ranges,
-    leading_class,
-    own_variant,
-    variants,
-)
+from ..stability.dimensions import Variant, certified_in_all, compare_ranges, leading_class, own_variant, variants
 from ..stability.place import check_scan, describe_fixed, fixed_conditions, require_kept_head
 from ..stability.samples import SAMPLE_TABLE, Sample, keep_samples, read_samples
 from ..stability.verdict import NOT_VALID, Verdict, lowered

@@ -38,12 +38,7 @@ class Keys(RangeSection):
     )
 
     def density(self) -> list[tuple[float, float]]:
-        """Frequencies and power densities of the pressure.
-
-        Raises
-        ------
-        CaseError
-        """
+        """Frequencies and power densities of the pressure. Raises CaseError."""
         if self.spectrum is None:
             level = self.noise**2 / self.max_frequency
             return [(0.0, level), (self.max_frequency, level)]

@@ -54,28 +54,16 @@ WIDTHS, NODES = (-100.0, -30.0, -10.0, -3.0, -1.0, 0.0, 1.0, 3.0, 10.0, 30.0, 10
 
 @dataclass(frozen=True)
 class Spread:
-    """Random motion under a pressure spectrum.
+    """Random motion under a pressure spectrum."""
 
-    Attributes
-    ----------
-    rms : (k,) array
-        Of the outputs.
-    correlation_time : (k,) array, s
-        Twice the integral of the square of the correlation coefficient over all lags: of one mode, one over its decay
-        rate.
-    """
-
-    rms: np.ndarray
+    rms: np.ndarray  #: (k,); of the outputs.
+    #: (k,), s; twice the integral of the square of the correlation coefficient over all lags: of one mode, one over its
+    #: decay rate.
     correlation_time: np.ndarray
 
 
 def require_inertia(case: Case) -> None:
-    """Refuse a valve without a fluid that has inertia.
-
-    Raises
-    ------
-    CaseError
-    """
+    """Refuse a valve without a fluid that has inertia. Raises CaseError."""
     if not (case.drive.kind == "flow" and case.fluid.unsteady):
         raise CaseError(
             "The response to the pressure at the inlet needs a fluid with inertia (fluid.unsteady = true).",
@@ -84,12 +72,11 @@ def require_inertia(case: Case) -> None:
 
 
 class Transfer:
-    """Response of a steady state per pressure at its inlet, over frequency.
+    """Response of a steady state per pressure at its inlet, over frequency. Raises CaseError for a flow without
+    inertia. Raises SolveError if the reduced operator does not become accurate.
 
     Parameters
     ----------
-    linear : LinearisedState
-    mu : Mu
     frequencies : (k,) array, Hz
         Frequencies that it is made for, ascending and not negative.
 
@@ -99,13 +86,6 @@ class Transfer:
         Largest relative difference from the full operator at frequencies that the space was not made for.
     checked : tuple of float, Hz
         Frequencies at which both were compared.
-
-    Raises
-    ------
-    CaseError
-        For a flow without inertia.
-    SolveError
-        If the reduced operator does not become accurate.
     """
 
     def __init__(self, linear: LinearisedState, mu: Mu, frequencies: np.ndarray):
@@ -335,12 +315,7 @@ def frequencies(case: Case, resolved: float = np.inf) -> np.ndarray:
 
 def left_out(case: Case, resolved: float = np.inf) -> list[str]:
     """Sentences on the power of response.spectrum beyond the frequencies that the response is made for, up to where
-    waves are resolved.
-
-    Raises
-    ------
-    CaseError
-        Without any power within them.
+    waves are resolved. Raises CaseError without any power within them.
     """
     frequency, power = np.transpose(case.response.density())
     (low, most), whole = frequencies(case, resolved)[[0, -1]], trapezoid(power, frequency)
@@ -368,14 +343,8 @@ def left_out(case: Case, resolved: float = np.inf) -> list[str]:
 
 
 def run(session: Session, record: GrowingRecord) -> None:
-    """Response at the state of the case, or at every value of response.over.
-
-    Raises
-    ------
-    CaseError
-        Without a fluid that has inertia.
-    SolveError
-        Without flow.
+    """Response at the state of the case, or at every value of response.over. Raises CaseError without a fluid that has
+    inertia. Raises SolveError without flow.
     """
     case, asked = session.case, session.case.response
     values = (case.drive.pressure,) if asked.axis is None else asked.axis.values

@@ -55,23 +55,13 @@ _PRESSURE = "pressure", PARAMETERS["pressure"].key
 
 @dataclass(frozen=True)
 class Sensitivity:
-    """Derivatives by one parameter.
-
-    Attributes
-    ----------
-    parameter : str
-    value : float
-        SI; angles in degrees.
-    eigenvalues : tuple of complex
-        1/s per unit of the parameter, of each mode, or each sum of them: growth rate and angular frequency.
-    performance : dict of float
-        Per unit of the parameter, by the names of `PERFORMANCE`.
-    """
+    """Derivatives by one parameter."""
 
     parameter: str
-    value: float
+    value: float  #: SI; angles in degrees.
+    #: 1/s per unit of the parameter, of each mode, or each sum of them: growth rate and angular frequency.
     eigenvalues: tuple[complex, ...]
-    performance: dict[str, float]
+    performance: dict[str, float]  #: Per unit of the parameter, by the names of `PERFORMANCE`.
 
     @property
     def derivative(self) -> complex:
@@ -117,11 +107,9 @@ class Neighbourhood:
 
     Parameters
     ----------
-    model : ValveModel
     q : (n,) array
         The steady state at the inlet pressure.
     pressure : float, Pa
-    mu : Mu
     modes : sequence of eigen.Mode, optional
         With left vectors (`SearchOptions(left=True)`).
     step : float
@@ -168,20 +156,15 @@ class Neighbourhood:
         return self._linear.pencil(self.mu)
 
     def slope(self, name: str) -> Sensitivity:
-        """Derivatives by one parameter.
+        """Derivatives by one parameter. Raises CaseError if a parameter does not exist, or its value beside this one is
+        refused. Raises SolveError if there is no flow through the valve beside this one, or the valve jumps at the end
+        of a parameter.
 
         Behind a pump the pressure follows its curve; by the pressure itself they are those of a static lift.
 
         At an end of what a parameter may be, such as the strain level of 10 %, those towards its inside, to second
         order as central ones are. Strain levels are interpolated linearly between the tests: at one of those, 20 or
         40 %, the derivative is the mean of both sides.
-
-        Raises
-        ------
-        CaseError
-            If a parameter does not exist, or its value beside this one is refused.
-        SolveError
-            If there is no flow through the valve beside this one, or the valve jumps at the end of a parameter.
         """
         require_number(self.model, name)
         value = _value(self.model, self.pressure, self.mu, name)
@@ -333,12 +316,7 @@ def parameters_of(model: ValveModel) -> tuple[str, ...]:
 
 
 def require_number(model: ValveModel, name: str) -> None:
-    """Refuse what is neither of `parameters_of` nor a key of the case that holds one number.
-
-    Raises
-    ------
-    CaseError
-    """
+    """Refuse what is neither of `parameters_of` nor a key of the case that holds one number. Raises CaseError."""
     known = parameters_of(model)
     if name in ("density", PARAMETERS["density"].key) and model.pump is not None:
         require_parameter(model.case, "density")
@@ -428,12 +406,8 @@ def _value(model, pressure, mu, name) -> float:
 
 
 def changed(model: ValveModel, pressure: float, mu: Mu, name: str, value: float) -> tuple[ValveModel, float, Mu]:
-    """Valve, inlet pressure and parameter point with one parameter changed; the same model where that stays.
-
-    Raises
-    ------
-    CaseError
-        For a value that the case does not allow.
+    """Valve, inlet pressure and parameter point with one parameter changed; the same model where that stays. Raises
+    CaseError for a value that the case does not allow.
     """
     case = model.case
     if name in _PRESSURE:

@@ -41,17 +41,10 @@ _WORDS = {True: "stable", False: "unstable", None: "undecided"}
 
 
 class Variant(NamedTuple):
-    """One flow model and one symmetry class.
-
-    Attributes
-    ----------
-    continuity : str
-    symmetry : str
-        Name of the class, see `dbvfiv.model.symmetry`.
-    """
+    """One flow model and one symmetry class."""
 
     continuity: str
-    symmetry: str
+    symmetry: str  #: Name of the class, see `dbvfiv.model.symmetry`.
 
     @property
     def storage(self) -> float:
@@ -81,11 +74,7 @@ def own_variant(case: Case) -> Variant:
 
 def variants(case: Case, study: str) -> list[Variant]:
     """Variants that a study is asked for by its keys `symmetry` and `continuity`, those of the case's flow model first.
-
-    Raises
-    ------
-    CaseError
-        If two flow models are asked for where none is at work.
+    Raises CaseError if two flow models are asked for where none is at work.
     """
     own, *other = flow_models(case, study)
     found = [Variant(own, motion.name) for motion in chosen_symmetries(getattr(case, study).symmetry, case.part)]
@@ -93,12 +82,8 @@ def variants(case: Case, study: str) -> list[Variant]:
 
 
 def flow_models(case: Case, study: str) -> list[str]:
-    """Flow models that a study is asked for by its key `continuity`, that of the case first.
-
-    Raises
-    ------
-    CaseError
-        If two are asked for where none is at work.
+    """Flow models that a study is asked for by its key `continuity`, that of the case first. Raises CaseError if two
+    are asked for where none is at work.
     """
     law = case.fluid.continuity
     if getattr(getattr(case, study), "continuity", "case") != "both":
@@ -108,12 +93,7 @@ def flow_models(case: Case, study: str) -> list[str]:
 
 
 def _require_two_laws(case: Case, study: str) -> None:
-    """Refuse to compare flow models where none is at work, or where they do not differ.
-
-    Raises
-    ------
-    CaseError
-    """
+    """Refuse to compare flow models where none is at work, or where they do not differ. Raises CaseError."""
     keys, without = getattr(case, study), ""
     if not case.continuity:
         without = "drive.kind is 'uniform'" if case.drive.kind != "flow" else "fluid.unsteady is false"

@@ -121,25 +121,17 @@ class OnsetCorrection:
 
 
 # -- the line
-# ----
 
 #: Accuracy of a crossing on a reduced-order model that the full matrices correct.
 ROUGH = 1e-6
 
 
 class LineOnset(NamedTuple):
-    """A located crossing of the imaginary axis, or of another level.
-
-    Attributes
-    ----------
-    value : float
-    eigenvalue : complex, 1/s
-    residual : float
-        Excess over the size of the eigenvalue that the full matrices leave there; NaN where they were not asked.
-    """
+    """A located crossing of the imaginary axis, or of another level."""
 
     value: float
-    eigenvalue: complex
+    eigenvalue: complex  #: 1/s.
+    #: Excess over the size of the eigenvalue that the full matrices leave there; NaN where they were not asked.
     residual: float
 
     @property
@@ -156,10 +148,8 @@ class ParameterLine:
 
     Parameters
     ----------
-    walk : StabilityWalk
     base : Mu
         Parameter point with all that is not moved.
-    parameter : str
     values : sequence of float
         Ascending; the reduced-order model is made for them.
     log : bool
@@ -211,11 +201,8 @@ class ParameterLine:
 
     @cached_property
     def column(self) -> Column | None:
-        """Cells at the values, with their reduced-order model; None where each value has its own steady state.
-
-        Raises
-        ------
-        SolveError
+        """Cells at the values, with their reduced-order model; None where each value has its own steady state. Raises
+        SolveError.
         """
         if not self.stays:
             return None
@@ -232,13 +219,7 @@ class ParameterLine:
         return self.column.error if self.stays and any(not s.refusal for s in self.samples.values()) else 0.0
 
     def cells(self) -> list[Sample]:
-        """Samples at all values at once.
-
-        Raises
-        ------
-        SolveError
-            If a steady state that all of them share was not found.
-        """
+        """Samples at all values at once. Raises SolveError if a steady state that all of them share was not found."""
         try:
             for value, cell in zip(self.values, () if self.column is None else self.column.cells):
                 self.samples[value] = replace(self.walk.sample(self.place(value), cell, value), key=self.key)
@@ -283,12 +264,7 @@ class ParameterLine:
         return cell.certificate.agrees and not cell.open_above
 
     def spectrum(self, value: float) -> np.ndarray:
-        """Leading eigenvalues of the full pencil.
-
-        Raises
-        ------
-        SolveError
-        """
+        """Leading eigenvalues of the full pencil. Raises SolveError."""
         return np.asarray(self.walk.spectrum(self.place(value)).eigenvalues)
 
     def _scanned(self, value: float, counted: bool = True) -> Sample:
@@ -308,12 +284,7 @@ class ParameterLine:
         return self._scanned(value, counted=not self.place(value).loss_factor)
 
     def bracket(self, crossing: Crossing, tolerance: float) -> tuple[float, complex]:
-        """Value and eigenvalue of a crossing as samples have it, without a correction.
-
-        Raises
-        ------
-        SolveError
-        """
+        """Value and eigenvalue of a crossing as samples have it, without a correction. Raises SolveError."""
         return locate(self.scan, crossing, tolerance)
 
     def contour(self, level: Level) -> Scan:
@@ -331,11 +302,7 @@ class ParameterLine:
         self, crossing: Crossing, tolerance: float, level: Level = Level(), scan: Scan | None = None
     ) -> LineOnset:
         """Locate a crossing; on a reduced-order model it is corrected with the full matrices, which search for it where
-        corrections do not settle. A level besides the neutral one has a scan of its own.
-
-        Raises
-        ------
-        SolveError
+        corrections do not settle. A level besides the neutral one has a scan of its own. Raises SolveError.
         """
         value, eigenvalue = locate(scan or self.scan, crossing, tolerance)
         if not self.is_reduced:

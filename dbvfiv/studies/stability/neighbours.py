@@ -55,34 +55,17 @@ SAFETY = 5.0
 
 @dataclass(frozen=True)
 class Neighbours:
-    """First-order states and added mass of valves, and a space of their leading motions.
+    """First-order states and added mass of valves, and a space of their leading motions."""
 
-    Attributes
-    ----------
-    origin, scales : (d,) arrays
-        Numbers of the first valve, and their scales.
-    q : (n,) array
-        Displacements of the first valve.
-    slopes : (d, n) array
-        Their change for a step of one scale in each number.
-    added : AddedMass or None
-        Of the first valve, at unit density.
-    images : (d, n, r) array
-        Change of the forces on accelerations `added.motions`, likewise.
-    space : (n, k) array
-        Leading motions of several valves.
-    error : float
-        Relative error of eigenvalues by the added mass at a distance of one scale.
-    """
-
+    #: origin and scales: (d,); numbers of the first valve, and their scales.
     origin: np.ndarray
     scales: np.ndarray
-    q: np.ndarray
-    slopes: np.ndarray
-    added: AddedMass | None
-    images: np.ndarray
-    space: np.ndarray
-    error: float = 0.0
+    q: np.ndarray  #: (n,); displacements of the first valve.
+    slopes: np.ndarray  #: (d, n); their change for a step of one scale in each number.
+    added: AddedMass | None  #: Of the first valve, at unit density.
+    images: np.ndarray  #: (d, n, r); change of the forces on accelerations `added.motions`, likewise.
+    space: np.ndarray  #: (n, k); leading motions of several valves.
+    error: float = 0.0  #: Relative error of eigenvalues by the added mass at a distance of one scale.
 
     def steps(self, row: np.ndarray) -> np.ndarray:
         """Distances (d,) of numbers from those of the first valve, in scales."""
@@ -117,11 +100,11 @@ def find_neighbours(
     numbers: Callable[[np.ndarray], np.ndarray],
     share: Share | None = None,
 ) -> Neighbours:
-    """Find the neighbours of a valve: their first-order states and added mass, and the space that they share.
+    """Find the neighbours of a valve: their first-order states and added mass, and the space that they share. Raises
+    SolveError, CaseError if one of them has no steady state or no modes, or cannot be made.
 
     Parameters
     ----------
-    at : callable
     origin, scales : (d,) arrays
         Scales are not zero.
     start : (n,) array
@@ -132,11 +115,6 @@ def find_neighbours(
         Numbers (m, d) of valves from standard scores (m, d), for two more of these.
     share : callable, optional
         Where several workers find them.
-
-    Raises
-    ------
-    SolveError, CaseError
-        If one of them has no steady state or no modes, or cannot be made.
     """
     share = share or (lambda function, near, rows: [function(at, near, row) for row in rows])
     walk, place = at(origin)

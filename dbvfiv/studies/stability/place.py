@@ -87,14 +87,8 @@ def moving_surroundings(case: Case) -> tuple[str, ...]:
 
 
 def check_scan(case: Case, *names: str) -> None:
-    """Refuse to ask over a parameter that this case does not have, or without flow.
-
-    Raises
-    ------
-    CaseError
-        For strain levels without a rubber that has them, and angles without a ply that has one.
-    SolveError
-        Without flow.
+    """Refuse to ask over a parameter that this case does not have, or without flow. Raises CaseError for strain levels
+    without a rubber that has them, and angles without a ply that has one. Raises SolveError without flow.
     """
     if case.drive.kind != "flow":
         raise SolveError(
@@ -106,22 +100,14 @@ def check_scan(case: Case, *names: str) -> None:
 
 
 def require_head(case: Case) -> None:
-    """Refuse a pump, behind which the head is no input.
-
-    Raises
-    ------
-    CaseError
-    """
+    """Refuse a pump, behind which the head is no input. Raises CaseError."""
     if case.has_pump:
         raise CaseError("Behind a pump a head is no input; give drive.pressure and no upstream.pump.", "upstream.pump")
 
 
 def require_kept_head(case: Case, *names: str) -> None:
-    """Refuse ranges that move the operating point of a pump, of which their studies keep the pressure.
-
-    Raises
-    ------
-    CaseError
+    """Refuse ranges that move the operating point of a pump, of which their studies keep the pressure. Raises
+    CaseError.
     """
     for name in () if "pressure" in names else names:
         if case.seeks_operating_point and not is_surrounding(case, name):
@@ -133,13 +119,9 @@ def require_kept_head(case: Case, *names: str) -> None:
 
 
 def require_parameter(case: Case, name: str) -> None:
-    """Refuse a parameter that nothing in a case depends on.
-
-    Raises
-    ------
-    CaseError
-        For strain levels without a rubber that has them, angles without a ply that has one, the length of a line that
-        is not there, and what the model of damping does not have.
+    """Refuse a parameter that nothing in a case depends on. Raises CaseError for strain levels without a rubber that
+    has them, angles without a ply that has one, the length of a line that is not there, and what the model of damping
+    does not have.
     """
     if name in ("pipe_length", "wave_speed") and case.upstream.pieces:
         raise CaseError(
@@ -194,11 +176,7 @@ def design_value(case: Case, name: str) -> float | None:
 def redesigned(case: Case, design: Mapping[str, float]) -> Case:
     """A case with design parameters changed: wall thickness factor, size of the angle of all plies (degrees), strain
     level (0.1 for 10 %); any other by its key, such as the length of the saddle, with which places along the wall move.
-
-    Raises
-    ------
-    CaseError
-        For values that the case does not allow.
+    Raises CaseError for values that the case does not allow.
     """
     changes: dict[str, object] = {}
     keys: dict[str, float] = {}
@@ -224,11 +202,7 @@ def redesigned(case: Case, design: Mapping[str, float]) -> Case:
 
 def number_of(case: Case, name: str, key: str) -> tuple[FieldInfo, Any]:
     """Field and value of a key of the case that holds a number, such as "materials.CR.stiffness_factor"; None where it
-    has none. `key` is the one that names it.
-
-    Raises
-    ------
-    CaseError
+    has none. `key` is the one that names it. Raises CaseError.
     """
     target: Any = case
     field = None
@@ -267,11 +241,7 @@ def _card(materials: Materials, name: str) -> Section:
 
 def key_of(case: Case, name: str, key: str) -> tuple[Quantity, float]:
     """Quantity and value of a key of the case that holds one number; of a loss factor that the case does not number,
-    the one that the material has.
-
-    Raises
-    ------
-    CaseError
+    the one that the material has. Raises CaseError.
     """
     field, value = number_of(case, name, key)
     if (number := plain_number(case, name, value)) is None:

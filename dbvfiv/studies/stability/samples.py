@@ -40,45 +40,24 @@ class SampleKey(NamedTuple):
 @shortly
 @dataclass(frozen=True, eq=False)
 class Sample:
-    """Leading eigenvalues at one parameter point, and both counts of the unstable ones.
+    """Leading eigenvalues at one parameter point, and both counts of the unstable ones."""
 
-    Attributes
-    ----------
-    value : float
-        Of the parameter of the line.
-    eigenvalues : (k,) complex array, 1/s
-        Sorted by growth rate, a conjugate pair given once.
-    unstable, counted : int
-        Unstable eigenvalues by the spectrum and by the argument principle, conjugates counted apart; -1 where nobody
-        asked.
-    certain : bool
-        The count followed its phase, and what both rest on is accurate enough.
-    line, band : float, 1/s, Hz
-        Growth rate counted from, and frequency up to which the sample is a verdict.
-    sealed : bool
-        The faces of a bill that is moulded shut hold each other, and nothing flows.
-    how : int
-        `eigen.columns.REDUCED`, `DIRECT` or `MISSING`.
-    failure : str
-        Why there is no spectrum; empty if there is one.
-    refusal : str
-        Why the constants of the rubber do not hold; empty where they do.
-    left_open : str
-        What a count finds above the band up to which the state is stable; empty where it finds nothing.
-    key : SampleKey
-    """
-
-    value: float
+    value: float  #: Of the parameter of the line.
+    #: (k,), 1/s; sorted by growth rate, a conjugate pair given once.
     eigenvalues: np.ndarray = field(default_factory=lambda: np.zeros(0, complex))
+    #: unstable and counted: unstable eigenvalues by the spectrum and by the argument principle, conjugates counted
+    #: apart; -1 where nobody asked.
     unstable: int = -1
     counted: int = -1
-    certain: bool = False
+    certain: bool = False  #: The count followed its phase, and what both rest on is accurate enough.
+    #: line and band: 1/s, Hz; growth rate counted from, and frequency up to which the sample is a verdict.
     line: float = 0.0
     band: float = np.inf
-    sealed: bool = False
-    how: int = MISSING
-    failure: str = ""
-    refusal: str = ""
+    sealed: bool = False  #: The faces of a bill that is moulded shut hold each other, and nothing flows.
+    how: int = MISSING  #: `eigen.columns.REDUCED`, `DIRECT` or `MISSING`.
+    failure: str = ""  #: Why there is no spectrum; empty if there is one.
+    refusal: str = ""  #: Why the constants of the rubber do not hold; empty where they do.
+    #: What a count finds above the band up to which the state is stable; empty where it finds nothing.
     left_open: str = ""
     key: SampleKey = SampleKey()
 
@@ -150,7 +129,6 @@ class Sample:
 
 
 # -- storage
-# ----
 
 SAMPLES, _TEXT = "samples", "no sample"
 _MISSING, _OPEN = ("failure", "refusal"), ("left_open",)

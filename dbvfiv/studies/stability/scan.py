@@ -185,13 +185,8 @@ def _exchanged(low: Sample, high: Sample) -> bool:
 
 def locate(scan: Scan, crossing: Crossing, tolerance: float) -> tuple[float, complex]:
     """Value at which the growth rate of a bracketed crossing vanishes (Brent's method), and the eigenvalue there.
-
-    Raises
-    ------
-    SolveError
-        If an equilibrium inside the bracket was not found.
-    JumpError
-        If the growth rate jumps there, as it does with a state that passes a limit point or loses contact.
+    Raises SolveError if an equilibrium inside the bracket was not found. Raises JumpError if the growth rate jumps
+    there, as it does with a state that passes a limit point or loses contact.
     """
     growth = {end.value: float(end.growth[crossing.index]) for end in (crossing.low, crossing.high)}
     low, high = crossing.low.value, crossing.high.value

@@ -31,39 +31,26 @@ NEUTRAL = 1e-9
 @shortly
 @dataclass(frozen=True)
 class Verdict:
-    """Stability of one steady state.
+    """Stability of one steady state."""
 
-    Attributes
-    ----------
-    outcome : str
-        "stable"; "flutters": an oscillating mode grows; "diverges": a motion grows without oscillating; "not valid":
-        the rubber's constants are unstable here; "undecided".
-    reason : str
-        One sentence.
-    growth_rate, frequency : float, 1/s, Hz
-        Of the leading oscillating mode, of a valve that diverges those of the motion that does (0 Hz); NaN if unknown.
-    damping_ratio : float
-        Of the least damped oscillating mode that is listed, of more modes by `modes` than by studies over parameters;
-        NaN if unknown.
-    critical_damping_factor : float
-        Factor on the loss factors, or on beta, at which flutter would begin or end; NaN where none is known.
-    certain : bool
-        The list and the independent count agree; always so where nothing was searched because the constants fail.
-    band : float, Hz
-        Frequency up to which modes were looked for; infinite for all.
-    damping_sought : float
-        Last factor on that damping that was looked at where none down to it, or up to it, makes the difference; NaN
-        where one does and where that is not known.
-    """
-
+    #: "stable"; "flutters": an oscillating mode grows; "diverges": a motion grows without oscillating; "not valid": the
+    #: rubber's constants are unstable here; "undecided".
     outcome: str
-    reason: str
+    reason: str  #: One sentence.
+    #: growth_rate and frequency: 1/s, Hz; of the leading oscillating mode, of a valve that diverges those of the motion
+    #: that does (0 Hz); NaN if unknown.
     growth_rate: float = np.nan
     frequency: float = np.nan
+    #: Of the least damped oscillating mode that is listed, of more modes by `modes` than by studies over parameters;
+    #: NaN if unknown.
     damping_ratio: float = np.nan
+    #: Factor on the loss factors, or on beta, at which flutter would begin or end; NaN where none is known.
     critical_damping_factor: float = np.nan
+    #: The list and the independent count agree; always so where nothing was searched because the constants fail.
     certain: bool = False
-    band: float = np.inf
+    band: float = np.inf  #: Hz; frequency up to which modes were looked for; infinite for all.
+    #: Last factor on that damping that was looked at where none down to it, or up to it, makes the difference; NaN
+    #: where one does and where that is not known.
     damping_sought: float = np.nan
 
     @classmethod

@@ -49,7 +49,6 @@ class ValveFamily(PencilFamily):
 
     Parameters
     ----------
-    linear : LinearisedState
     max_frequency : float, optional
         Hz; only modes up to it are searched for. Without it and without stiffness damping the band follows from the
         structural frequencies of the state.
@@ -150,12 +149,7 @@ class ValveFamily(PencilFamily):
 
 @contextmanager
 def name_state_in_failures(pressure: float) -> Iterator[None]:
-    """Turn what an eigenvalue search refuses into a sentence with the pressure, Pa, of the state.
-
-    Raises
-    ------
-    SolveError
-    """
+    """Turn what an eigenvalue search refuses into a sentence with the pressure, Pa, of the state. Raises SolveError."""
     try:
         yield
     except CaseError:
@@ -206,7 +200,6 @@ class StabilityWalk:
 
     Parameters
     ----------
-    case : Case
     observer : Observer, optional
     model : ValveModel, optional
         Of the case, where it is at hand.
@@ -258,12 +251,7 @@ class StabilityWalk:
         return self._built[key]
 
     def equilibrium(self, place: Mu) -> np.ndarray:
-        """Displacements q (n,) of the steady state.
-
-        Raises
-        ------
-        SolveError
-        """
+        """Displacements q (n,) of the steady state. Raises SolveError."""
         self._recollect()
         return self._reach(place)
 
@@ -303,11 +291,8 @@ class StabilityWalk:
 
     def settle(self, place: Mu, q: np.ndarray | None) -> None:
         """Find the steady state of a place from displacements q (n,) next to it; by load steps where these are not
-        known, or Newton's method does not lead from them or leads to lips that touch where they did not.
-
-        Raises
-        ------
-        SolveError
+        known, or Newton's method does not lead from them or leads to lips that touch where they did not. Raises
+        SolveError.
         """
         built, path = self.built(place), self.built(place).path
         before = path.pressure, path.q, path.slope
@@ -323,12 +308,8 @@ class StabilityWalk:
         self.equilibrium(place)
 
     def lift(self, place: Mu) -> float:
-        """Pressure, Pa, at a place beyond that of the pump at its flow: a static lift; 0 without a pump.
-
-        Raises
-        ------
-        SolveError
-            If there is no steady state.
+        """Pressure, Pa, at a place beyond that of the pump at its flow: a static lift; 0 without a pump. Raises
+        SolveError if there is no steady state.
         """
         pump = self.built(place).model.pump
         if pump is None:
@@ -337,7 +318,7 @@ class StabilityWalk:
 
     def meet_pump(self, place: Mu, lift: float, q: np.ndarray | None = None) -> Mu:
         """Parameter point at the pressure at which a pump with a lift delivers what the valve takes; the same without a
-        pump.
+        pump. Raises SolveError if the curves do not meet near it within the pump's table.
 
         Parameters
         ----------
@@ -346,11 +327,6 @@ class StabilityWalk:
         lift : float, Pa
         q : (n,) array, optional
             Displacements next to those of its steady state.
-
-        Raises
-        ------
-        SolveError
-            If the curves do not meet near it within the pump's table.
         """
         pump = self.built(place).model.pump
         if pump is None:
@@ -370,12 +346,7 @@ class StabilityWalk:
         return there
 
     def state(self, place: Mu) -> SteadyState:
-        """Steady state of a place with what is read off it.
-
-        Raises
-        ------
-        SolveError
-        """
+        """Steady state of a place with what is read off it. Raises SolveError."""
         self.equilibrium(place)
         return self.built(place).described[place.pressure]
 
@@ -419,12 +390,7 @@ class StabilityWalk:
         return path.q
 
     def family(self, place: Mu) -> ValveFamily:
-        """The linearised state for any density, damping and continuity law; the last one is kept.
-
-        Raises
-        ------
-        SolveError
-        """
+        """The linearised state for any density, damping and continuity law; the last one is kept. Raises SolveError."""
         key = (place.pressure, self._key(place))
         if self._last is None or self._last[0] != key:
             model = self.built(place).model
@@ -434,11 +400,8 @@ class StabilityWalk:
         return self._last[1]
 
     def search(self, place: Mu) -> LeadingSearch:
-        """Search for the leading modes at a parameter point, with the frequency up to which it is a verdict.
-
-        Raises
-        ------
-        SolveError
+        """Search for the leading modes at a parameter point, with the frequency up to which it is a verdict. Raises
+        SolveError.
         """
         return self.family(place).leading(place)
 
@@ -459,12 +422,7 @@ class StabilityWalk:
 
     def refusal(self, place: Mu) -> str:
         """Reason why the constants of a rubber with loss factors are unstable at a place, or its branches do not reach
-        such loss factors; empty where all holds.
-
-        Raises
-        ------
-        SolveError
-            If there is no steady state.
+        such loss factors; empty where all holds. Raises SolveError if there is no steady state.
         """
         loss = place.loss_factor
         if not loss:
@@ -483,26 +441,14 @@ class StabilityWalk:
         return self._validity[key]
 
     def require_valid(self, place: Mu) -> None:
-        """Refuse a place at which the constants of a rubber are unstable.
-
-        Raises
-        ------
-        NotValidError
-            With the `refusal` as its sentence.
-        SolveError
-            If there is no steady state.
+        """Refuse a place at which the constants of a rubber are unstable. Raises NotValidError with the `refusal` as
+        its sentence. Raises SolveError if there is no steady state.
         """
         if refusal := self.refusal(place):
             raise NotValidError(refusal)
 
     def spectrum(self, place: Mu, count: int = 6):
-        """Leading modes of the full pencil, an `eigen.Spectrum`.
-
-        Raises
-        ------
-        NotValidError
-        SolveError
-        """
+        """Leading modes of the full pencil, an `eigen.Spectrum`. Raises NotValidError. Raises SolveError."""
         self.require_valid(place)
         family = self.family(place)
         with name_state_in_failures(place.pressure):
@@ -520,7 +466,8 @@ class StabilityWalk:
         return np.concatenate([mode.q, u])
 
     def column(self, places: list[Mu], snapshots: int = 3, edges: bool = False, spectra=None, count: int = 2) -> Column:
-        """Cells that share a steady state; those whose rubber has lost stability are left blank.
+        """Cells that share a steady state; those whose rubber has lost stability are left blank. Raises NotValidError
+        if that is so at all of them. Raises SolveError.
 
         Parameters
         ----------
@@ -533,12 +480,6 @@ class StabilityWalk:
             Of one or two places, where they are known.
         count : int
             Leading modes of each place that the small model is made for.
-
-        Raises
-        ------
-        NotValidError
-            If that is so at all of them.
-        SolveError
         """
         sound = [i for i, place in enumerate(places) if not self.refusal(place)]
         if not sound:
@@ -556,12 +497,7 @@ class StabilityWalk:
         return replace(column, find=cells)
 
     def cell(self, place: Mu, spectrum: Spectrum | None = None) -> Cell:
-        """Cell of one place with the full operator, whose leading modes may be known.
-
-        Raises
-        ------
-        NotValidError, SolveError
-        """
+        """Cell of one place by the full operator; its leading modes may be known. Raises NotValidError, SolveError."""
         return self.column([place], spectra=None if spectrum is None else [spectrum]).cells[0]
 
     def sample(self, place: Mu, cell: Cell, value: float = np.nan) -> Sample:
@@ -576,12 +512,8 @@ class StabilityWalk:
         return Sample.of(value, cell, family.leading(place), family.linear.seal is not None)
 
     def verdict(self, place: Mu, spectrum=None) -> Verdict:
-        """Verdict on one place; its leading modes with the full pencil may be known.
-
-        Raises
-        ------
-        SolveError
-            If there is no steady state, or its spectrum was not found.
+        """Verdict on one place; its leading modes with the full pencil may be known. Raises SolveError if there is no
+        steady state, or its spectrum was not found.
         """
         try:
             return self.sample(place, self.cell(place, spectrum)).verdict

@@ -156,22 +156,12 @@ def _range(text: str, density: float) -> tuple[float, ...]:
 
 @dataclass(frozen=True)
 class SheetColumn:
-    """A column of the sheet; heads and pressures but `FAR` are those at the flange.
-
-    Attributes
-    ----------
-    title : str
-    kind : str
-        Quantity whose unit can be chosen, a key of `dbvfiv.case.units.UNITS`; empty for one of fixed unit.
-    unit : str
-        Unit where none is chosen.
-    value : callable
-        From a steady `State` of a result to the number, in SI units where there is a kind.
-    """
+    """A column of the sheet; heads and pressures but `FAR` are those at the flange."""
 
     title: str
-    kind: str
-    unit: str
+    kind: str  #: Quantity whose unit can be chosen, a key of `dbvfiv.case.units.UNITS`; empty for one of fixed unit.
+    unit: str  #: Unit where none is chosen.
+    #: From a steady `State` of a result to the number, in SI units where there is a kind.
     value: Callable[[Any], float]
 
 
@@ -198,12 +188,7 @@ def _bore(state: Any) -> float:
 
 
 def require_sheet(path: Path) -> None:
-    """Refuse a sheet that cannot be written before anything is computed.
-
-    Raises
-    ------
-    CaseError
-    """
+    """Refuse a sheet that cannot be written before anything is computed. Raises CaseError."""
     if path.suffix.lower() == ".xlsx" and find_spec("openpyxl") is None:
         raise CaseError(
             f"{str(path)!r} needs the package openpyxl (pip install 'dbvfiv[report]'); a name in .csv does not."

@@ -22,13 +22,7 @@ from ...case.measured import AREA, DISCHARGE, SHAPE, TAPS
 from ...case.quantity import head_of
 from ...errors import CaseError, SolveError
 from ...exchange.files import state_name, write_shapes
-from ...model.equilibria import (
-    LoadPath,
-    SteadyOptions,
-    first_opening,
-    redescribe,
-    state_warnings,
-)
+from ...model.equilibria import LoadPath, SteadyOptions, first_opening, redescribe, state_warnings
 from ...model.load_curve import LimitPoint
 from ...model.state import SteadyState, parted_width
 from ...model.valve import ValveModel
@@ -124,24 +118,12 @@ def _told(pressures: Sequence[float]) -> str:
 
 
 class Cracking(NamedTuple):
-    """Cracking pressure: that at which the passage at the lips has grown to a multiple of its area at rest.
+    """Cracking pressure: that at which the passage at the lips has grown to a multiple of its area at rest."""
 
-    Attributes
-    ----------
-    area_ratio : float
-        The multiple.
-    pressure : float or None, Pa
-        Driving pressure there, over that at rest; None where no state is open so far.
-    head : float or None, m
-        The same as a head of the fluid.
-    sealed : bool
-        The faces press on each other at rest, so nothing passes before.
-    """
-
-    area_ratio: float
-    pressure: float | None = None
-    head: float | None = None
-    sealed: bool = False
+    area_ratio: float  #: The multiple.
+    pressure: float | None = None  #: Pa; driving pressure there, over that at rest; None where no state is open so far.
+    head: float | None = None  #: m; the same as a head of the fluid.
+    sealed: bool = False  #: The faces press on each other at rest, so nothing passes before.
 
     def sentence(self, highest: float) -> str:
         """Sentence on the cracking pressure; `highest` is the highest pressure among the states, Pa."""
@@ -162,12 +144,8 @@ class Cracking(NamedTuple):
 
 
 def find_cracking(model: ValveModel, states: Iterable[SteadyState], area_ratio: float) -> Cracking:
-    """Cracking pressure between rest and the states found of a model with a flow.
-
-    Raises
-    ------
-    SolveError
-        If a state on the way is not found.
+    """Cracking pressure between rest and the states found of a model with a flow. Raises SolveError if a state on the
+    way is not found.
     """
     rest = model.rows.areas(model.nodal(model.rest()))[0]
     wanted = np.log(area_ratio * rest)
@@ -232,7 +210,6 @@ def flow_at(states: Sequence[SteadyState], pressure: np.ndarray, rest: float, na
 
 
 # -- for people
-# ----
 
 
 def _hydraulic(name: str, title: str, unit: str, width: int, form: str = ".4g") -> Column:
@@ -410,13 +387,7 @@ _COMPARED = (Compared("mass_flow"), Compared("volume_flow", 1e3, unit="L/s", sha
 
 
 def compare(results: Sequence[SteadyResult]) -> Comparison:
-    """Hold the flows of several runs against the first.
-
-    Raises
-    ------
-    CaseError
-        If one of them has no flow or no state.
-    """
+    """Hold the flows of several runs against the first. Raises CaseError if one of them has no flow or no state."""
     for result in results:
         if result.case.drive.kind != "flow":
             name = str(result.path or result.header.name)

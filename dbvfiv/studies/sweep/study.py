@@ -57,7 +57,6 @@ class Tracking:
 
     Parameters
     ----------
-    case : Case
     walk : StabilityWalk
         In the class of the motions.
     record : GrowingRecord
@@ -88,12 +87,8 @@ class Tracking:
         self._workspace = Workspace()
 
     def follow(self) -> None:
-        """Track the modes over the values at which the constants of the rubber hold.
-
-        Raises
-        ------
-        SolveError
-            If a value has no steady state; what lies before it is followed.
+        """Track the modes over the values at which the constants of the rubber hold. Raises SolveError if a value has
+        no steady state; what lies before it is followed.
         """
         sound, failure = [], None
         for value in self.line.values:
@@ -267,12 +262,7 @@ def check(case: Case) -> None:
 
 def run(session: Session, record: GrowingRecord) -> None:
     """Modes along `sweep.over` of the case. An interrupt, or a value that has no steady state, ends the sweep and keeps
-    what was found.
-
-    Raises
-    ------
-    SolveError
-        If not even the first value was solved.
+    what was found. Raises SolveError if not even the first value was solved.
     """
     case, model, axis = session.case, session.model, session.case.sweep.axis
     (variant,) = variants(case, "sweep")
@@ -314,21 +304,12 @@ def rows_to_keep(known: Record, _case: Case) -> dict[str, int]:
 
 @dataclass(frozen=True, eq=False)
 class Branch:
-    """A mode followed along the parameter.
-
-    Attributes
-    ----------
-    id : int
-    growth_rate : (p,) 1/s
-        NaN where the branch does not exist.
-    angular_frequency : (p,) rad/s
-    confidence : (p,)
-    """
+    """A mode followed along the parameter."""
 
     id: int
-    growth_rate: np.ndarray
-    angular_frequency: np.ndarray
-    confidence: np.ndarray
+    growth_rate: np.ndarray  #: (p,) 1/s; NaN where the branch does not exist.
+    angular_frequency: np.ndarray  #: (p,) rad/s.
+    confidence: np.ndarray  #: (p,).
 
     @property
     def frequency(self) -> np.ndarray:
@@ -345,21 +326,12 @@ class Branch:
 
 @dataclass(frozen=True)
 class Crossing:
-    """Crossing of zero growth by a branch, interpolated between two values of the parameter.
-
-    Attributes
-    ----------
-    branch : int
-    value : float
-    frequency : float, Hz
-    to_unstable : bool
-        True where the branch becomes unstable as the parameter grows.
-    """
+    """Crossing of zero growth by a branch, interpolated between two values of the parameter."""
 
     branch: int
     value: float
-    frequency: float
-    to_unstable: bool
+    frequency: float  #: Hz.
+    to_unstable: bool  #: True where the branch becomes unstable as the parameter grows.
 
 
 class SweepResult(StudyResult):

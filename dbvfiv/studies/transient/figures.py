@@ -286,7 +286,8 @@ def _space_time(result: StudyResult, name: str, factor: float, label: str, headi
 
 
 def animate(result: StudyResult, path: Path, frames: int = 48, duration: float | None = None) -> Path:
-    """Write a GIF of the faces at x = 0, the flow area and the lip's history.
+    """Write a GIF of the faces at x = 0, the flow area and the lip's history. Raises CaseError if there are fewer than
+    2 frames, or the file cannot be written.
 
     Parameters
     ----------
@@ -294,11 +295,6 @@ def animate(result: StudyResult, path: Path, frames: int = 48, duration: float |
         At least 2.
     duration : float, optional
         End of the run to show, s; the last cycle by default, or the whole run if there is none.
-
-    Raises
-    ------
-    CaseError
-        If there are fewer than 2 frames, or the file cannot be written.
     """
     if frames < 2:
         raise CaseError(f"An animation needs at least 2 frames, not {frames}.")
@@ -314,12 +310,8 @@ def animate(result: StudyResult, path: Path, frames: int = 48, duration: float |
 
 
 def cycles_to_animate(result: StudyResult, count: int) -> float:
-    """Length, s, of the last `count` cycles; of the whole run for 1 where there is no cycle.
-
-    Raises
-    ------
-    CaseError
-        If the run does not hold so many.
+    """Length, s, of the last `count` cycles; of the whole run for 1 where there is no cycle. Raises CaseError if the
+    run does not hold so many.
     """
     t = result.history["time"]
     length = float(t[-1] - t[0])

@@ -32,8 +32,6 @@ class Instant:
 
     Parameters
     ----------
-    reader : Reader
-    progress : Progress
     load : Load
         Of the fluid.
     step : float, s
@@ -332,31 +330,18 @@ def tables_of(mesh: MeshData) -> tuple[TableSpec, ...]:
 
 @dataclass
 class Progress:
-    """Restart point: progress of a run.
-
-    Attributes
-    ----------
-    state : MotionState
-    steps : int
-    saved : int
-        Full states kept so far.
-    work, dissipation, energy, renewed, contact_loss, numerical_loss : float
-        Energy budget, J of the computed part.
-    control : tuple of float
-        State of the step control.
-    eigenvalue : complex
-        Eigenvalue, 1/s, of the mode of a kick; not a number without one.
-    """
+    """Restart point: progress of a run."""
 
     state: MotionState
     steps: int = 0
-    saved: int = 0
+    saved: int = 0  #: Full states kept so far.
+    #: work, dissipation, energy, renewed, contact_loss and numerical_loss: energy budget, J of the computed part.
     work: float = 0.0
     dissipation: float = 0.0
     energy: float = 0.0
     renewed: float = 0.0
-    control: tuple[float, ...] = (0.0, 0.0, 0.0, 0.0)
-    eigenvalue: complex = complex(np.nan, np.nan)
+    control: tuple[float, ...] = (0.0, 0.0, 0.0, 0.0)  #: State of the step control.
+    eigenvalue: complex = complex(np.nan, np.nan)  #: Eigenvalue, 1/s, of the mode of a kick; not a number without one.
     contact_loss: float = 0.0
     numerical_loss: float = 0.0
 
@@ -489,7 +474,8 @@ class Keeper:
 
 
 def rows_to_keep(known: Record, case: Case) -> dict[str, int]:
-    """Rows of each table that a run goes on from: those up to its last restart point; none without one.
+    """Rows of each table that a run goes on from: those up to its last restart point; none without one. Raises
+    CaseError if the run is over and the case does not ask for more.
 
     Parameters
     ----------
@@ -497,11 +483,6 @@ def rows_to_keep(known: Record, case: Case) -> dict[str, int]:
         What the earlier attempt kept.
     case : Case
         The case as it is to go on, perhaps with a later end.
-
-    Raises
-    ------
-    CaseError
-        If the run is over and the case does not ask for more.
     """
     whole = [
         index

@@ -43,27 +43,16 @@ REFUSAL, RUBBER = "not valid", "rubber"
 
 @dataclass(frozen=True)
 class RunVerdict:
-    """Verdicts on the signals and what mass flow and lip displacement say together.
-
-    Attributes
-    ----------
-    mass_flow, lip_displacement : Verdict
-    lip_opening : Verdict
-        Of the clear opening, which is cut off at zero and says nothing more; amplitudes are about twice as large.
-    residual : float
-        Unbalanced force at the end over pressure force; not a number while the pressure changes.
-    steps : int
-    time : float, s
-    chatter : dict
-        Numbers of the shuttings of a valve that chatters; empty of others.
-    """
+    """Verdicts on the signals and what mass flow and lip displacement say together."""
 
     mass_flow: Verdict
     lip_displacement: Verdict
+    #: Of the clear opening, which is cut off at zero and says nothing more; amplitudes are about twice as large.
     lip_opening: Verdict
-    residual: float
+    residual: float  #: Unbalanced force at the end over pressure force; not a number while the pressure changes.
     steps: int
-    time: float
+    time: float  #: s.
+    #: Numbers of the shuttings of a valve that chatters; empty of others.
     chatter: Mapping[str, Any] = field(default_factory=dict)
 
     @property
@@ -113,7 +102,6 @@ def assess(history: Columns, model: ValveModel, residual: float = np.nan, since:
     ----------
     history : mapping of str to array
         See `dbvfiv.studies.transient.history.SCALARS`.
-    model : ValveModel
     residual : float
         Of the equilibrium at the end; not a number if it is not known.
     since : float
@@ -227,21 +215,15 @@ def beyond_model(history: Columns, vacuum: float) -> str | None:
 
 
 def stored_state(motion: ValveMotion, case: Case, inlet: float) -> MotionState:
-    """State `transient.start_state` of `transient.start_file`, a steady or a transient result on the same mesh.
+    """State `transient.start_state` of `transient.start_file`, a steady or a transient result on the same mesh. Raises
+    CaseError if the file cannot be read, has no such state, or belongs to another mesh.
 
     A wall that relaxes starts without stress in its branches: states do not hold what it remembered.
 
     Parameters
     ----------
-    motion : ValveMotion
-    case : Case
     inlet : float
         Inlet pressure of the first instant, Pa.
-
-    Raises
-    ------
-    CaseError
-        If the file cannot be read, has no such state, or belongs to another mesh.
     """
     path, index, model = Path(case.transient.start_file), case.transient.start_state, motion.model
     record, moving = _read(path)
@@ -281,7 +263,6 @@ class Runner:
 
     Parameters
     ----------
-    model : ValveModel
     options : RunOptions, optional
         Of the case by default.
     record : GrowingRecord, optional
@@ -329,12 +310,8 @@ class Runner:
 
     def start(self, first: MotionState | None = None) -> Runner:
         """Run from the case's first state, or from a given one; a step that is not found ends the run, which keeps
-        everything up to there and says so in `failures`; so does an interrupt.
-
-        Raises
-        ------
-        SolveError, CaseError
-            If there is no first state.
+        everything up to there and says so in `failures`; so does an interrupt. Raises SolveError, CaseError if there is
+        no first state.
         """
         self._begin(0)
         inlet = self.drive(0.0)
@@ -382,7 +359,6 @@ class Runner:
             self.record.note(REFUSAL, text=found.sentence)
 
     # -- the loop
-    # ----
 
     def _begin(self, done: int) -> None:
         total = max(done, math.ceil(self.options.duration / self.options.control.step * (1 - 1e-9)))
@@ -466,7 +442,6 @@ class Runner:
         self.history.restart(progress, needed)
 
     # -- what the run amounts to
-    # ----
 
     def _judge(self) -> RunVerdict:
         state, model = self.progress.state, self.model

@@ -30,10 +30,7 @@ from .run import NUMBERS, REFUSAL, Runner, assess, judged_from
 
 def check(case: Case) -> None:
     """Refuse a drive below the pressure at rest where the flow has no inertia: the steady law has outward flow alone.
-
-    Raises
-    ------
-    CaseError
+    Raises CaseError.
     """
     if not case.fluid.unsteady and (least := min(Drive.of(case).pressures)) < case.rest_pressure:
         raise CaseError(
@@ -84,24 +81,16 @@ _NO_VERDICT = {
 
 
 class TransientState(NamedTuple):
-    """A full state of a run.
+    """A full state of a run."""
 
-    Attributes
-    ----------
-    time : float, s
-    nodal, nodal_rate : (nn, c) arrays
-        Displacements (m) and rotations (rad) of the nodes, and their rates, c = 5.
-    station_pressure, station_area : (m,) arrays, Pa, m2 of the part that is computed
-    station_velocity : (m,) array, m/s
-        At the flange only; the others are not a number.
-    """
-
-    time: float
+    time: float  #: s.
+    #: nodal and nodal_rate: (nn, c); displacements (m) and rotations (rad) of the nodes, and their rates, c = 5.
     nodal: np.ndarray
     nodal_rate: np.ndarray
+    #: station_pressure and station_area: (m,), Pa, m2 of the part that is computed.
     station_pressure: np.ndarray
     station_area: np.ndarray
-    station_velocity: np.ndarray
+    station_velocity: np.ndarray  #: (m,), m/s; at the flange only; the others are not a number.
 
 
 class StateList(Sequence):
@@ -346,13 +335,7 @@ class Together:
 
 
 def compare(results: Sequence[TransientResult]) -> Together:
-    """Several runs side by side.
-
-    Raises
-    ------
-    CaseError
-        If one of them has no step.
-    """
+    """Several runs side by side. Raises CaseError if one of them has no step."""
     for result in results:
         result.require_steps()
     return Together(results, labels(results, figures.QUIET))

@@ -20,35 +20,21 @@ from ..stability.walk import StabilityWalk
 
 
 class Found(NamedTuple):
-    """One sampled valve at one value of the range.
-
-    Attributes
-    ----------
-    sample : int
-    value : float
-        Of the range, SI; the inlet pressure where there is none.
-    outcome : int
-        Number of the outcome of its verdict in `OUTCOMES`.
-    growth_rate, frequency, damping_ratio : float, 1/s, Hz
-        Of the leading oscillating mode, and the least ratio; NaN where nothing is known.
-    opening, flow : float, m2, m3/s
-        Area between the lips and volume flow, NaN without a steady state.
-    apart : bool
-        Found with its full matrices although samples share a space.
-    why : str
-        Of a sample that is undecided or not valid.
-    """
+    """One sampled valve at one value of the range."""
 
     sample: int
-    value: float
-    outcome: int
+    value: float  #: Of the range, SI; the inlet pressure where there is none.
+    outcome: int  #: Number of the outcome of its verdict in `OUTCOMES`.
+    #: growth_rate, frequency and damping_ratio: 1/s, Hz; of the leading oscillating mode, and the least ratio; NaN
+    #: where nothing is known.
     growth_rate: float
     frequency: float
     damping_ratio: float
+    #: opening and flow: m2, m3/s; area between the lips and volume flow, NaN without a steady state.
     opening: float
     flow: float
-    apart: bool = False
-    why: str = ""
+    apart: bool = False  #: Found with its full matrices although samples share a space.
+    why: str = ""  #: Of a sample that is undecided or not valid.
 
     @classmethod
     def of(
@@ -68,18 +54,10 @@ class Found(NamedTuple):
 
 
 class Start(NamedTuple):
-    """Steady state of the case at a value of the range.
+    """Steady state of the case at a value of the range."""
 
-    Attributes
-    ----------
-    q : (n,) array
-        Displacements.
-    lift : float, Pa
-        Behind a pump, its pressure beyond that of the pump's table, which samples share.
-    """
-
-    q: np.ndarray
-    lift: float
+    q: np.ndarray  #: (n,); displacements.
+    lift: float  #: Pa; behind a pump, its pressure beyond that of the pump's table, which samples share.
 
 
 class Sampler:
@@ -87,7 +65,6 @@ class Sampler:
 
     Parameters
     ----------
-    plan : Plan
     states : sequence of Start or None
         Of the case at the values of the range; None where it has no steady state.
     neighbours : mapping, optional

@@ -93,19 +93,14 @@ def check(case: Case) -> None:
 
 
 def run(session: Session, record: GrowingRecord, workers: int | str | None = None) -> None:
-    """Samples of the inputs of `uncertainty` of the case, and the verdict on each at every value of its range.
+    """Samples of the inputs of `uncertainty` of the case, and the verdict on each at every value of its range. Raises
+    CaseError for inputs that cannot be used. Raises SolveError if the valve of the case has no steady state at any
+    value.
 
     Parameters
     ----------
     workers : int or str, optional
         See `dbvfiv.studies.workers.Workers`; those of the case by default.
-
-    Raises
-    ------
-    CaseError
-        For inputs that cannot be used.
-    SolveError
-        If the valve of the case has no steady state at any value.
     """
     case, plan, laws = session.case, Plan(session.case), flow_models(session.case, "uncertainty")
     count = case.uncertainty.workers if workers is None else workers

@@ -93,7 +93,6 @@ def test_python_interface_refuses_what_is_no_pressure():
 
 
 # -- figures
-# ----
 
 
 def test_the_contact_map_reaches_to_its_maximum_and_says_it(run, figures):

@@ -17,12 +17,7 @@ from dbvfiv.studies.session import load_result
 from tests.observers import Stop
 from tests.small_valves import FORMER
 
-COARSE = {
-    "mesh.around": 6,
-    "mesh.along": 10,
-    "closure.max_step": "3 kPa",
-    "closure.eigenvalues": 2,
-}
+COARSE = {"mesh.around": 6, "mesh.along": 10, "closure.max_step": "3 kPa", "closure.eigenvalues": 2}
 PRESSURES = [4e3, 1.2e4, 2e4]
 
 

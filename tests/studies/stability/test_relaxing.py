@@ -35,7 +35,7 @@ def lossy_case():
             "map.refine=0",
             "map.curve=false",
             "map.checks=4",
-        ],
+        ]
     )
 
 

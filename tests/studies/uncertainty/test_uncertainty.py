@@ -390,10 +390,7 @@ MALFORMED = [
     ('inputs."fluid.density" = "normal(5 %)"\nover = "density=10:100:3"', "uncertainty.over moves"),
     ('inputs."valve.cracking_head" = "normal(0.2 m, 0.02 m)"', "in whose place sealing is used"),
     ('inputs."drive.head" = "normal(1 m, 0.1 m)"', "in whose place pressure is used"),
-    (
-        'inputs.angle = "normal(2 deg)"\ninputs."layers.2.angle" = "normal(2 deg)"',
-        "layers.2.angle, which angle sets",
-    ),
+    ('inputs.angle = "normal(2 deg)"\ninputs."layers.2.angle" = "normal(2 deg)"', "layers.2.angle, which angle sets"),
     (
         'inputs.thickness = "normal(2 %)"\ninputs."valve.thickness_factor" = "normal(2 %)"',
         "valve.thickness_factor, which thickness sets",
