@@ -34,8 +34,8 @@ class NewtonOptions:
     #: A SNES line search. Full steps ("basic") serve shells best: the residual rises before it falls, as membrane
     #: forces follow bending, so searches on its norm crawl; load steps catch what diverges.
     line_search: str = "basic"
-    #: Largest norm of one Newton step over that of the valve's length per root of the node count; guards against wild
-    #: first steps.
+    #: Bound on the share of a correction that a search finds, over the valve's length in m times the root of the node
+    #: count: beyond it the whole correction is taken.
     largest_step: float = 0.1
 
 

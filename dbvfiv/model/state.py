@@ -124,15 +124,19 @@ class SteadyState:
             return None
         density = self.mass_flow / self.volume_flow
         velocity = float(self.station_velocity[-1])
-        behind = Behind(
-            self.outlet_pressure,
-            self.outlet_velocity,
-            self.recovered_pressure,
-            self.downstream_velocity,
-            self.tail_loss,
-        )
         pressure = self.flange_pressure - self.level_pressure
-        return hydraulics_of(pressure, density, self.volume_flow, velocity, self.line_loss, behind)
+        return Hydraulics.of(
+            pressure,
+            density,
+            self.volume_flow,
+            velocity,
+            self.line_loss,
+            around=self.outlet_pressure,
+            jet_velocity=self.outlet_velocity,
+            recovered=self.recovered_pressure,
+            velocity=self.downstream_velocity,
+            tail_loss=self.tail_loss,
+        )
 
 
 def describe_state(model: ValveModel, q: np.ndarray, pressure: float, **solution) -> SteadyState:
@@ -285,23 +289,18 @@ class LipCentre:
 CV_OVER_KV = 1.156
 
 
-@dataclass(frozen=True)
-class Behind:
-    """Flow downstream of the valve; the defaults are those of a free discharge."""
-
-    pressure: float = 0.0  #: Pa; static pressure around the jet, over that of the surroundings.
-    jet_velocity: float = math.nan  #: m/s; NaN where it is not known.
-    recovered: float = 0.0  #: Pa; pressure rise where the jet has widened to a pipe; 0 where its energy is lost.
-    velocity: float = 0.0  #: m/s; velocity in that pipe; 0 without one.
-    loss: float = 0.0  #: m; head lost in that pipe up to its far end.
-
-
 @shortly
 @dataclass(frozen=True)
 class Hydraulics:
     """Heads, head loss and coefficients of the valve in a steady flow.
 
     The whole head of a valve that discharges freely ends in its jet. In a downstream pipe the jet gives back a part.
+
+    Examples
+    --------
+    >>> found = Hydraulics.of(1e5, 1000.0, 0.01, 1.0)
+    >>> round(found.kv, 6), round(found.loss_coefficient, 6)
+    (36.0, 201.0)
     """
 
     flange_velocity: float  #: m/s.
@@ -325,59 +324,66 @@ class Hydraulics:
     tail_loss: float  #: m; head lost in the downstream pipe.
     downstream_head: float  #: m; static head at its far end, or around a free discharge, over that of the surroundings.
 
+    @classmethod
+    def of(
+        cls,
+        pressure: float,
+        density: float,
+        volume_flow: float,
+        flange_velocity: float,
+        line_loss: float = 0.0,
+        *,
+        around: float = 0.0,
+        jet_velocity: float = math.nan,
+        recovered: float = 0.0,
+        velocity: float = 0.0,
+        tail_loss: float = 0.0,
+    ) -> Hydraulics:
+        """Hydraulics of a flow, by default of a free discharge into the surroundings, whose pressure is 0.
+
+        Parameters
+        ----------
+        pressure : float, Pa
+            Static, at the flange.
+        density : float, kg/m3
+        volume_flow : float, m3/s
+        flange_velocity : float, m/s
+        line_loss : float, m
+        around : float, Pa
+            Static pressure around the jet.
+        jet_velocity : float, m/s
+            Not a number where it is not known.
+        recovered : float, Pa
+            Pressure rise where the jet has widened to a pipe; 0 where its energy is lost.
+        velocity : float, m/s
+            In that pipe; 0 without one.
+        tail_loss : float, m
+            Head lost in that pipe up to its far end.
+        """
+        velocity_head = flange_velocity**2 / (2 * GRAVITY)
+        total = head_of(pressure, density) + velocity_head
+        flows = velocity_head > 0
+        static = around + recovered
+        loss = total - head_of(static, density) - velocity**2 / (2 * GRAVITY)
+        drop = pressure - static
+        kv = 3600 * volume_flow * math.sqrt(density / WATER * 1e5 / drop) if drop > 0 else math.nan
+        return cls(
+            flange_velocity=flange_velocity,
+            total_head=total,
+            head_loss=loss,
+            loss_coefficient=loss / velocity_head if flows else math.inf,
+            discharge_coefficient=flange_velocity / math.sqrt(2 * GRAVITY * loss) if flows and loss > 0 else 0.0,
+            kv=kv,
+            cv=CV_OVER_KV * kv,
+            line_loss=line_loss,
+            supply_head=total + line_loss,
+            jet_velocity=jet_velocity,
+            recovered_pressure=recovered,
+            recovered_head=head_of(recovered, density),
+            tail_loss=tail_loss,
+            downstream_head=head_of(static, density) - tail_loss,
+        )
+
     def summary(self) -> dict[str, float]:
         """Plain numbers, SI but for kv and cv."""
         return asdict(self)
-
-
-def hydraulics_of(
-    pressure: float,
-    density: float,
-    volume_flow: float,
-    flange_velocity: float,
-    line_loss: float = 0.0,
-    behind: Behind | None = None,
-) -> Hydraulics:
-    """Hydraulics of a flow.
-
-    Parameters
-    ----------
-    pressure : float, Pa
-        Static, at the flange, over that of the surroundings.
-    density : float, kg/m3
-    volume_flow : float, m3/s
-    flange_velocity : float, m/s
-    line_loss : float, m
-    behind : Behind, optional
-        Free discharge into the surroundings without it.
-
-    Examples
-    --------
-    >>> found = hydraulics_of(1e5, 1000.0, 0.01, 1.0)
-    >>> round(found.kv, 6), round(found.loss_coefficient, 6)
-    (36.0, 201.0)
-    """
-    behind = Behind() if behind is None else behind
-    velocity_head = flange_velocity**2 / (2 * GRAVITY)
-    total = head_of(pressure, density) + velocity_head
-    flows = velocity_head > 0
-    static = behind.pressure + behind.recovered
-    loss = total - head_of(static, density) - behind.velocity**2 / (2 * GRAVITY)
-    drop = pressure - static
-    kv = 3600 * volume_flow * math.sqrt(density / WATER * 1e5 / drop) if drop > 0 else math.nan
-    return Hydraulics(
-        flange_velocity=flange_velocity,
-        total_head=total,
-        head_loss=loss,
-        loss_coefficient=loss / velocity_head if flows else math.inf,
-        discharge_coefficient=flange_velocity / math.sqrt(2 * GRAVITY * loss) if flows and loss > 0 else 0.0,
-        kv=kv,
-        cv=CV_OVER_KV * kv,
-        line_loss=line_loss,
-        supply_head=total + line_loss,
-        jet_velocity=behind.jet_velocity,
-        recovered_pressure=behind.recovered,
-        recovered_head=head_of(behind.recovered, density),
-        tail_loss=behind.loss,
-        downstream_head=head_of(static, density) - behind.loss,
-    )

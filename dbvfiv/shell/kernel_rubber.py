@@ -79,9 +79,9 @@ def i1_slopes(constants, e):
 
 
 @numba.njit(fastmath=FAST)
-def ogden_terms(constants, e, energy, out):
-    """Fill out (6,): energy of Ogden's terms, where it is asked for, and its derivatives by I1, I2, I1 I1, I1 I2,
-    I2 I2; see `dbvfiv.materials.energy`.
+def ogden_terms(constants, e, out):
+    """Fill out (5,): derivatives of the energy of Ogden's terms by I1, I2, I1 I1, I1 I2, I2 I2; see
+    `dbvfiv.materials.energy`.
     """
     out[:] = 0.0
     largest = 0.0
@@ -113,59 +113,56 @@ def ogden_terms(constants, e, energy, out):
         characteristic = y * y * y + z * (gap - i1 * y)
         size = characteristic.real * characteristic.real + characteristic.imag * characteristic.imag
         inv = z * complex(characteristic.real / size, -characteristic.imag / size)
-        value = 0j
         slope = 0j
         for p in range(OGDEN_FROM, constants.shape[0], 2):
             half_power = 0.5 * constants[p + 1]
             if constants[p] != 0.0:
                 swing = half_power * turn
                 power = constants[p] * np.exp(half_power * real) * complex(np.cos(swing), np.sin(swing))
-                value += power / constants[p + 1]
                 slope += 0.5 * power
         first = weight * slope * inv
         second = first * inv
-        if energy:
-            out[0] += (weight * value * inv * ((i1 * y + 2 * (i1 - gap)) * y - 3 * gap) / y).real
-        out[1] += (first * z).real
-        out[2] -= first.real
-        out[3] += (second * z * z).real
-        out[4] -= (second * z).real
-        out[5] += second.real
+        out[0] += (first * z).real
+        out[1] -= first.real
+        out[2] += (second * z * z).real
+        out[3] -= (second * z).real
+        out[4] += second.real
     out /= _COS.shape[0]
+
+
+@numba.njit(fastmath=FAST, inline="always")
+def _slopes(constants, e, w1, w2):
+    """Derivatives of the energy by I1, I2, I1 I1, I1 I2, I2 I2, from the first two of Mooney and Rivlin's part."""
+    w11, w12, w22 = 0.0, constants[2], 0.0
+    if has_more(constants):
+        w, v = i1_slopes(constants, e)
+        w1 += w
+        w11 += v
+    if constants.shape[0] > OGDEN_FROM:
+        o = np.empty(5)
+        ogden_terms(constants, e, o)
+        w1, w2, w11, w12, w22 = w1 + o[0], w2 + o[1], w11 + o[2], w12 + o[3], w22 + o[4]
+    return w1, w2, w11, w12, w22
 
 
 @numba.njit(fastmath=FAST, inline="always")
 def rubber_stress(constants, e, s):
     """Fill the stress s (5,) for the parameters of a law and strains e (5,)."""
     a, b, c, g, k, inv, h, h0, h1, h2, h3, h4, w1, w2 = _deformation(constants, e)
-    sum_ab = a + b
-    s[0] = 2 * (w1 * (1 + h0) + w2 * (b + h + sum_ab * h0))
-    s[1] = 2 * (w1 * (1 + h1) + w2 * (a + h + sum_ab * h1))
-    s[2] = w1 * h2 + w2 * (sum_ab * h2 - 2 * c)
-    s[3] = w1 * h3 + w2 * (sum_ab * h3 - 2 * g)
-    s[4] = w1 * h4 + w2 * (sum_ab * h4 - 2 * k)
-    if has_more(constants):
-        w = i1_slopes(constants, e)[0]
-        s[0] += 2 * w * (1 + h0)
-        s[1] += 2 * w * (1 + h1)
-        s[2] += w * h2
-        s[3] += w * h3
-        s[4] += w * h4
-    if constants.shape[0] > OGDEN_FROM:
-        w = np.empty(6)
-        ogden_terms(constants, e, False, w)
-        s[0] += 2 * (w[1] * (1 + h0) + w[2] * (b + h + sum_ab * h0))
-        s[1] += 2 * (w[1] * (1 + h1) + w[2] * (a + h + sum_ab * h1))
-        s[2] += w[1] * h2 + w[2] * (sum_ab * h2 - 2 * c)
-        s[3] += w[1] * h3 + w[2] * (sum_ab * h3 - 2 * g)
-        s[4] += w[1] * h4 + w[2] * (sum_ab * h4 - 2 * k)
+    w1, w2, _, _, _ = _slopes(constants, e, w1, w2)
+    r = a + b
+    s[0] = 2 * (w1 * (1 + h0) + w2 * (b + h + r * h0))
+    s[1] = 2 * (w1 * (1 + h1) + w2 * (a + h + r * h1))
+    s[2] = w1 * h2 + w2 * (r * h2 - 2 * c)
+    s[3] = w1 * h3 + w2 * (r * h3 - 2 * g)
+    s[4] = w1 * h4 + w2 * (r * h4 - 2 * k)
 
 
 @numba.njit(fastmath=FAST, inline="always")
 def rubber_tangent(constants, e, s, t):
     """Fill stress s (5,) and the upper triangle of the tangent t (5, 5); arguments as `rubber_stress` has them."""
-    c11 = constants[2]
     a, b, c, g, k, inv, h, h0, h1, h2, h3, h4, w1, w2 = _deformation(constants, e)
+    w1, w2, w11, w12, w22 = _slopes(constants, e, w1, w2)
     r = a + b
     d2 = -2 * c
     p0 = 1 + h0
@@ -197,65 +194,29 @@ def rubber_tangent(constants, e, s, t):
     h34 = -2 * c * inv
     h44 = 2 * a * inv
     w = w1 + w2 * r
-    t[0, 0] = 4 * (w * h00 + w2 * 2 * h0 + 2 * c11 * p0 * q0)
-    t[0, 1] = 4 * (w * h01 + w2 * (1 + h0 + h1) + c11 * (p0 * q1 + p1 * q0))
-    t[0, 2] = 2 * (w * h02 + w2 * h2 + c11 * (p0 * q2 + h2 * q0))
-    t[0, 3] = 2 * (w * h03 + w2 * h3 + c11 * (p0 * q3 + h3 * q0))
-    t[0, 4] = 2 * (w * h04 + w2 * h4 + c11 * (p0 * q4 + h4 * q0))
-    t[1, 1] = 4 * (w * h11 + w2 * 2 * h1 + 2 * c11 * p1 * q1)
-    t[1, 2] = 2 * (w * h12 + w2 * h2 + c11 * (p1 * q2 + h2 * q1))
-    t[1, 3] = 2 * (w * h13 + w2 * h3 + c11 * (p1 * q3 + h3 * q1))
-    t[1, 4] = 2 * (w * h14 + w2 * h4 + c11 * (p1 * q4 + h4 * q1))
-    t[2, 2] = w * h22 - 2 * w2 + 2 * c11 * h2 * q2
-    t[2, 3] = w * h23 + c11 * (h2 * q3 + h3 * q2)
-    t[2, 4] = w * h24 + c11 * (h2 * q4 + h4 * q2)
-    t[3, 3] = w * h33 - 2 * w2 + 2 * c11 * h3 * q3
-    t[3, 4] = w * h34 + c11 * (h3 * q4 + h4 * q3)
-    t[4, 4] = w * h44 - 2 * w2 + 2 * c11 * h4 * q4
-    if has_more(constants):
-        w, v = i1_slopes(constants, e)
-        s[0] += 2 * w * p0
-        s[1] += 2 * w * p1
-        s[2] += w * h2
-        s[3] += w * h3
-        s[4] += w * h4
-        t[0, 0] += 4 * (w * h00 + v * p0 * p0)
-        t[0, 1] += 4 * (w * h01 + v * p0 * p1)
-        t[0, 2] += 2 * (w * h02 + v * p0 * h2)
-        t[0, 3] += 2 * (w * h03 + v * p0 * h3)
-        t[0, 4] += 2 * (w * h04 + v * p0 * h4)
-        t[1, 1] += 4 * (w * h11 + v * p1 * p1)
-        t[1, 2] += 2 * (w * h12 + v * p1 * h2)
-        t[1, 3] += 2 * (w * h13 + v * p1 * h3)
-        t[1, 4] += 2 * (w * h14 + v * p1 * h4)
-        t[2, 2] += w * h22 + v * h2 * h2
-        t[2, 3] += w * h23 + v * h2 * h3
-        t[2, 4] += w * h24 + v * h2 * h4
-        t[3, 3] += w * h33 + v * h3 * h3
-        t[3, 4] += w * h34 + v * h3 * h4
-        t[4, 4] += w * h44 + v * h4 * h4
-    if constants.shape[0] > OGDEN_FROM:
-        o = np.empty(6)
-        ogden_terms(constants, e, False, o)
-        p = (2 * p0, 2 * p1, h2, h3, h4)
-        q = (2 * q0, 2 * q1, q2, q3, q4)
-        for i in range(5):
-            s[i] += o[1] * p[i] + o[2] * q[i]
-            for j in range(i, 5):
-                t[i, j] += o[3] * p[i] * p[j] + o[4] * (p[i] * q[j] + q[i] * p[j]) + o[5] * q[i] * q[j]
-        w = o[1] + o[2] * r
-        t[0, 0] += 4 * (w * h00 + o[2] * 2 * h0)
-        t[0, 1] += 4 * (w * h01 + o[2] * (1 + h0 + h1))
-        t[0, 2] += 2 * (w * h02 + o[2] * h2)
-        t[0, 3] += 2 * (w * h03 + o[2] * h3)
-        t[0, 4] += 2 * (w * h04 + o[2] * h4)
-        t[1, 1] += 4 * (w * h11 + o[2] * 2 * h1)
-        t[1, 2] += 2 * (w * h12 + o[2] * h2)
-        t[1, 3] += 2 * (w * h13 + o[2] * h3)
-        t[1, 4] += 2 * (w * h14 + o[2] * h4)
-        t[2, 2] += w * h22 - 2 * o[2]
-        t[2, 3] += w * h23
-        t[2, 4] += w * h24
-        t[3, 3] += w * h33 - 2 * o[2]
-        t[3, 4] += w * h34
-        t[4, 4] += w * h44 - 2 * o[2]
+    # derivatives of those of the energy by I1 (m) and by I2 (n), where p and q are those of both invariants
+    m0, m1 = w11 * p0 + w12 * q0, w11 * p1 + w12 * q1
+    m2, m3 = w11 * h2 + w12 * q2, w11 * h3 + w12 * q3
+    m4 = w11 * h4 + w12 * q4
+    n0, n1, n2, n3, n4 = (
+        w12 * p0 + w22 * q0,
+        w12 * p1 + w22 * q1,
+        w12 * h2 + w22 * q2,
+        w12 * h3 + w22 * q3,
+        w12 * h4 + w22 * q4,
+    )
+    t[0, 0] = 4 * (w * h00 + w2 * 2 * h0 + p0 * m0 + q0 * n0)
+    t[0, 1] = 4 * (w * h01 + w2 * (1 + h0 + h1) + p1 * m0 + q1 * n0)
+    t[0, 2] = 2 * (w * h02 + w2 * h2 + h2 * m0 + q2 * n0)
+    t[0, 3] = 2 * (w * h03 + w2 * h3 + h3 * m0 + q3 * n0)
+    t[0, 4] = 2 * (w * h04 + w2 * h4 + h4 * m0 + q4 * n0)
+    t[1, 1] = 4 * (w * h11 + w2 * 2 * h1 + p1 * m1 + q1 * n1)
+    t[1, 2] = 2 * (w * h12 + w2 * h2 + h2 * m1 + q2 * n1)
+    t[1, 3] = 2 * (w * h13 + w2 * h3 + h3 * m1 + q3 * n1)
+    t[1, 4] = 2 * (w * h14 + w2 * h4 + h4 * m1 + q4 * n1)
+    t[2, 2] = w * h22 - 2 * w2 + h2 * m2 + q2 * n2
+    t[2, 3] = w * h23 + h3 * m2 + q3 * n2
+    t[2, 4] = w * h24 + h4 * m2 + q4 * n2
+    t[3, 3] = w * h33 - 2 * w2 + h3 * m3 + q3 * n3
+    t[3, 4] = w * h34 + h4 * m3 + q4 * n3
+    t[4, 4] = w * h44 - 2 * w2 + h4 * m4 + q4 * n4
