@@ -201,7 +201,7 @@ DIVERGENCE = 1e6
 class Correction:
     """Outcome of Newton's method on a `Problem`."""
 
-    z: np.ndarray  #: ndarray.
+    z: np.ndarray
     local: Local | None  #: The linearisation at ``z`` when converged.
     reason: Said
     iterations: int

@@ -107,13 +107,15 @@ def kicked(law: str, density: float, step: float, keys) -> tuple[ValveModel, dic
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("law", [QUASI, STORAGE])
-def test_balances_of_line_and_valve(law):
+@pytest.mark.parametrize(("law", "mode"), [(QUASI, 1), (STORAGE, 3)])
+def test_balances_of_line_and_valve(law, mode):
     """What the reservoir gives is in the column, lost on the way or handed to the valve; what enters the valve leaves
-    it or stays in it; and the wall's own balance.
+    it or stays in it; and the wall's own balance. Slow modes move the column so little that the rounding of the
+    pressures that are kept shows: 2e-6 along the first one under storage.
     """
-    step, density, length = 1.25e-4, 100.0, 10.0
-    model, h, mass, own = kicked(law, density, step, SMALL | LINE | {"transient.kick_opening": 1e-3})
+    step, density, length = 6.25e-5, 100.0, 10.0
+    kick = {"transient.kick_opening": 1e-3, "transient.kick_mode": mode}
+    model, h, mass, own = kicked(law, density, step, SMALL | LINE | kick)
     section = QUARTER.copies * float(model.mesh.rest_area[-1] - model.mesh.wall_deduction[-1])
     pipe = 0.25 * np.pi * 0.3**2
     velocity = h["inlet_velocity"]
