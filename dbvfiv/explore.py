@@ -22,6 +22,7 @@ from eigen.reduction import OPTIONS, FamilyReduction
 from eigen.spectrum import number_right_of
 
 from .case.parameters import PARAMETERS, Mu
+from .case.quantity import number_or_text
 from .errors import CaseError, SolveError
 from .model.build import build_flow
 from .model.equilibria import redescribe
@@ -128,15 +129,23 @@ class Explorer:
         """True where a parameter changes the steady state."""
         return not is_surrounding(self.case, name)
 
-    def place(self, values: Mapping[str, float]) -> Mu:
-        """Parameter point with some values changed. Raises CaseError for a name or a value that cannot be asked."""
-        for name, value in values.items():
+    def place(self, values: Mapping[str, float | str]) -> Mu:
+        """Parameter point with some values changed, SI or texts with a unit; heads are those of the fluid of the case.
+        Raises CaseError for a name or a value that cannot be asked.
+        """
+        found = {}
+        for name, given in values.items():
             if name not in self.ranges:
                 raise CaseError(f"{name!r} is given, which cannot be moved here; known are {', '.join(self.ranges)}.")
             row = PARAMETERS[name]
+            try:
+                found[name] = value = row.quantity.parse(number_or_text(given), self.case.fluid.density)
+            except ValueError as error:
+                raise CaseError(f"{name} is given as {given!r}, {error}.") from None
             if not (row.low < value <= row.high or (value == row.low and row.low_included)):
-                raise CaseError(f"{name} is given as {value:g}; it must lie from {row.low:g} to {row.high:g}.")
-        return self.base.at(**values)
+                least = f"from {row.low:g}" if row.low_included else f"above {row.low:g}"
+                raise CaseError(f"{name} is given as {given!r}; it must lie {least} up to {row.high:g}.")
+        return self.base.at(**found)
 
     def state(self, place: Mu) -> SteadyState:
         """Steady state of a point, its flow in the fluid of the point. Raises SolveError."""
@@ -148,13 +157,13 @@ class Explorer:
         seen.flow = build_flow(seen.case, seen.mesh)
         return redescribe(seen, found)
 
-    def predict(self, **values: float) -> Answer:
+    def predict(self, **values: float | str) -> Answer:
         """Answer of the reduced operator, without its bound. Where the constants of a rubber are unstable the verdict
         says so. Raises CaseError, SolveError.
         """
         return self._asked(values, lambda place: np.nan)
 
-    def _asked(self, values: Mapping[str, float], bound: Callable[[Mu], float]) -> Answer:
+    def _asked(self, values: Mapping[str, float | str], bound: Callable[[Mu], float]) -> Answer:
         place = self.place(values)
         state, refusal = self.state(place), self.walk.refusal(place)
         if refusal:
@@ -169,7 +178,7 @@ class Explorer:
             reduction = self.walk.built(place).solver.reduction(family)
             self._space = reduction, reduction.fine(reduction.first([place]), [place], TAKEN), self._corners(place)
 
-    def bounded(self, **values: float) -> Answer:
+    def bounded(self, **values: float | str) -> Answer:
         """Prediction with its bound, on a reduced operator that is enriched where this is too large. Raises CaseError,
         SolveError.
         """
@@ -203,7 +212,7 @@ class Explorer:
         share = 0.5 + 0.5 * np.cos(np.pi * np.arange(HEADS) / (HEADS - 1))
         return [float(value) for value in low * (high / low) ** share]
 
-    def confirm(self, **values: float) -> Answer:
+    def confirm(self, **values: float | str) -> Answer:
         """Answer of the full operator with its independent count, as `dbvfiv modes` gives it: on the motions that are
         predicted, and those of all classes that modes.symmetry asks for. Raises CaseError, SolveError.
         """

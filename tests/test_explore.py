@@ -35,6 +35,13 @@ def test_predictions_are_what_is_confirmed(explorer, asked):
     assert error <= max(10 * predicted.bound, 1e-7) and predicted.bound <= 1e-6
 
 
+def test_texts_and_limits_of_what_is_asked(explorer):
+    assert explorer.place({"pressure": "1 m"}) == explorer.place({"pressure": 9806.65})
+    for asked, words in (({"pressure": 0.0}, "above 0"), ({"density": "1 s"}, "density is given as '1 s'")):
+        with pytest.raises(CaseError, match=words):
+            explorer.place(asked)
+
+
 def test_a_confirmed_answer_on_the_fit_of_a_rubber_says_so():
     keys = COARSE | {"materials.constants": "published", "drive.pressure": 36e3}
     (said,) = dbvfiv.load(thesis_case(keys)).explore().confirm().summary()["warnings"]

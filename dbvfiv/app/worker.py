@@ -129,9 +129,9 @@ class Desk:
         skin, found = ValveSkin.of(mesh), layer_fields(explorer.model.shell, state.q)
         colours = {"Displacement, mm": 1e3 * np.linalg.norm(state.nodal[:, :3], axis=1)}
         often = np.bincount(mesh.quads.ravel(), minlength=len(mesh.nodes))
-        for name, stretch in zip(mesh.layer_titles(), found.stretch[:, :, 1].T):
+        for number, (name, stretch) in enumerate(zip(mesh.layer_titles(), found.stretch[:, :, 1].T), 1):
             summed = np.bincount(mesh.quads.ravel(), np.repeat(stretch, 4), len(mesh.nodes))
-            colours[f"Largest strain of {name}, %"] = 100 * (summed / often - 1)
+            colours[f"Largest strain of {number} {name}, %"] = 100 * (summed / often - 1)
         points = np.round(skin.points(state.nodal), 5)
         whole = {name: np.round(skin.spread(field), 4) for name, field in colours.items()}
         return {"points": points, "triangles": skin.triangles, "colours": whole}

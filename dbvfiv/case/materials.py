@@ -240,6 +240,16 @@ class Fit(Relaxing):
     )
     density: Density = _density(...)
 
+    @model_validator(mode="after")
+    def _stable_alone_has_a_reach(self) -> Fit:
+        if self.stable_to is not None and self.constraint != "stable":
+            raise BrokenRule(
+                "stable_to",
+                f"{self.stable_to:.0%} beside constraint = {self.constraint!r}",
+                "it goes with 'stable' alone",
+            )
+        return self
+
 
 class ShippedRubber(Relaxing):
     """One of the three tested rubbers at a strain level."""

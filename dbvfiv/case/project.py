@@ -54,8 +54,8 @@ class Report(Section):
     heads: tuple[LoadPressure, ...] = key(
         (),
         "Static inlet pressures, or heads of the fluid, at which a report says whether the valve opens and chatters: a "
-        "list, or a range '0.1 m:1 m:6'; where none are given seven, up to the largest of drive.pressure and "
-        "steady.pressures.",
+        "list, or a range '0.1 m:1 m:6'; where none are given seven, up to the largest of drive.pressure and, where "
+        "they are given, steady.pressures.",
     )
 
     @field_validator("heads", mode="before")

@@ -61,8 +61,9 @@ def unit_of(pressure: Any) -> str:
 
 
 def with_pressure_in(units: str, unit: str) -> str:
-    """Units with another one for pressures, those of other quantities kept."""
-    kept = {name: one for name, one in read_units(units).items() if name not in ("head", "pressure")}
+    """Units with another one for pressures, those of other quantities kept; a head takes the place of both."""
+    gone = ("head", "pressure") if unit in UNITS["head"][1] else ("pressure",)
+    kept = {name: one for name, one in read_units(units).items() if name not in gone}
     return ", ".join(filter(None, (unit, *kept.values())))
 
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from ..errors import CaseError
-from .terminal import AsJson, CaseFile, Override, PlotFolder, print_answer, save_figures
+from .terminal import AsJson, CaseFile, Override, PlotFolder, print_answer, refuse_beside, save_figures
 
 if TYPE_CHECKING:
     from ..fit.ply import PlyFit
@@ -91,6 +91,8 @@ def fit(
 
     mass = _read_material(name, density)
     far = None if stable_to is None else _read_positive("--stable-to", stable_to, "%", "a strain greater than 0: 30 %")
+    if constraint.value != "stable":
+        refuse_beside({"--stable-to": stable_to}, "goes with --constraint stable alone")
     tests = read_tests(path, planar, biaxial)
     report = describe_fits(tests, law and law.value, terms, constraint.value, far, error.value, cycle.value)
     figures = save_figures({"fit": lambda: fit_figure(report)}, plots)

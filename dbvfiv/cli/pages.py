@@ -69,13 +69,20 @@ def report(
         )
     case = load_case(case_file, overrides or ())
     require_consistent(case)
-    from ..report import gather, write_page, write_pdf  # drawing libraries, which a mistake need not wait for
+    from ..report import (
+        find_printers,
+        gather,
+        write_page,
+        write_pdf,
+    )  # drawing libraries, which a mistake need not wait for
     from ..report.answers import answers
     from ..report.gather import PARTS
 
     for name in without or ():
         if name not in PARTS:
             raise CaseError(f"--without is given as {name!r}, which is none of {', '.join(PARTS)}.")
+    if pdf:
+        find_printers()  # before anything is solved
     name = case_file.stem if case_file else "dbv12"
     page = output or Path(f"{name}-report.html")
     leave_out = (*(without or ()), *(() if cycle else ("cycle",)))
@@ -86,7 +93,6 @@ def report(
         except KeyboardInterrupt:
             raise Stopped(f"the same command goes on with what was found before, in {folder}") from None
     write_page(found, page)
-    written = [page, *([write_pdf(page, page.with_suffix(".pdf"))] if pdf else [])]
     answered = answers(found)
     if as_json:
         said = [one.summary() for one in answered]
@@ -96,7 +102,11 @@ def report(
             print(found.case.units.say(f"{one.question} {one.answer.capitalize()}. {one.text}"))
             if one.margin:
                 print(f"  margin: {one.margin}")
-        print(f"{found.seconds:.0f} s of processor time. {' and '.join(map(str, written))} written.")
+        print(f"{found.seconds:.0f} s of processor time. {page} written.")
+    if pdf:  # the answers are out, whatever the browser does
+        printed = write_pdf(page, page.with_suffix(".pdf"))
+        if not as_json:
+            print(f"{printed} written.")
     failed = found.failed
     if failed:
         said = "; ".join(f"no result of {name}: {why.rstrip('.')}" for name, why in failed.items()) + "."

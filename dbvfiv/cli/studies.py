@@ -86,6 +86,7 @@ def _in_units_asked(case, pressures):
 
 def perform(kind: str, case, request, name: str, output: Path | None, plots: Path | None, as_json: bool) -> None:
     """Run a study on a case with what its command asks for (a `Request`), and report it."""
+    from ..case.units import read_units, with_pressure_in
     from ..record.files import refuse_read
     from ..studies.session import Session, find_study
 
@@ -94,7 +95,10 @@ def perform(kind: str, case, request, name: str, output: Path | None, plots: Pat
             f"{str(output)!r} names a sheet, which `dbvfiv steady` writes alone; -o of {kind} takes a .h5 file."
         )
     changes = dict(request.changes)
-    case = case.replace({"project.units": changes.pop("project.units", None) or case.project.units})
+    if units := changes.pop("project.units", None):
+        pressure, case = case.units.name("pressure"), case.replace({"project.units": units})
+        if pressure != "kPa" and not {"head", "pressure"} & read_units(units).keys():
+            case = case.replace({"project.units": with_pressure_in(units, pressure)})
     choices = {key: value for key, value in request.choices.items() if value is not None}
     session = Session(case, name).prepared(kind, changes)
     if request.sheet is not None:  # a result is checked by its session

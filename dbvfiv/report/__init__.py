@@ -5,6 +5,6 @@ into headings, sentences, tables and figures; `page` puts them into one HTML fil
 """
 
 from .gather import Gathered, gather
-from .page import write_page, write_parts, write_pdf
+from .page import find_printers, write_page, write_parts, write_pdf
 
-__all__ = ["Gathered", "gather", "write_page", "write_parts", "write_pdf"]
+__all__ = ["Gathered", "find_printers", "gather", "write_page", "write_parts", "write_pdf"]

@@ -287,19 +287,21 @@ def closes(found: Gathered) -> Answer:
     result, question, units = found.get("closure"), "Does it close under back pressure?", found.case.units
     if result is None or not result.states:
         return Answer(question, UNKNOWN, found.why("closure") if result is None else _first(result.failures))
-    rated = found.case.closure.rated_pressure or max(s.pressure for s in result.states)
-    states = [s for s in result.states if not s.beyond_limit and s.pressure <= rated * (1 + 1e-9)]
+    rated = found.case.closure.rated_pressure
+    asked = rated or max(result.case.closure.pressures)
+    states = [s for s in result.states if not s.beyond_limit and s.pressure <= asked * (1 + 1e-9)]
     states.sort(key=lambda state: state.pressure)  # those of closure.pressures stand as they were asked for
     if not states:
         return Answer(question, UNKNOWN, _first(result.failures))
     shut = [s.pressure for s in states if s.closed]
     held = result.case.closure.supports == HELD_LIPS
     text = _HELD if held else f"Shut at {listed(units.pressure(p, 3) for p in shut)}" if shut else "Open"
-    collapse = _collapse(result, found.case.closure.rated_pressure or max(result.case.closure.pressures))
+    collapse = _collapse(result, asked)
     text += f"{'' if shut else ' up to ' + units.pressure(states[-1].pressure, 3)}; {collapse}" if collapse else ""
     answer = UNKNOWN if held else YES if shut and states[-1].closed else NO
-    if not collapse and max(s.pressure for s in states) < rated * (1 - 1e-9):
-        answer, text = UNKNOWN, f"{text}; no state was found at the rated {units.pressure(rated, 3)}"
+    if not collapse and max(s.pressure for s in states) < asked * (1 - 1e-9):
+        pressure = f"{'rated ' if rated else ''}{units.pressure(asked, 3)}{'' if rated else ' asked for'}"
+        answer, text = UNKNOWN, f"{text}; no state was found at the {pressure}"
     return Answer(question, answer, text + ".", _margin(result), _closure_mesh(found))
 
 

@@ -17,7 +17,7 @@ from typing import Any
 
 import numpy as np
 
-from ..case.parameters import Mu
+from ..case.parameters import PARAMETERS, Mu
 from ..effects import with_effect, without_numbers
 from ..errors import CaseError, SolveError
 from ..model.sizes import ValveSizes
@@ -200,7 +200,8 @@ def following(found: Gathered) -> Iterator[Run]:
         length, quick = case.upstream.length, {}
         if moves and case.valve.is_preset:  # at every length a curve of equilibria from rest on
             quick, count = second_mesh(case) | {"sweep.count": 1, "sweep.least_confidence": 1e-3}, 3
-        span = f"pipe_length={low * length:.6g}:{high * length:.6g}:{count}:log"
+        top = min(high * length, PARAMETERS["pipe_length"].high)
+        span = f"pipe_length={low * length:.6g}:{top:.6g}:{count}:log"
         heads = [worst] if moves else sorted({found.heads[0], worst, found.heads[-1]})
         for i, pressure in enumerate(heads, 1):
             keys = quick | {"drive.pressure": pressure, "sweep.over": span}

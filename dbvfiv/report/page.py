@@ -132,15 +132,20 @@ def _told_once(parts: list[Part]) -> list[Part]:
 _BROWSERS = ("chromium", "chromium-browser", "google-chrome", "chrome")
 
 
-def write_pdf(page: Path, path: Path) -> Path:
-    """Print a page on A4. Raises CaseError if neither a browser nor WeasyPrint is there, or neither wrote the file."""
+def find_printers() -> tuple[str | None, bool]:
+    """Path of a browser, and whether WeasyPrint is there. Raises CaseError if neither is."""
     browser, weasyprint = next(filter(None, map(shutil.which, _BROWSERS)), None), find_spec("weasyprint") is not None
     if browser is None and not weasyprint:
         raise CaseError(
-            f"{str(path)!r} needs the browser chromium (apt-get install chromium) or the package weasyprint "
-            f"(pip install dbvfiv[report]), and neither is there; the page is in {str(page)!r} and prints from any "
-            "browser."
+            "--pdf needs the browser chromium (apt-get install chromium) or the package weasyprint (pip install "
+            "dbvfiv[report]), and neither is there; without --pdf the page prints from any browser."
         )
+    return browser, weasyprint
+
+
+def write_pdf(page: Path, path: Path) -> Path:
+    """Print a page on A4. Raises CaseError if neither a browser nor WeasyPrint is there, or neither wrote the file."""
+    browser, weasyprint = find_printers()
     draft = path.with_name(f"{path.stem}.partial.pdf")  # an earlier one is not taken for what this run has printed
     draft.unlink(missing_ok=True)
     if browser is not None:

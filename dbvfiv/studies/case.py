@@ -15,6 +15,7 @@ from typing import Any, Self
 
 from pydantic import create_model, model_validator
 
+from ..case.axis import parse_stability_axis
 from ..case.describe import page
 from ..case.load import key_path, read_case_file
 from ..case.model import Case as PhysicsCase
@@ -54,6 +55,14 @@ class _CaseOfStudies(PhysicsCase):
         )
         closed = {"rated_pressure", "pressures"} & self.closure.model_fields_set
         return opening, (self.closure.rated_pressure or max(self.closure.pressures)) if closed else None
+
+    def ranged_pressures(self, kind: str) -> list[tuple[str, tuple[float, ...]]]:
+        """Keys of a study, such as "sweep.over", that name pressures besides these, and the pressures, Pa."""
+        section = getattr(self, kind, None)
+        texts = {f"{kind}.{name}": getattr(section, name, None) for name in ("over", "x", "y")}
+        axes = {key: parse_stability_axis(text) for key, text in texts.items() if text and "=" in text}
+        found = [(key, tuple(axis.values)) for key, axis in axes.items() if axis.parameter == "pressure"]
+        return found + ([("levels.pressures", section.pressures)] if kind == "levels" else [])
 
     @model_validator(mode="after")
     def _steps_take_what_is_upstream(self) -> Self:

@@ -333,7 +333,8 @@ def _centre_line(shapes: MeasuredShapes) -> Figure:
 
 
 def save_figure(draw: Callable[[], Figure], path: Path, units: Units) -> Path:
-    """Draw into a file, in the units of a case. Raises CaseError if the file cannot be written."""
+    """Draw into a file, .png without a suffix, in the units of a case. Raises CaseError if it cannot be written."""
+    path = path if path.suffix else path.with_suffix(".png")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         with style():

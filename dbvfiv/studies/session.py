@@ -173,9 +173,16 @@ class Session:
         """
         free_memory()
         model = attempt(lambda: ValveModel(self.case))
-        behind = self.case.rest_pressure - self.case.level_pressure, 0.0  # what is around the wall bears it too
-        names = "drive.pressure", "closure.rated_pressure"
-        for name, pressure, around in zip(names, self.case.straining_pressures(), behind):
+        self._require_borne(model)
+        return model
+
+    def _require_borne(self, model: ValveModel, kind: str = "") -> None:
+        """Refuse pressures of the case, those of the ranges of a study too, that no wall like its bears."""
+        behind = self.case.rest_pressure - self.case.level_pressure  # what is around the wall bears it too
+        opening, closed = self.case.straining_pressures()
+        named = [("drive.pressure", opening, behind), ("closure.rated_pressure", closed, 0.0)]
+        named += [(key, max(values), behind) for key, values in self.case.ranged_pressures(kind)]
+        for name, pressure, around in named:
             if pressure and (strain := hoop_strain(model, pressure - around)) > HIGHEST_LEVEL:
                 said = (
                     f"{name} is {pressure / 1e3:.4g} kPa at most, which strains the round wall at the inlet by "
@@ -183,7 +190,6 @@ class Session:
                     "bears."
                 )
                 raise CaseError(self.case.units.say(said), key=name)
-        return model
 
     @cached_property
     def mesh(self) -> MeshData:
@@ -202,6 +208,8 @@ class Session:
             session.origin = self, dict(changes)
         if {key.partition(".")[0] for key in changes} <= set(KINDS):
             session.__dict__.update({name: self.__dict__[name] for name in _MODELS if name in self.__dict__})
+            if "described" in self.__dict__:
+                session._require_borne(self.described)
         return session
 
     def prepared(self, kind: str, changes: Mapping[str, Any]) -> Session:
@@ -279,6 +287,8 @@ class Session:
             _require_new(choices.get(name), study.files[name])
         study.check(self.case)
         refuse_read(self.case, output)
+        if self.case.ranged_pressures(kind):
+            self._require_borne(self.described, kind)
         session = self.asked(kind, observer)
         if session is not self:
             return session.perform(kind, output, observer, **choices)

@@ -4,7 +4,7 @@ import json
 
 import pytest
 
-from dbvfiv.case.units import Units
+from dbvfiv.case.units import Units, with_pressure_in
 from dbvfiv.cli.terminal import in_units
 from dbvfiv.errors import CaseError, SolveError
 from dbvfiv.observer import Progress
@@ -39,6 +39,8 @@ def test_units_of_choice_stand_before_that_of_the_pressure():
     other = load_case(None, ["drive.pressure=2 m", "project.units=gpm"]).units
     assert other.pressure(2e3) == "0.2039 m" and other.text == "m, gpm"
     assert case.units.text_of("flow", 3.785411784e-3 / 60) == "1 gpm"
+    assert with_pressure_in("psi, ft, gpm", "kPa") == "kPa, ft, gpm"
+    assert with_pressure_in("psi, ft, gpm", "m") == "m, gpm"
 
 
 @pytest.mark.parametrize("units, words", [("furlong", "no unit to choose"), ("m, ft", "second unit")])

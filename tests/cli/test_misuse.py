@@ -52,6 +52,7 @@ MISUSE = [
     (("damping", *LOSS, "--set", "materials.CR.loss_data=gone.csv"), "does not exist"),
     (("fit", "none.csv"), "none.csv cannot be read"),
     (("fit", TRELOAR, "--stable-to", "-3 %"), "--stable-to is given as '-3 %'"),
+    (("fit", TRELOAR, "--stable-to", "30 %"), "--stable-to goes with --constraint stable alone"),
     (("fit", TRELOAR, "--stable-to", "much"), "--stable-to is given as 'much'"),
     (("fit", TRELOAR, "--density", "3 m"), "--density is given as '3 m'"),
     (("fit", TRELOAR, "--name", "a b"), "--name 'a b' must be of letters"),

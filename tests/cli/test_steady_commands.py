@@ -63,6 +63,24 @@ def test_which_pressures(monkeypatch, tmp_path, command_line, toml, arguments, e
     assert asked == pytest.approx(expected)
 
 
+@pytest.mark.parametrize(
+    "keys, arguments, units",
+    [
+        ([], ["-p", "1 m", "--units", "gpm"], "m, gpm"),
+        (["drive.pressure=2 m"], ["--units", "gpm"], "m, gpm"),
+        ([], ["-p", "1 psi", "--units", "kPa, gpm"], "kPa, gpm"),
+        (["project.units=psi, ft, gpm"], ["-p", "7 kPa"], "kPa, ft, gpm"),
+        ([], ["--units", "gpm"], "gpm"),
+    ],
+)
+def test_units_that_are_asked_for_go_together(monkeypatch, command_line, keys, arguments, units):
+    seen = []
+    monkeypatch.setattr(Session, "perform", lambda self, *_: seen.append(self.case.project.units) or sys.exit(0))
+    with pytest.raises(SystemExit):
+        command_line("steady", *COARSE, *(word for key in keys for word in ("--set", key)), *arguments)
+    assert seen == [units]
+
+
 def test_a_pressure_that_is_not_reached(command_line, one_sentence, tmp_path):
     hard = ("--set", "steady.max_iterations=4", "--set", "steady.min_step=1")
     outcome = command_line("steady", *COARSE, *hard, "-p", "50 Pa", "-p", "50 kPa", "-o", tmp_path / "r.h5", "--json")

@@ -21,6 +21,7 @@ from PIL import Image
 from dbvfiv.api import Valve
 from dbvfiv.case.axis import parse_axis
 from dbvfiv.case.units import UNITS
+from dbvfiv.cli.pages import report as report_command
 from dbvfiv.errors import CaseError
 from dbvfiv.model import ValveModel
 from dbvfiv.model.material_stability import material_stability
@@ -535,22 +536,30 @@ def test_the_lips_crack_above_the_pressure_downstream(top, text):
     assert opens(found).text.endswith(" No state was found at 11 kPa: The state at 11 kPa was not found.")
 
 
-@pytest.mark.parametrize("rated, answer", [("60 kPa", "yes"), ("100 kPa", UNKNOWN)])
-def test_a_rated_pressure_that_was_not_reached_is_named(rated, answer):
-    case = load_case(None, [*KEYS, f"closure.rated_pressure={rated}"])
+@pytest.mark.parametrize(
+    "keys, answer, missed",
+    [
+        (["closure.rated_pressure=60 kPa"], "yes", ""),
+        (["closure.rated_pressure=100 kPa"], UNKNOWN, "rated 100 kPa"),
+        (["closure.pressures=[10 kPa, 60 kPa, 100 kPa]"], UNKNOWN, "100 kPa asked for"),
+    ],
+)
+def test_a_back_pressure_that_was_not_reached_is_named(keys, answer, missed):
+    case = load_case(None, [*(key for key in KEYS if "rated" not in key), *keys])
     found = Gathered(case, "valve", (2e3, 6e3), None)
     states = [SimpleNamespace(pressure=p, closed=True, beyond_limit=False) for p in (1e4, 6e4)]
     nothing = {"failures": (), "critical_pressure": None, "safety": None, "classes": (), "buckling": ()}
     found.results["closure"] = SimpleNamespace(states=states, case=case, **nothing)
     told = closes(found)
-    missed = "; no state was found at the rated 100 kPa" if answer == UNKNOWN else ""
+    missed = f"; no state was found at the {missed}" if missed else ""
     assert (told.answer, told.text) == (answer, f"Shut at 10 kPa and 60 kPa{missed}.")
-    found.case = found.results["closure"].case = case.replace({"closure.rated_pressure": None})  # the largest
+    free = {"closure.rated_pressure": None, "closure.pressures": (60e3, 10e3)}
+    found.case = found.results["closure"].case = case.replace(free)
     states.reverse()  # as closure.pressures has them
     assert (closes(found).answer, closes(found).text) == ("yes", "Shut at 10 kPa and 60 kPa.")
     states[0].closed = False
     assert (closes(found).answer, closes(found).text) == ("no", "Shut at 10 kPa.")
-    states[0].closed, held = True, case.replace({"closure.rated_pressure": None, "closure.supports": "held-lips"})
+    states[0].closed, held = True, case.replace(free | {"closure.supports": "held-lips"})
     found.case = found.results["closure"].case = held
     assert (closes(found).answer, closes(found).text) == (UNKNOWN, "The lips are held shut by the supports.")
 
@@ -623,6 +632,9 @@ def test_without_a_printer_the_pdf_says_what_is_missing(made, monkeypatch, one_s
     with pytest.raises(CaseError) as refused:
         write_pdf(made[1], tmp_path / "page.pdf")
     assert "chromium" in str(refused.value) and "weasyprint" in str(refused.value)
+    monkeypatch.setattr("dbvfiv.report.gather", lambda *given: pytest.fail("solved before it was refused"))
+    with pytest.raises(CaseError, match="chromium"):
+        report_command(None, tmp_path / "page.html", pdf=True)
 
 
 @pytest.mark.parametrize("browser", [None, "/bin/false"])

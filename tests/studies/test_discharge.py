@@ -189,7 +189,8 @@ def test_steady_runs_side_by_side(runs, command_line, tmp_path):
     # between the states of the third run, and not beyond them
     assert rows[1]["volume_flow"][2] == pytest.approx(rows[1]["volume_flow"][0], rel=0.1)
     assert rows[0]["volume_flow"][2] is None and rows[3]["difference"][2] is None
-    out = command_line("compare", *runs, "-o", figure).out
+    out = command_line("compare", *runs, "-o", figure.with_suffix("")).out
+    assert f"Wrote {figure}" in " ".join(out.split())
     assert "2: pipe_diameter 0.305" in out and "2, L/s" in out and "Wrote" in out
 
 

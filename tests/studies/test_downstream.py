@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+import dbvfiv
 from dbvfiv.case.materials import HIGHEST_LEVEL
 from dbvfiv.case.parameters import Mu
 from dbvfiv.case.quantity import GRAVITY
@@ -64,6 +65,24 @@ def test_the_pressure_downstream_bears_the_wall():
     assert hoop_strain(session.described, 451e3) > HIGHEST_LEVEL
     with pytest.raises(CaseError, match="strains the round wall"):
         _ = session.replace({"downstream.pressure": 0.0}).described
+
+
+@pytest.mark.parametrize(
+    "ask",
+    [
+        lambda valve: valve.steady("46 m"),
+        lambda valve: valve.modes("46 m"),
+        lambda valve: valve.levels("46 m"),
+        lambda valve: valve.sweep("pressure=45.9 m:46 m:2"),
+        lambda valve: valve.map("pressure=1 m:46 m:2", "density=10:1000:2"),
+    ],
+)
+def test_no_study_asks_for_a_pressure_that_no_wall_bears(ask):
+    """The state at 46 m was computed from Python, and certified along a sweep, which the command line refused."""
+    valve = dbvfiv.load("cases/dbv4-wide.toml", {"mesh.around": 6, "mesh.along": 8, "materials.strain_level": "10 %"})
+    _ = valve.model
+    with pytest.raises(CaseError, match="strains the round wall"):
+        ask(valve)
 
 
 def test_a_drive_that_does_not_overcome_it_is_refused():
