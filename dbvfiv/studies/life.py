@@ -94,9 +94,10 @@ def motion_of(
     if per_day is None:
         raise CaseError(f"{name} has states and no time; give how often a day it goes there and back: --per-day N.")
     shell = result.model.shell
-    there = [shell.dofs.restrict(state.nodal) for state in result.states]
+    rising = sorted(result.states, key=lambda state: state.pressure)  # they stand as they were asked for
+    there = [shell.dofs.restrict(state.nodal) for state in rising]
     states = [np.zeros(shell.size), *there, *there[-2::-1]]  # and back through each to the rest of the next block
-    last = result.case.units.pressure(result.states[-1].pressure)
+    last = result.case.units.pressure(rising[-1].pressure)
     return Motion(shell, states, 24.0 / per_day, f"{per_day:g} ways a day from rest to {last} and back")
 
 

@@ -71,6 +71,7 @@ def test_onsets_under_both_laws_are_those_of_each():
         ("modes", {"fluid.unsteady": False}, "fluid.unsteady is false"),
         ("modes", {"drive.kind": "uniform"}, "drive.kind is 'uniform'"),
         ("onset", {"onset.over": "storage"}, "onset.over moves the flow model itself"),
+        ("map", {"map.y": "storage"}, "an axis moves the flow model itself"),
         ("onset", {"fluid.unsteady": False}, "fluid.unsteady is false"),
         ("modes", {"fluid.sound_speed": 343, "fluid.continuity": "storage"}, "compressed .* stores mass"),
     ],

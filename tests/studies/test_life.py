@@ -105,6 +105,14 @@ def test_the_way_back_is_that_of_the_way_there():
         motion = motion_of(SimpleNamespace(**named, case=case, model=SimpleNamespace(shell=shell)), per_day=24.0)
         return life_of_states(shell, motion.states, *EXACT).first.hours
 
+    def words(*pressures):
+        states = [SimpleNamespace(nodal=shell.dofs.expand(rolled(shell, 1e-2 * p)), pressure=p) for p in pressures]
+        header, case = SimpleNamespace(name="strip"), SimpleNamespace(units=SimpleNamespace(pressure=str))
+        result = SimpleNamespace(kind="steady", header=header, states=states, case=case)
+        motion = motion_of(SimpleNamespace(**vars(result), model=SimpleNamespace(shell=shell)), per_day=24.0)
+        return motion.words, np.round(motion.states, 12).tolist()
+
+    assert words(2e3, 1e3) == words(1e3, 2e3)  # as they rise, in whichever order they were asked for
     once = hours(20.0)
     assert hours(20.0, 1e-6) == pytest.approx(0.5 * once, rel=1e-6)
     assert hours(10.0, 20.0) == pytest.approx(once, rel=1e-9)

@@ -21,7 +21,7 @@ from ..case import Case
 from ..inputs import Plan, counted, quasi_random
 from ..stability.neighbours import CHECKS, NEAR_SEED, TAKEN, Beside, find_neighbours
 from ..stability.place import is_surrounding
-from ..stability.verdict import FLUTTERS
+from ..stability.verdict import DIVERGES, FLUTTERS
 from ..stability.walk import StabilityWalk
 from ..workers import Work, Workers, share_all
 from .column import MapPlan
@@ -87,7 +87,7 @@ class Chances:
             return rows(scores[:, :-1], np.clip(0.5 + scores[:, -1], 0.0, 1.0))
 
         shared = find_neighbours(at, origin, scales, start, taken, checks, far)
-        beside, (flutters, undecided) = Beside(at, shared), np.zeros((2, len(along.values)), int)
+        beside, (flutters, undecided, diverges) = Beside(at, shared), np.zeros((3, len(along.values)), int)
         for row in rows(quasi_random(count, d, plan.case.uncertainty.seed), np.full(count, 0.5)):
             try:
                 walk, place = at(row)
@@ -98,7 +98,8 @@ class Chances:
                 continue
             flutters += [one is not None and one.outcome == FLUTTERS for one in found]
             undecided += [one is None or one.stable is None for one in found]
-        return {"flutters": flutters.tolist(), "undecided": undecided.tolist()}
+            diverges += [one is not None and one.outcome == DIVERGES for one in found]
+        return {"flutters": flutters.tolist(), "undecided": undecided.tolist(), "diverges": diverges.tolist()}
 
 
 def _column(chances: Chances, value: float) -> dict[str, Any]:
@@ -147,20 +148,34 @@ def chance_grid(record: Record, plan: MapPlan) -> np.ndarray:
     return cells if plan.transposed else cells.transpose(0, 2, 1)
 
 
+def diverging_grid(record: Record, plan: MapPlan) -> np.ndarray:
+    """Share (y, x) of the samples that do not return to the state without oscillating; NaN where there is none."""
+    cells = np.full((len(plan.across.values), len(plan.along.values)), np.nan)
+    for note in record.notes(_CHANCE):
+        if "diverges" in note:
+            cells[plan.across.values.index(note["value"])] = np.array(note["diverges"]) / plan.case.map.samples
+    return cells if plan.transposed else cells.T
+
+
 def summary_of(record: Record, plan: MapPlan) -> dict[str, Any]:
     """Probability of flutter over the cells (y, x) for JSON, None where there is none, with what is uncertain."""
-    value, low, high = (np.where(np.isnan(table), None, table).tolist() for table in chance_grid(record, plan))
+    tables = *chance_grid(record, plan), diverging_grid(record, plan)
+    value, low, high, diverges = (np.where(np.isnan(table), None, table).tolist() for table in tables)
     inputs = _inputs(plan).inputs
     named = {"samples": plan.case.map.samples, "inputs": [one.summary() for one in inputs]}
-    return {"probability": {"value": value, "low": low, "high": high} | named}
+    return {"probability": {"value": value, "low": low, "high": high, "diverges": diverges} | named}
 
 
 def sentences(record: Record, plan: MapPlan) -> Iterator[str]:
     """Lines on the cells between the bands."""
     value = chance_grid(record, plan)[0]
     known = value[np.isfinite(value)]
+    diverges = diverging_grid(record, plan)
+    most = diverges[diverges > 0].max(initial=0.0)
     counts = [int((known <= BANDS[0]).sum()), int(((known > BANDS[0]) & (known < BANDS[-1])).sum())]
     yield (
         f"Probability of flutter from {plan.case.map.samples} samples a column: up to {100 * BANDS[0]:g} % in "
         f"{counts[0]} cells, more than {100 * BANDS[-1]:g} % in {len(known) - sum(counts)}, between in {counts[1]}."
     )
+    if most:
+        yield f"Besides, up to {100 * most:.3g} % of the samples of a cell diverge without oscillating."

@@ -213,17 +213,22 @@ def summary_of(record: Record, plan: MapPlan, law: int) -> dict[str, Any]:
 
 def touching_curves(record: Record, plan: MapPlan, law: int) -> list[np.ndarray]:
     """Lines (k, 2) in x and y on which cycles just close the lips at their middle: located along each column, straight
-    between neighbouring columns.
+    to the nearest of the next column that no other line goes to.
     """
-    known, lines, open_ = read_cycles(record, plan), [], False
+    known, lines, open_ = read_cycles(record, plan), [], []
     for value in plan.across.values:
         values = sorted(known[value, law].touching) if (value, law) in known else []
-        if values and not open_:
-            lines.append([])
-        open_ = bool(values)
+        pairs = sorted((abs(line[-1][1] - along), i, along) for i, line in enumerate(open_) for along in values)
+        taken: dict[float, list] = {}
+        for _, i, along in pairs:
+            if along not in taken and not any(open_[i] is line for line in taken.values()):
+                taken[along] = open_[i]
         for along in values:
-            lines[-1].append((along, value) if plan.transposed else (value, along))
-    return [np.array(line) for line in lines]
+            if along not in taken:
+                lines.append(taken.setdefault(along, []))
+            taken[along].append((value, along))
+        open_ = [taken[along] for along in values]
+    return [np.array(line)[:, :: -1 if plan.transposed else 1] for line in lines]
 
 
 def sentences(record: Record, plan: MapPlan, law: int) -> list[str]:

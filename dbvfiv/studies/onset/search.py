@@ -285,7 +285,10 @@ def with_uncertainty(
     """
     coarse, ratio = coarse_case(case, case.onset.coarse_mesh)
     if ratio < LEAST_RATIO:
-        warnings.append("The mesh is too coarse for a second one, so onsets carry no uncertainty.")
+        why = "The mesh is too coarse for a second one"
+        if coarse_case(case, 0.5)[1] >= LEAST_RATIO:
+            why = f"The second mesh is all but as fine with onset.coarse_mesh = {case.onset.coarse_mesh:g}"
+        warnings.append(f"{why}, so onsets carry no uncertainty.")
         return points
     size = f"{coarse.mesh.around} x {coarse.mesh.along}"
     observer.progress(f"second mesh, {size}")

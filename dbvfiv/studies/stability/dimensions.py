@@ -102,8 +102,9 @@ def _require_two_laws(case: Case, study: str) -> None:
     why = f"{without}, so that no flow model is at work" if without else ""
     if not why and case.is_compressed:
         why = "a fluid that is compressed (fluid.sound_speed) stores mass, and the quasi-steady model does not"
-    if not why and getattr(getattr(keys, "axis", None), "parameter", "") == "storage":
-        why = f"{study}.over moves the flow model itself"
+    axes = getattr(keys, "axes", (getattr(keys, "axis", None),))
+    if not why and any(axis is not None and axis.parameter == "storage" for axis in axes):
+        why = f"{'an axis' if study == 'map' else f'{study}.over'} moves the flow model itself"
     if why:
         said = f"{study}.continuity is given as 'both', but {why}; it must be 'case' then."
         raise CaseError(said, key=f"{study}.continuity")

@@ -74,16 +74,16 @@ class Sample:
 
     @cached_property
     def growth(self) -> np.ndarray:
-        """(WATCHED,) largest growth rates; very negative where there are fewer."""
-        found = np.full(WATCHED, -1e9)
-        kept = self.eigenvalues.real[:WATCHED]
+        """(KEPT,) largest growth rates; very negative where there are fewer."""
+        found = np.full(KEPT, -1e9)
+        kept = self.eigenvalues.real[:KEPT]
         found[: len(kept)] = kept
         return found
 
     @cached_property
     def moving(self) -> np.ndarray:
-        """(WATCHED,) bool, whether these growth rates are more than rounding."""
-        return np.abs(self.growth) > NEUTRAL * np.pad(np.abs(self.eigenvalues[:WATCHED]), (0, WATCHED))[:WATCHED]
+        """(KEPT,) bool, whether these growth rates are more than rounding."""
+        return np.abs(self.growth) > NEUTRAL * np.pad(np.abs(self.eigenvalues), (0, KEPT))[:KEPT]
 
     @property
     def growing(self) -> np.ndarray:

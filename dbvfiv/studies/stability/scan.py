@@ -166,7 +166,10 @@ class Scan:
             if not known:
                 self.uncertain.append((a, b))
                 continue
-            found += [Crossing(k, low, high) for k in range(few, min(many, WATCHED))]
+            listed = min(len(low.eigenvalues), len(high.eigenvalues))
+            if many > listed:  # a growth rate that only one end knows
+                self.uncertain.append((a, b))
+            found += [Crossing(k, low, high) for k in range(few, min(many, listed))]
         return found
 
 

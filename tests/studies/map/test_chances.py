@@ -46,20 +46,32 @@ def test_a_column_without_a_probability_is_told_again_by_a_run_that_goes_on():
     assert said == ["No probability at 3 kPa: No state."]
 
 
-def test_samples_whose_rubber_does_not_hold_say_nothing_of_flutter(monkeypatch):
-    """A cell in which all lost their stability has no probability, and not that of valves that never flutter."""
+@pytest.mark.parametrize(
+    "verdict, undecided, diverges",
+    [
+        (Verdict.not_valid("CR is unstable."), 8, 0),
+        (Verdict.of(np.array([1.0 + 0.0j]), 1, 1, True, line=0.0, band=np.inf), 0, 8),
+    ],
+    ids=["no rubber", "diverge"],
+)
+def test_samples_that_say_nothing_of_flutter(monkeypatch, verdict, undecided, diverges):
+    """A cell in which all lost the stability of their rubber has no probability, and not that of valves that never
+    flutter; those that diverge are told beside.
+    """
     shared = SimpleNamespace(state=lambda row: None)
-    unsound = SimpleNamespace(verdicts=lambda walk, places, row: [Verdict.not_valid("CR is unstable.")] * len(places))
+    unsound = SimpleNamespace(verdicts=lambda walk, places, row: [verdict] * len(places))
     monkeypatch.setattr(chances, "find_neighbours", lambda *_: shared)
     monkeypatch.setattr(chances, "Beside", lambda *_: unsound)
     for name in ("equilibrium", "settle"):
         monkeypatch.setattr(StabilityWalk, name, lambda *_: None)
     case = load_small(KEYS, AXES, {"map.samples": 8}).case
     found = chances.Chances(case).column(3e3)
-    assert found == {"flutters": [0] * 4, "undecided": [8] * 4}
+    assert found == {"flutters": [0] * 4, "undecided": [undecided] * 4, "diverges": [diverges] * 4}
     record = SimpleNamespace(notes=lambda _: [{"value": 3e3, **found}])
     value, low, high = chances.chance_grid(record, MapPlan(case))[:, :, 0]
-    assert np.isnan(value).all() and (low == 0).all() and (high == 1).all()
+    assert (low == 0).all() and (high == 1).all() == np.isnan(value).all() == (undecided > 0)
+    told = " ".join(chances.sentences(record, MapPlan(case)))
+    assert ("100 % of the samples of a cell diverge" in told) == (diverges > 0)
 
 
 @pytest.mark.parametrize(

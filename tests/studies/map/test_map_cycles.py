@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import json
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
+from dbvfiv.studies.map import cycles
 from dbvfiv.studies.map.cycles import CELLS
 from dbvfiv.studies.orbits import Follower
 from dbvfiv.studies.session import load_result, resume_result
@@ -35,6 +37,21 @@ def file(tmp_path_factory):
 @pytest.fixture(scope="module")
 def found(file):
     return session_of().perform("map", file)
+
+
+@pytest.mark.parametrize("transposed", [False, True])
+def test_lines_on_which_lips_touch_go_to_the_nearest_point(monkeypatch, transposed):
+    """A tongue along a column is touched twice; a line ends where the next column has no partner for it."""
+    touching = {1.0: [2.0, 4.0], 2.0: [1.8, 4.3], 3.0: [4.8], 4.0: [], 5.0: [3.0]}
+    known = {(value, 0): SimpleNamespace(touching=points) for value, points in touching.items()}
+    monkeypatch.setattr(cycles, "read_cycles", lambda *_: known)
+    plan = SimpleNamespace(across=SimpleNamespace(values=tuple(touching)), transposed=transposed)
+    lines = [line[:, ::-1] if transposed else line for line in cycles.touching_curves(None, plan, 0)]
+    assert [line.tolist() for line in lines] == [
+        [[1.0, 2.0], [2.0, 1.8]],
+        [[1.0, 4.0], [2.0, 4.3], [3.0, 4.8]],
+        [[5.0, 3.0]],
+    ]
 
 
 def test_cells_have_the_cycles_of_branches(found):

@@ -55,6 +55,17 @@ def test_a_second_mode_that_becomes_unstable_counts_too():
     assert [locate(scan, c, 1e-12)[0] for c in crossings] == pytest.approx([1.0, 2.0])
 
 
+def test_crossings_of_all_modes_that_are_kept():
+    """Six cross between two values; where only one end lists a mode the interval is uncertain."""
+    growth = [lambda x, k=k: x - 1.0 - 0.1 * k for k in range(9)]
+    scan = Scan(modes(*growth[:6]))
+    found = [locate(scan, c, 1e-12)[0] for c in scan.run([0.0, 3.0])]
+    assert found == pytest.approx([1.0, 1.1, 1.2, 1.3, 1.4, 1.5])
+    spectrum = modes(*growth)
+    scan = Scan(lambda x: spectrum(x)[: 3 if x < 1.0 else 8])
+    assert [c.index for c in scan.run([0.0, 3.0])] == [0, 1, 2] and scan.uncertain == [(0.0, 3.0)]
+
+
 @pytest.mark.parametrize("on, off", [(1.48, 1.52), (1.52, 1.48)])
 def test_modes_that_take_each_other_s_place_between_two_values_are_told_apart(on, off):
     scan = Scan(modes(lambda x: off - x, lambda x: x - on))
