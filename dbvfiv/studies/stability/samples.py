@@ -14,6 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from eigen.columns import DIRECT, MISSING, Cell
+from eigen.spectrum import number_right_of
 
 from ...model.leading import LeadingSearch
 from ...record.record import GrowingRecord, Record
@@ -65,7 +66,9 @@ class Sample:
     def of(cls, value: float, cell: Cell, search: LeadingSearch | None = None, sealed: bool = False) -> Sample:
         """Sample of a cell, which speaks for the state as far as the search for its modes does."""
         own, left_open = cell.certificate, ""
-        band = min(own.band, search.claimed) if search and own.agrees else own.band
+        band = own.band
+        if search and own.agrees and number_right_of(cell.leading, own.line, search.claimed) == own.unstable:
+            band = min(band, search.claimed)  # none of those counted lies above it
         if search and cell.open_above:
             left_open = search.left_open(band)
         counts = own.unstable, own.counted, own.certain

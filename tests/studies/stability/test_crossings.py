@@ -16,7 +16,8 @@ from dbvfiv.studies.stability.dimensions import Variant
 from dbvfiv.studies.stability.line import LineOnset
 from dbvfiv.studies.stability.samples import Sample
 from dbvfiv.studies.stability.scan import Scan, locate
-from eigen.columns import DIRECT
+from eigen.certificate import Certificate
+from eigen.columns import DIRECT, REDUCED, Cell
 
 
 def modes(*functions):
@@ -53,6 +54,15 @@ def test_a_second_mode_that_becomes_unstable_counts_too():
     crossings = scan.run([0.0, 3.0])
     assert [c.index for c in crossings] == [0, 1]
     assert [locate(scan, c, 1e-12)[0] for c in crossings] == pytest.approx([1.0, 2.0])
+
+
+@pytest.mark.parametrize("unstable, band", [(0, 95.0), (4, np.inf)])
+def test_as_many_are_unstable_as_are_counted_up_to_the_band(unstable, band):
+    """With loss factors all frequencies are counted; "20 up to 95 Hz" had 12 there."""
+    growth = np.array([1.0 + 100.0j, 0.5 + 900.0j]) if unstable else np.array([-1.0 + 100.0j])
+    cell = Cell(growth, Certificate(unstable, unstable, True, 0.0, np.inf), REDUCED)
+    sample = Sample.of(6e3, cell, SimpleNamespace(claimed=95.0))
+    assert (sample.band, sample.verdict.band, sample.unstable) == (band, band, unstable)
 
 
 def test_crossings_of_all_modes_that_are_kept():
