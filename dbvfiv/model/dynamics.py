@@ -64,7 +64,9 @@ class LinearisedState:
 
     def resolved(self, mu: Mu) -> float:
         """Frequency up to which waves of the fluid inside are resolved, Hz; infinite where these motions make none."""
-        law = self.model.flow if self.seal is None else self._still_law(mu.storage)
+        law = self.model.flow
+        if law.has_fluid and self.seal is not None:
+            law = self._still_law(mu.storage)
         return law.resolved(mu.pipes)
 
     def _still_law(self, storage: float | None) -> FlowLaw:

@@ -83,6 +83,16 @@ class _CaseOfStudies(PhysicsCase):
         return self
 
     @model_validator(mode="after")
+    def _held_lips_meet(self) -> Self:
+        if self.closure.supports == "held-lips" and self.valve.lip_rise > 0:
+            raise BrokenRule(
+                "closure.supports",
+                f"'held-lips' with valve.lip_rise = {self.valve.lip_rise:g} m",
+                "lips that are bowed apart are not shut where they are held; it must be 'contact' there",
+            )
+        return self
+
+    @model_validator(mode="after")
     def _classes_are_those_of_the_part(self) -> Self:
         known = {"SS", "all", *self.part.classes}
         for study in ("modes", "sweep"):

@@ -249,12 +249,12 @@ def judge(
     ('limit cycle', 1.0, 1.0)
     """
     time, values, facts = longest_samples(time, values, gaps)
-    if len(values) < _FEWEST:
+    series = Series.of(time, values) if len(values) >= _FEWEST else None
+    if series is None or len(series.values) < _FEWEST:  # interpolation takes the larger steps of uneven ones
         words = f"There are fewer than {_FEWEST} samples{' between two gaps' if gaps and facts['notes'] else ''}."
         sizes = {"mean": float(values.mean()), "amplitude": 0.5 * float(np.ptp(values)), "rms": float(values.std())}
         return Verdict("undecided", False, words, **sizes, **facts)
-    found = _judge(Series.of(time, values), options, residual, closed_below)
-    return replace(found, **facts)
+    return replace(_judge(series, options, residual, closed_below), **facts)
 
 
 def longest_samples(time, values, gaps: bool) -> tuple[np.ndarray, np.ndarray, dict[str, Any]]:

@@ -622,6 +622,13 @@ def test_a_bill_opens_by_a_slow_and_a_sudden_head_and_is_closed_after_it(tmp_pat
     assert np.abs(h["balance"]).max() < 2e-4 * h["pressure_work"].max()
 
 
+def test_a_sealed_bill_has_modes_under_a_load_without_a_fluid(model):
+    """As in air: all of them decay, at frequencies that water, which they do not move, makes no lower."""
+    bare = {"drive.kind": "uniform", "drive.pressure": 0.6 * PRESSURE}
+    found = load(model.case.replace(bare)).modes()
+    assert found.modes and all(mode.growth_rate < 0 for mode in found.modes)
+
+
 @pytest.mark.parametrize(
     "law",
     [

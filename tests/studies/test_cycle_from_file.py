@@ -151,12 +151,12 @@ def test_the_last_period_of_a_run_is_at_the_pressure_of_its_drive(tmp_path, monk
     run = SimpleNamespace(
         kind="transient",
         case=session_of(drive__pressure=18e3, transient__drive_table=str(table)).case,
-        mesh=SimpleNamespace(nodes=np.zeros((3, 3))),
+        mesh=SimpleNamespace(differs_from=lambda model: ""),
         history={"time": np.array([0.0, 0.5])},
         verdict={"verdict": "limit cycle", "frequency": None, "mass_flow": steady, "lip_displacement": lasting},
     )
     monkeypatch.setattr(start, "load_result", lambda _: run)
-    model = SimpleNamespace(mesh=run.mesh, flow=SimpleNamespace(inner=2), pump=None)
+    model = SimpleNamespace(flow=SimpleNamespace(inner=2), pump=None)
     walk = SimpleNamespace(built=lambda _: SimpleNamespace(model=model))
     asked = started(table, cycle__over="pressure=4 kPa:8 kPa:3").case
     with pytest.raises(CaseError, match="an elastic line, or a compressed fluid, does not start"):
@@ -203,17 +203,18 @@ def test_from_a_run_in_time(file, tmp_path):
 
 @pytest.mark.parametrize("number, value", [(None, 250.0), (0, 230.0), (1, 240.0), (-2, 240.0)])
 def test_the_cycle_of_a_number_is_that_of_its_row(number, value):
-    """In the order of the table; the last one by default."""
+    """In the order in which cycles lie on the branch and are printed; the last one by default, as everywhere."""
     keys = {"cycle.over": "density=226:233:2", "cycle.start": "file", "cycle.start_file": __file__}
     keys |= {} if number is None else {"cycle.start_cycle": number}
-    points = [SimpleNamespace(number=row, value=value) for row, value in ((2, 250.0), (0, 230.0), (1, 240.0))]
+    # a branch that went up from its start first, and down afterwards
+    points = [SimpleNamespace(number=row, value=value) for row, value in ((2, 230.0), (0, 240.0), (1, 250.0))]
     result = SimpleNamespace(points=points, parameter="density")
     assert _cycle_of(thesis_case(keys), result).value == value
 
 
 def stored(kind, case, **more):
     """A result of a case as `given_motion` reads it."""
-    return SimpleNamespace(kind=kind, case=case, mesh=SimpleNamespace(nodes=np.zeros((3, 3))), **more)
+    return SimpleNamespace(kind=kind, case=case, mesh=SimpleNamespace(differs_from=lambda model: ""), **more)
 
 
 @pytest.mark.parametrize(
@@ -234,7 +235,7 @@ def test_a_motion_starts_at_the_value_that_its_own_valve_has(monkeypatch, over, 
     monkeypatch.setattr(start, "load_result", lambda _: stored("transient", thesis_case(changes)))
     monkeypatch.setattr(start, "_last_period", lambda model, *_: model)
     monkeypatch.setattr(start, "ValveModel", lambda case: case.upstream.length)
-    model = SimpleNamespace(mesh=SimpleNamespace(nodes=np.zeros((3, 3))), pump=None, case=case)
+    model = SimpleNamespace(pump=None, case=case)
     walk = SimpleNamespace(built=lambda _: SimpleNamespace(model=model))
     if value is None:
         with pytest.raises(CaseError, match="has no one pipe_length to start from"):
@@ -268,6 +269,8 @@ def test_files_that_nothing_starts_from(file, tmp_path):
         started(file, cycle__start_cycle=99).perform("cycle")
     with pytest.raises(CaseError, match="belongs to a mesh of"):
         started(file, mesh__around=4).perform("cycle")
+    with pytest.raises(CaseError, match="belongs to another valve"):
+        started(file, valve__scale=0.8).perform("cycle")
     other = tmp_path / "steady.h5"
     session_of().perform("steady", other)
     with pytest.raises(CaseError, match="of kind 'steady'"):

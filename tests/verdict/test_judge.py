@@ -298,3 +298,16 @@ def test_what_is_no_series_is_refused(time, values, words):
 
 def test_few_samples_are_no_verdict():
     assert judge(range(10), range(10)).name == "undecided"
+
+
+@pytest.mark.parametrize("count", range(16, 32))
+def test_few_uneven_samples_can_be_too_few(count):
+    """Interpolation at their typical distance leaves fewer, down to one."""
+    rng = np.random.default_rng(count)
+    for spread in (0.3, 1.0, 3.0):
+        time, values = np.cumsum(rng.lognormal(0.0, spread, count)), rng.standard_normal(count)
+        for gaps in (False, True):
+            assert np.isfinite(judge(time, values, gaps=gaps).mean)
+    time = np.append(0.01 * np.arange(8), 1.0 + np.arange(10))
+    found = judge(time, np.ones(18), gaps=False)
+    assert found.name == "undecided" and found.reason == "There are fewer than 16 samples."

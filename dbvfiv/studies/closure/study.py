@@ -12,6 +12,7 @@ import numpy as np
 
 from ...case.measured import AREA, SHAPE
 from ...model.closed import ClosedValve, Passage
+from ...model.supports import HELD_LIPS
 from ...model.symmetry import equilibria_of
 from ...record.mesh import MeshData, WholeValve
 from ...record.record import GrowingRecord
@@ -310,7 +311,11 @@ class ClosureResult(StudyResult):
 
     @property
     def closing_pressure(self) -> float | None:
-        """Pressure on the path, Pa, up to which the load had to rise for some section to be shut; None if none was."""
+        """Pressure on the path, Pa, up to which the load had to rise for some section to be shut; 0 for a bill that is
+        moulded shut; None if none was, or supports hold the lips.
+        """
+        if self.supports == HELD_LIPS or self.case.valve.is_preset:
+            return None if self.supports == HELD_LIPS else 0.0
         highest = 0.0
         for point in self.walk:
             if point.sealed_length > 0:

@@ -38,7 +38,7 @@ class Keys(RangeSection):
     )
     start_cycle: StrictInt | None = key(
         None,
-        "Which cycle of a branch in start_file, from 0 in the order of its table; negative ones count from the end. "
+        "Which cycle of a branch in start_file, from 0 as they are printed; negative ones count from the end. "
         "Without it the last one; of a branch over another parameter the one nearest to this case's value of that.",
     )
     amplitude: Length = key(

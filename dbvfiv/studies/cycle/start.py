@@ -100,12 +100,8 @@ def given_motion(case: Case, walk: StabilityWalk) -> Given:
             key="cycle.start_file",
         )
     model, name = walk.built(Mu.of(case)).model, axis.parameter
-    if result.mesh.nodes.shape != model.mesh.nodes.shape:
-        raise CaseError(
-            f"The motion of {str(path)!r} belongs to a mesh of {len(result.mesh.nodes)} nodes and this case's has "
-            f"{len(model.mesh.nodes)}.",
-            key="cycle.start_file",
-        )
+    if other := result.mesh.differs_from(model):
+        raise CaseError(f"The motion of {str(path)!r} belongs to {other}.", key="cycle.start_file")
     value = _value_of(result.case, case, name)
     if value is None:
         raise CaseError(f"The valve of {str(path)!r} has no one {name} to start from.", key="cycle.start_file")
@@ -142,8 +138,8 @@ def _value_of(other: Case, case: Case, name: str) -> float | None:
 
 
 def _cycle_of(case: Case, result):
-    """Cycle `cycle.start_cycle` of a result, counted in the order of its table."""
-    number, points = case.cycle.start_cycle, sorted(result.points, key=lambda point: point.number)
+    """Cycle `cycle.start_cycle` of a result, counted in the order in which cycles lie on its branch."""
+    number, points = case.cycle.start_cycle, result.points
     if number is None and result.parameter != case.cycle.axis.parameter and points:
         value = _value_of(case, result.case, result.parameter)
         if value is None:

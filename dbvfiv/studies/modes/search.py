@@ -340,9 +340,10 @@ def _contact_notes(model, state: SteadyState, linear, modes: Sequence[ModeShape]
         return []
     said = []
     if linear.seal is not None:
+        fluid = ", with the still fluid behind the seal" if model.flow.has_fluid else ""
         said.append(
             f"Sealed: the faces touch up to z = {1e3 * model.mesh.z[linear.seal]:.4g} mm and nothing flows; the modes "
-            "are those of the wall held there, with the still fluid behind the seal."
+            f"are those of the wall held there{fluid}."
         )
     if symmetry.of_equilibria and modes and model.touching(state.q):
         reach = model.contact_reach(state.q, modes[0].shape)

@@ -92,8 +92,13 @@ class RunVerdict:
 _LIVELINESS = ("closed", "steady", "decaying", "limit cycle", "growing", "undecided", "irregular", "chatters")
 
 
-def assess(history: Columns, model: ValveModel, residual: float = np.nan, since: float = 0.0) -> RunVerdict:
-    """Verdict on a history.
+#: Drive that never changes.
+STILL = Drive((0.0,), (0.0,))
+
+
+def assess(history: Columns, model: ValveModel, residual: float = np.nan, drive: Drive = STILL) -> RunVerdict:
+    """Verdict on a history, from where the drive holds still on, once it has held for two steps; nothing is certain of
+    one that ends before.
 
     A valve is closed where its lips are shut and nothing flows, see `openness`. Faces that part and meet again and
     again chatter, periodically or not.
@@ -104,11 +109,11 @@ def assess(history: Columns, model: ValveModel, residual: float = np.nan, since:
         See `dbvfiv.studies.transient.history.SCALARS`.
     residual : float
         Of the equilibrium at the end; not a number if it is not known.
-    since : float
-        Time, s, before which the drive still changed.
+    drive : Drive
+        What the run was driven by.
     """
-    time = history["time"]
-    chosen = time >= since
+    time, since = history["time"], drive.settled_at
+    chosen = time >= (since if np.count_nonzero(time >= since) > 1 else 0.0)
     judged = partial(judge, time[chosen], gaps=False)
     known = residual if np.isfinite(residual) else None
     signals = ("mass_flow", "lip_displacement", "lip_opening")
@@ -126,15 +131,9 @@ def assess(history: Columns, model: ValveModel, residual: float = np.nan, since:
             chatter = shuttings.evidence(time[chosen], *signals)
             told = {name: getattr(opens, name) for name in ("decided", "reason", "period", "cycles")}
             found = [replace(v, name="chatters", **told) for v in found]
+    if time[-1] < since * (1 - 1e-9):
+        found = [replace(v, decided=False, reason=f"{v.reason} The drive changes until {since:.4g} s.") for v in found]
     return RunVerdict(*found, residual, len(time) - 1, float(time[-1]), chatter)
-
-
-def judged_from(time: np.ndarray, drive: Drive) -> float:
-    """Time, s, of a run up to a step from which on it is judged: where the drive holds still, once it has held for two
-    steps; else the start.
-    """
-    since = drive.settled_at
-    return since if np.count_nonzero(time >= since) > 1 else 0.0
 
 
 def shut_share(model: ValveModel) -> float:
@@ -232,11 +231,8 @@ def stored_state(motion: ValveMotion, case: Case, inlet: float) -> MotionState:
         raise CaseError(f"{str(path)!r} holds no states to start from.")
     if not -count <= index < count:
         raise CaseError(f"{str(path)!r} holds {count} states, so there is no state {index}.")
-    if record.mesh.nodes.shape != model.mesh.nodes.shape:
-        raise CaseError(
-            f"The states of {str(path)!r} belong to a mesh of {len(record.mesh.nodes)} nodes and this case's has "
-            f"{len(model.mesh.nodes)}."
-        )
+    if other := record.mesh.differs_from(model):
+        raise CaseError(f"The states of {str(path)!r} belong to {other}.")
     q = model.shell.dofs.restrict(record.value(STATES, "nodal", index))
     if not moving:
         speed = float(record.value(STATES, "station_velocity", index)[-1])
@@ -367,7 +363,7 @@ class Runner:
     def _go(self) -> Runner:
         progress, every = self.progress, self.options.judge_every
         _, judged = _verdicts_beside(progress.steps, every)
-        before = self._certain_before()
+        before, stop_when = self._certain_before(), self._verdicts_to_stop_at()
         try:
             while not self.stopped and progress.state.time < self.options.end:
                 self._step()
@@ -377,7 +373,7 @@ class Runner:
                 if progress.steps == judged:
                     verdict = self._judge()
                     certain = verdict.name if verdict.decided else ""
-                    self.stopped = bool(certain) and certain in self.options.stop_when and certain == before
+                    self.stopped = bool(certain) and certain in stop_when and certain == before
                     before, (_, judged) = certain, _verdicts_beside(progress.steps, every)
         except StepFailure as failure:
             smallest = self.options.control.step * self.options.control.smallest
@@ -409,6 +405,16 @@ class Runner:
         if not found and due == steps > 0:  # ended before it was judged
             found = [self._judge().summary()]
         return found[-1]["verdict"] if found and found[-1]["decided"] else ""
+
+    def _verdicts_to_stop_at(self) -> set[str]:
+        """Those of `stop_when` but the ones at which the run was complete before it was asked to go on."""
+        asked, last = set(self.options.stop_when), ""
+        for note in self.record.log:
+            if note["what"] == "verdict":
+                last = note["verdict"] if note["decided"] else ""
+            elif note["what"] == "end" and note["complete"]:
+                asked.discard(last)
+        return asked
 
     def _step(self) -> None:
         options, progress = self.options, self.progress
@@ -451,7 +457,7 @@ class Runner:
             if inlet > model.flow.back:
                 scale = model.force_scale(state.q, inlet)
                 residual = float(np.linalg.norm(model.residual(state.q, inlet)) / scale)
-        verdict = assess(self.history, model, residual, since=judged_from(self.history["time"], self.drive))
+        verdict = assess(self.history, model, residual, self.drive)
         self.record.note("verdict", **verdict.summary())
         self.record.progress(f"{verdict.name}{'' if verdict.decided else '?'} at {state.time:.4g} s")
         return verdict

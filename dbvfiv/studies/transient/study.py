@@ -25,7 +25,7 @@ from ..stability.verdict import DIVERGES, FLUTTERS, STABLE, UNDECIDED, Verdict
 from ..state import StateSteps
 from . import figures
 from .history import HISTORY, RESTART, STATE_COLUMNS, STATES, rows_to_keep, tables_of
-from .run import NUMBERS, REFUSAL, Runner, assess, judged_from
+from .run import NUMBERS, REFUSAL, Runner, assess
 
 
 def check(case: Case) -> None:
@@ -61,11 +61,11 @@ def stability_of(summary: Mapping[str, Any]) -> Verdict:
     """
     lip = summary.get("lip_displacement") or {}
     frequency = lip.get("frequency") or np.nan
-    outcome = _STABILITY.get(summary["verdict"], UNDECIDED)
-    if summary["verdict"] == "growing" and not np.isfinite(frequency):
+    outcome = _STABILITY.get(summary["verdict"], UNDECIDED) if summary["decided"] else UNDECIDED
+    if outcome == FLUTTERS and summary["verdict"] == "growing" and not np.isfinite(frequency):
         outcome = DIVERGES
     reason = f"After a kick the run in time ends as {summary['verdict']}: {summary['reason']}"
-    return Verdict(outcome, reason, frequency=frequency, certain=bool(summary["decided"]))
+    return Verdict(outcome, reason, frequency=frequency, certain=outcome != UNDECIDED)
 
 
 _NO_VERDICT = {
@@ -165,8 +165,7 @@ class TransientResult(StudyResult):
         if not self.begun:
             return dict(_NO_VERDICT)
         # a run that goes on or was killed has an older one, or none
-        since = judged_from(self.history["time"], Drive.of(self.case))
-        return assess(self.history, self.model, since=since).summary()
+        return assess(self.history, self.model, drive=Drive.of(self.case)).summary()
 
     @property
     def judged_from(self) -> float:
@@ -181,6 +180,8 @@ class TransientResult(StudyResult):
         refusals = self.record.notes(REFUSAL)
         if refusals:
             return Verdict.not_valid(refusals[-1]["text"])
+        if (since := Drive.of(self.case).settled_at) > 0:
+            return Verdict.undecided(f"The drive changes until {since:.4g} s, and the steady state with it.")
         return stability_of(self.verdict)
 
     @property

@@ -151,8 +151,15 @@ def test_where_equilibria_end_is_a_limit():
     ],
 )
 def test_the_closing_pressure_is_one_that_rises_up_to_it(points, closing):
+    """A bill that is moulded shut needs none, and supports that hold the lips tell nothing of it."""
     walk = [SimpleNamespace(pressure=pressure, sealed_length=sealed) for pressure, sealed in points]
-    assert ClosureResult.closing_pressure.fget(SimpleNamespace(walk=walk)) == closing
+
+    def found(preset: bool = False, supports: str = "contact"):
+        case = SimpleNamespace(valve=SimpleNamespace(is_preset=preset))
+        return ClosureResult.closing_pressure.fget(SimpleNamespace(walk=walk, case=case, supports=supports))
+
+    assert found() == closing
+    assert found(preset=True) == 0.0 and found(supports="held-lips") is None
 
 
 def test_leak_is_that_of_a_laminar_film_and_of_a_jet_at_its_ends():

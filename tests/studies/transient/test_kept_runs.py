@@ -292,7 +292,7 @@ def test_a_run_that_fails_or_is_interrupted_at_once_can_be_read_and_resumed(
 
 def test_a_resumed_run_is_ended_by_the_same_verdict(tmp_path, valve, all_restart_points):
     changes = {
-        "transient.duration": 5.0,
+        "transient.duration": 1.3,
         "transient.stop_when": ["steady"],
         "transient.numerical_damping": 0.1,
         "transient.restart_every": 50,
@@ -315,6 +315,8 @@ def test_a_resumed_run_is_ended_by_the_same_verdict(tmp_path, valve, all_restart
     with pytest.raises(CaseError, match="was ended by its verdict"):
         dbvfiv.resume(tmp_path / "run.h5")
     assert load_result(tmp_path / "run.h5").complete
+    longer = dbvfiv.resume(tmp_path / "run.h5", duration=1.6)  # beyond the verdict at 1.5 s, the same again
+    assert longer.complete and not longer.stopped
 
 
 def test_progress_and_history_go_through_a_file_unchanged(tmp_path, valve):

@@ -10,7 +10,9 @@ from dbvfiv.motion.control import Drive
 from dbvfiv.motion.start import steady_positions
 from dbvfiv.studies.case import thesis_case
 from dbvfiv.studies.session import load_result
+from dbvfiv.studies.stability.verdict import DIVERGES, FLUTTERS, UNDECIDED
 from dbvfiv.studies.transient.run import Runner, assess, beyond_model, lip_gap, parting
+from dbvfiv.studies.transient.study import stability_of
 from tests.small_valves import SMALL
 
 from .runs import SHORT, transient
@@ -127,6 +129,28 @@ def test_a_hold_is_judged_from_its_begin():
     assert Drive((0.0, 0.1, 1.0), (6e3, 6e3, 0.0)).settled_at == 1.0
     assert Drive((0.0, 0.1, 1.0), (0.0, 6e3, 0.0)).settled_at == 1.0
     assert Drive((0.5,), (6e3,)).settled_at == Drive((0.5, 1.0), (6e3, 6e3)).settled_at == 0.0
+
+
+@pytest.mark.parametrize("until, decided", [(0.5, True), (2.0, True), (2.001, False)])
+def test_nothing_is_certain_before_the_drive_holds(valve, until, decided):
+    """A run that ends before the last change of a table is not steady because nothing has changed so far."""
+    history = made_history(model := valve(), 5.0)
+    end = float(history["time"][-1])
+    found = assess(history, model, drive=Drive((0.0, 0.25 * end * until, 0.5 * end * until), (6e3, 6e3, 7e3)))
+    assert found.name == "steady" and found.decided == decided
+    assert decided or "The drive changes until" in found.summary()["reason"]
+
+
+def test_a_kick_says_what_became_of_it_where_that_is_certain(valve):
+    """A steady state is that of one pressure."""
+    told = {"verdict": "growing", "reason": "It drifts one way.", "decided": False}
+    assert stability_of(told).outcome == UNDECIDED and not stability_of(told).certain
+    assert stability_of(told | {"decided": True}).outcome == DIVERGES
+    rings = {"decided": True, "lip_displacement": {"frequency": 20.0}}
+    assert stability_of(told | rings).outcome == FLUTTERS and stability_of(told | rings).certain
+    kicked = {"transient.start": "kick", "transient.ramp": 5e-3, "transient.duration": 8e-3}
+    found = transient(valve(kicked | {"drive.pressure": 6e3})).stability
+    assert found.outcome == UNDECIDED and "the drive changes until 0.005 s" in found.sentence("")
 
 
 def test_drives(tmp_path, valve):
@@ -303,6 +327,9 @@ def test_impossible_starts(tmp_path, valve):
     other = type(valve())(case.replace({"mesh.around": 4}))
     with pytest.raises(CaseError, match="mesh of 63 nodes and this case's has 45"):
         Runner(other).start()
+    longer = type(valve())(case.replace({"valve.scale": 1.2}))
+    with pytest.raises(CaseError, match="another valve, whose nodes lie up to 115 mm from those of this case"):
+        Runner(longer).start()
     with pytest.raises(CaseError, match="no state 77"):
         Runner(type(valve())(case.replace({"transient.start_state": 77}))).start()
 
