@@ -57,18 +57,21 @@ def leading_band(found, aim, options) -> tuple[float, float]:
         return (growth[min(aim, growth.size) - 1] if growth.size else -np.inf), band
     if not values.size:
         return -np.inf, np.inf
+    least = 2 * np.pi * options.covered
     if not found.everything:
-        covered = _widest_covered(found, aim)
+        covered = _widest_covered(found, aim, least)
         if covered is not None:
             return covered
     order = np.argsort(-values.real)[:aim]
-    return float(values.real[order].min()), float(values.imag[order].max())
+    return float(values.real[order].min()), max(float(values.imag[order].max()), least)
 
 
-def _widest_covered(found, aim) -> tuple[float, float] | None:
-    """The widest band whose leading modes the region covers, with the growth rate of the last."""
+def _widest_covered(found, aim, least) -> tuple[float, float] | None:
+    """The widest band, no narrower than the least, rad/s, whose leading modes the region covers, with the growth rate
+    of the last.
+    """
     region = found.region
-    tops = np.unique(found.eigenvalues.imag)[::-1]
+    tops = np.unique(np.maximum(found.eigenvalues.imag, least))[::-1]
     for band in tops[:: max(1, tops.size // 60)]:
         growth = np.sort(found.eigenvalues.real[found.eigenvalues.imag <= band])[::-1]
         if growth.size < aim:

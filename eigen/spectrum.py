@@ -52,6 +52,8 @@ class SearchOptions:
         searched does not depend on small differences in the number asked for.
     max_shifts : int
         Automatic shifts at most.
+    covered : float
+        Hz, up to which a list without a band is complete at least; beside a limit point, as far as that leaves.
     resolved : float
         Hz, up to which the pencil stands for what it is made of, such as the waves of a line of elements; eigenvalues
         above it say nothing and are not counted.
@@ -70,6 +72,7 @@ class SearchOptions:
     dense_below: int = 240
     least: int = 6
     max_shifts: int = 4
+    covered: float = 0.0
     resolved: float = math.inf
     lowest: float | None = None
     inside: float = 0.999

@@ -188,7 +188,8 @@ def _select(options: SearchOptions, mu: Mu, structural_frequencies, count: int) 
     highest = float(known.max(initial=0.0))
     if limit is not None:
         claimed = ROOM * highest if highest > 0 else np.inf
-        return LeadingSearch(replace(options, limit_point=limit), asked, claimed=claimed)
+        options = replace(options, limit_point=limit, covered=claimed if highest > 0 else 0.0)
+        return LeadingSearch(options, asked, claimed=claimed)
     if not highest > 0:
         return LeadingSearch(options, asked, creeps=creeps)  # nothing oscillates: any band would be arbitrary
     return LeadingSearch(replace(options, max_frequency=ROOM * highest), BandOrigin.STRUCTURE, len(known), creeps)

@@ -22,7 +22,7 @@ def never(_count):
 
 def test_stiffness_damping_orders_the_modes():
     found = select_search(SearchOptions(tolerance=1e-9), Mu(density=10.0, alpha=0.0, beta=0.004), lowest, 3)
-    assert found.options == SearchOptions(tolerance=1e-9, limit_point=-250.0)
+    assert found.options == SearchOptions(tolerance=1e-9, limit_point=-250.0, covered=found.claimed)
     assert found.origin is BandOrigin.NONE and np.isinf(found.band) and found.note is None and found.notes == ()
     assert found.floor == growth_floor(0.004) == pytest.approx(-200.0)
     assert found.claimed == pytest.approx(1.05 * 28.0), "no band is searched, yet verdicts end where models do"

@@ -140,6 +140,8 @@ class OnsetSearch:
         point, mode = self._known.get(key), None
         if point is None:
             point, mode = self._located(crossing)
+            if twin := self._twin(point):  # lists above the band of the verdict may lack a mode at one of the ends
+                return twin
             self._keep(point)
         else:
             self.line.bracket(crossing, self.case.onset.tolerance)  # repeats known samples, which belong to the scan
@@ -155,6 +157,13 @@ class OnsetSearch:
             self._keep(point)
         self.points[key] = point
         return point
+
+    def _twin(self, point: OnsetPoint) -> OnsetPoint | None:
+        """The same onset, located from another growth rate; None where there is none."""
+        value, frequency = ASIDE * abs(point.value), SAME * point.frequency  # no further apart than its two sides
+        alike = (p for p in self.points.values() if p.key != point.key and p.gains == point.gains)
+        near = (p for p in alike if abs(p.value - point.value) <= value)
+        return next((p for p in near if abs(p.frequency - point.frequency) <= frequency), None)
 
     def _keep(self, point: OnsetPoint) -> None:
         self.points[point.key] = point

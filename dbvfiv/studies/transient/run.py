@@ -407,7 +407,7 @@ class Runner:
         return found[-1]["verdict"] if found and found[-1]["decided"] else ""
 
     def _verdicts_to_stop_at(self) -> set[str]:
-        """Those of `stop_when` but the ones at which the run was complete before it was asked to go on."""
+        """Verdicts of `stop_when` but those at which the run was complete before it was asked to go on."""
         asked, last = set(self.options.stop_when), ""
         for note in self.record.log:
             if note["what"] == "verdict":
