@@ -90,6 +90,7 @@ def test_heads_begin_at_none_where_weight_opens_the_valve():
     assert explorer.model.flow.back < 0.0 < explorer.ranges["pressure"][0]
 
 
+@pytest.mark.slow
 def test_confirmed_answers_are_those_of_the_command(explorer):
     valve = dbvfiv.load(None, COARSE | {"damping.model": "rayleigh", "damping.beta": 0.003})
     modes = valve.modes("12 kPa", density=800.0, beta=0.001)
@@ -144,6 +145,7 @@ def test_classes_that_the_case_asks_for_are_confirmed_too(monkeypatch, asked, ou
     assert answer.warnings == ("CR strains.",)
 
 
+@pytest.mark.slow
 def test_an_unstable_mode_far_above_the_list_is_told():
     """At 489 Hz, where the list of leading modes ends at 113 Hz. A band up to 100 Hz is left open, as `modes` says it:
     stable there, and the count finds the flutter.

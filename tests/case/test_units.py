@@ -82,6 +82,7 @@ def test_a_bar_speaks_in_heads():
     assert progress._bar.text == "equilibrium at 1 m, 3 iterations"
 
 
+@pytest.mark.slow
 def test_a_range_of_pressures_makes_a_table_in_their_unit(command_line):
     """Heads go the same way, by the text that was given (test_pressures_are_read_in_the_unit_they_were_given_in)."""
     said = command_line("sweep", *COARSE, "--over", "pressure=0.5 psi:2 psi:2").out.splitlines()

@@ -91,6 +91,7 @@ def test_what_is_seldom_meant_is_noted(command_line, changes, word):
     assert time.process_time() - begin < 3.0
 
 
+@pytest.mark.slow
 def test_a_run_warns_of_what_is_seldom_meant(command_line):
     """Also of a study that solves nothing, beside which it is seen at once."""
     keys = [f"--set={key}" for key in ("mesh.around=6", "mesh.along=8", "drive.kind=uniform", "drive.pressure=100 Pa")]

@@ -124,6 +124,7 @@ def test_files_that_are_no_results(misused, tmp_path, command):
         misused("", command, path)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "kill, status", [(signal.SIGINT, 130), pytest.param(signal.SIGTERM, 143, marks=pytest.mark.slow)]
 )

@@ -200,6 +200,7 @@ def test_file_holds_everything(tmp_path):
     assert one.values == two.values
 
 
+@pytest.mark.slow
 def test_a_killed_run_resumes_from_its_checkpoint(tmp_path):
     """kill -9 in the middle of a step; nothing but the file survives."""
     path = tmp_path / "killed.h5"

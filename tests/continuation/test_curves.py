@@ -70,6 +70,7 @@ def test_generalised_hopf_point():
     assert other.values("nu")[-1] == -1 and np.abs(other.values("mu")).max() < 1e-9
 
 
+@pytest.mark.slow
 def test_the_unit_of_time_does_not_matter_to_a_hopf_curve():
     plain, options = brusselator(), ContinuationOptions(limits={"A": (0.5, 2.0)})
     lengths = []

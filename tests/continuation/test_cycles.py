@@ -133,6 +133,7 @@ def test_forced_duffing_against_integration():
     assert np.isclose(np.abs(np.angle(found[0])), np.abs(np.angle(multipliers[0])), rtol=1e-5)
 
 
+@pytest.mark.slow
 def test_folds_of_the_forced_duffing():
     """Both turning points of the resonance of a hardening spring, against one harmonic's algebra, which is exact for
     small forcing.
@@ -276,6 +277,7 @@ def test_a_fold_between_the_origin_and_the_first_cycles():
     assert np.allclose([p.value for p in again.points], [p.value for p in tracer.points], rtol=0, atol=1e-9)
 
 
+@pytest.mark.slow
 def test_a_restored_branch_tells_what_its_last_step_met():
     """w' = mu w - w^3 + mu |z|^2 w beside a cycle of z: the exponent of w, 2 mu, passes zero at mu = 0."""
 

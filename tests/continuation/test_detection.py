@@ -234,6 +234,7 @@ def test_missing_second_derivative_leaves_the_point_bracketed_with_the_reason():
     assert abs(special.mu["B"] - 2.0) < 0.5
 
 
+@pytest.mark.slow
 def test_only_products_and_solves_are_used():
     """Branch, Hopf points and normal form of a system that never shows a matrix."""
     points = 15

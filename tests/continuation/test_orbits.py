@@ -82,6 +82,7 @@ def test_multiple_exponents_count_as_often_as_they_are():
     assert np.allclose(exponents, [0.0, -2.0, -2.0], atol=1e-7)
 
 
+@pytest.mark.slow
 def test_a_slow_modulation_is_no_real_multiplier():
     """A pair mu + 5e-4 i beside a cycle of frequency 1."""
 
@@ -121,6 +122,7 @@ def test_linearisation_by_differences():
     assert np.allclose(linear.lift(motion.harmonics.project(rates)), difference, rtol=1e-6, atol=1e-7)
 
 
+@pytest.mark.slow
 def test_series_grow_for_relaxation_oscillations():
     """The period of van der Pol's oscillator at mu = 3 by integration; harmonics are added as they are needed."""
     system, orbit = van_der_pol(), find_orbit(van_der_pol(), 2 * CIRCLE * [1, -1], 2 * np.pi, {"mu": 1.0})
@@ -246,6 +248,7 @@ def test_orbits_towards_a_homoclinic_one_have_no_false_bifurcations():
     assert abs(branch.values()[-1] - 13.926) < 1e-2 and "harmonics are too few" in branch.reason
 
 
+@pytest.mark.slow
 def test_fold_of_cycles_of_the_bautin_system(tmp_path, bautin_hopf, bautin_cycles):
     system, branch = bautin(), bautin_cycles
     assert bautin_hopf.values["criticality"] == "sub"
@@ -297,6 +300,7 @@ def test_period_doubling_of_a_twisted_band():
     assert branch.unstable[0] == 0 and branch.unstable[-1] == 1
 
 
+@pytest.mark.slow
 def test_a_branch_whose_series_grow(tmp_path):
     """Van der Pol's oscillator from mu = 0.5 to 1, periods to the printed digits, checkpoints on the way."""
     system = van_der_pol()
@@ -331,6 +335,7 @@ def test_a_branch_stops_where_it_is_asked_to():
     assert branch.reason == "stopped at: fold of cycles" and branch.special[-1].index >= len(branch) - 3
 
 
+@pytest.mark.slow
 def test_an_orbit_of_a_discretised_equation_takes_few_sparse_factorisations(monkeypatch):
     """The Brusselator with diffusion, 20 unknowns: at most three for an orbit, the one of its exponents among them."""
     from continuation import linear

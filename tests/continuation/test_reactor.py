@@ -60,6 +60,7 @@ def test_branches_meet_their_folds_hopf_points_and_limits(seeds):
         _branch_is_right(seed)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", [9, pytest.param(2, marks=pytest.mark.slow)])
 def test_orbits_of_the_reactor_have_the_mean_divergence_for_exponent(seed):
     """Liouville: the exponent of a planar orbit is the mean of the trace along it; towards homoclinic orbits too."""

@@ -55,6 +55,7 @@ def test_condensed_and_dense_find_the_same_hopf_point():
     assert np.isclose(one.values["c1_real"], two.values["c1_real"], rtol=1e-6)
 
 
+@pytest.mark.slow
 def test_seven_thousand_unknowns_without_a_dense_matrix():
     """Also keeps memory in check: a dense matrix of this size would take 0.4 GB."""
     chain = CoupledChain(3500)

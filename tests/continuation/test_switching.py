@@ -54,6 +54,7 @@ def test_a_branch_far_from_the_unit_of_the_first():
         assert abs(branch.values()[-1]) == 1.0
 
 
+@pytest.mark.slow
 def test_points_on_both_sides_of_the_buckled_column_tree():
     """Euler's elastica, discrete: buckling at the closed-form loads, switch to the first."""
     n = 6

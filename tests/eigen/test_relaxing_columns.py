@@ -262,6 +262,7 @@ def test_slow_divergence_is_found_and_counted():
     assert reduced.count(condition).number == 1
 
 
+@pytest.mark.slow
 def test_columns_without_any_mode():
     """In a band below all of them nothing is listed, and what is unstable beyond it is still counted."""
 

@@ -136,6 +136,7 @@ def test_a_branch_whose_time_vanishes_is_stiffness_damping():
     assert edge_of(fast.relaxation) == pytest.approx(-0.8 / beta, rel=1e-6)
 
 
+@pytest.mark.slow
 def test_creep_is_no_mode_but_divergence_is():
     stiffness = np.diag(np.linspace(1.0, 60.0, 80) ** 2)
     relaxation = Relaxation([stiffness], [[0.3, 0.2]], [1.0, 0.05])

@@ -42,6 +42,7 @@ def test_plate_over_four_decades_of_density_against_dense(storage, density):
     assert np.abs(modes.eigenvalues - expected).max() < 1e-6 * np.abs(expected).max()
 
 
+@pytest.mark.slow
 def test_the_leading_modes_depend_neither_on_the_number_nor_on_the_shift(plate):
     few = leading_modes(plate, 4, SearchOptions(max_frequency=40.0))
     for options, count in (
@@ -68,6 +69,7 @@ def test_the_region_holds_what_it_claims(plate):
         assert np.abs(modes.eigenvalues - value).min() < 1e-7 * abs(value)
 
 
+@pytest.mark.slow
 def test_several_shifts_give_no_duplicates(plate):
     modes = leading_modes(plate, 4, SearchOptions(shifts=(200.0, 60 + 100j, 60 + 180j)))
     gaps = np.abs(modes.eigenvalues[:, None] - modes.eigenvalues) + 1e9 * np.eye(len(modes))

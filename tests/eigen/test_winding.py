@@ -78,6 +78,7 @@ def test_lines_beside_the_axis(line, relaxing):
             unstable_count(pencil, line=-0.2)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("storage, density", [(False, 10.0), (True, 1000.0)])
 def test_certificate_where_the_stiffness_relaxes(storage, density):
     elastic, stiffness = plate_over_channel(5, 8, beta=0.0, storage=storage, density=density, with_parts=True)

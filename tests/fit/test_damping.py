@@ -233,6 +233,7 @@ TITLE = st.sampled_from(
 )
 
 
+@pytest.mark.slow
 @settings(max_examples=20)
 @given(
     titles=st.lists(TITLE | st.text(max_size=8), max_size=4),

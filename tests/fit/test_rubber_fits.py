@@ -138,6 +138,7 @@ def test_planar_tension_alone_cannot_tell_c10_from_c01(treloar):
         fit_rubber(treloar[1:2], form_of("mooney-rivlin", 2))
 
 
+@pytest.mark.slow
 def test_treloar_residuals_are_no_greater_than_the_reference_ones(treloar):
     """Three terms of Ogden (1972) for the same tests: 6.3, 0.012, -0.1 kgf/cm2 with 1.3, 5, -2."""
     published = np.array([6.3, 0.012, -0.1]) * 0.0980665e6
@@ -220,6 +221,7 @@ def test_stable_and_non_negative_ogden():
     assert stable.rms <= positive.rms * (1 + 1e-6)
 
 
+@pytest.mark.slow
 def test_the_best_form_for_a_wall_is_told_and_its_table_can_be_pasted(treloar):
     report = describe_fits(read_tests(TRELOAR), constraint="stable")
     assert report.chosen.form.name == "softening"

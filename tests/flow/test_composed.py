@@ -97,6 +97,7 @@ def test_steady_flow():
         assert np.abs(slope @ way - expected).max() < 1e-6 * np.abs(expected).max()
 
 
+@pytest.mark.slow
 def test_a_pump_and_pipes_carry_the_mass_flow_of_a_gas():
     """At the density around the jet, as the steady states that operating points are found with: a pump that has the
     supply's pressure at that flow leaves the flow as it is, and an elastic line loses what its rigid column does.
@@ -119,6 +120,7 @@ def test_a_pump_and_pipes_carry_the_mass_flow_of_a_gas():
             assert (np.abs(rest).max() < 1e-9 * SUPPLY) == still
 
 
+@pytest.mark.slow
 def test_jacobians_of_everything_together():
     z, area = passage()
     law, rng = everything(z), np.random.default_rng(4)
@@ -133,6 +135,7 @@ def test_jacobians_of_everything_together():
         assert np.abs(slope - (ahead - back) / (2 * d)).max() < 1e-6 * np.abs(slope).max()
 
 
+@pytest.mark.slow
 def test_steps_of_everything_together():
     """Slopes against differences; books that close to rounding with any step, and steps that take the less the shorter
     they are. The gas takes in what the line hands over, but for what a pipe behind gives back.

@@ -87,6 +87,7 @@ def valve_like(viscosity: float = 3e-3, **others) -> tuple[Channel, np.ndarray]:
     return Channel(z, FLOOR, terms=(GapFriction(viscosity),), perimeter=np.full(len(z), 0.2), **others), area
 
 
+@pytest.mark.slow
 def test_derivatives_of_the_steady_flow():
     law, area = valve_like(3.0, density=850.0)
     direction = area * np.random.default_rng(2).standard_normal(len(area))

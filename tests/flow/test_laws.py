@@ -28,6 +28,7 @@ class Searched(Channel):
     steady = solve_steady
 
 
+@pytest.mark.slow
 def test_closed_form_of_the_channel_is_the_root_of_its_equations():
     """Pressures, velocity and their derivatives up to the third by Newton's method on the definition alone."""
     z, area = passage()
@@ -53,6 +54,7 @@ def test_closed_form_of_the_channel_is_the_root_of_its_equations():
     assert searched.steady_pressure(nearly_shut, 1.0) == pytest.approx(channel.steady_pressure(nearly_shut, 1.0))
 
 
+@pytest.mark.slow
 def test_steady_flow_through_a_vessel():
     _, area = passage()
     law = vessel()

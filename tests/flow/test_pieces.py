@@ -26,6 +26,7 @@ def in_series(*parts: Line, speeds, elements=None) -> ElasticLine:
     return ElasticLine(PiecedLine(parts), speeds, elements)
 
 
+@pytest.mark.slow
 def test_a_pipe_in_pieces_is_the_pipe():
     """Any motion of the fluid asks for the same, in pipes that are longer than their own length too; steady flow."""
     keys, rng = {"diameter": 0.2, "friction": 0.02, "reservoir": False}, np.random.default_rng(1)
@@ -45,6 +46,7 @@ def test_a_pipe_in_pieces_is_the_pipe():
     assert behind(pipes[1]).resolved({}) == behind(pipes[0]).resolved({})
 
 
+@pytest.mark.slow
 def test_rigid_pieces_add_inertance_and_losses():
     term = PiecedLine([Line(3.0, 0.2, friction=0.03, loss=0.5), Line(2.0, 0.1, loss=1.0), Line(1.0, roughness=1e-4)])
     z, area = passage()
@@ -88,6 +90,7 @@ def test_organ_pipes_of_two_sections():
     assert found[:6] == pytest.approx(roots(dispersion, 6, 3000.0), rel=1e-8)
 
 
+@pytest.mark.slow
 def test_a_rigid_piece_at_an_end_is_its_inertance():
     """At the far end it hangs between the reservoir and the waves, at the flange between them and the valve."""
     length, speed, d = 10.0, 500.0, 0.2
@@ -127,6 +130,7 @@ def test_a_blow_at_a_change_of_section():
     assert passed == pytest.approx(2 * z1 / (z1 + z2) * blow, rel=0.01)
 
 
+@pytest.mark.slow
 def test_what_a_step_solves_is_the_law():
     """The books hold what becomes of the energy, and a steady flow meets the law too."""
     _, area = passage()

@@ -79,6 +79,7 @@ def plug_on_a_beam(velocity, mass_ratio, elements=60):
     return CoupledPencil((1 - mass_ratio) * b.mass, 0 * b.mass, b.bending, J.T.tocsr(), J, **parts)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("mass_ratio, velocity, omega", [(0.1, 4.7499, 14.2171), (0.2, 5.5914, 13.7147)])
 def test_a_cantilevered_pipe_flutters(mass_ratio, velocity, omega):
     """Critical velocities of the Galerkin series; linear w between stations leaves an error of second order."""
@@ -130,6 +131,7 @@ def slowest(pencil, band):
     return found[np.argmin(np.abs(found))]
 
 
+@pytest.mark.slow
 def test_a_tube_conveys_fluid_as_a_beam_does():
     """Lowest mode of a slender tube of shell elements: mass of the fluid at rest, damping and frequency of the flow,
     in both directions of sway.

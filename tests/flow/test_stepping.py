@@ -66,6 +66,7 @@ def test_steady_flow_of_a_long_step_is_that_of_the_law(terms):
     assert flow.pressure == pytest.approx(fluid.law.steady_pressure(area, INLET), rel=1e-7, abs=1e-5)
 
 
+@pytest.mark.slow
 def test_a_state_keeps_its_law_whatever_the_next_inlet_pressure():
     """A flow that is more than a film at its own pressure, and less at the next; a seal took it for a flow for good."""
     z, area = np.linspace(0.0, 0.6, 7), np.array([4e-6, 4e-6, 4e-6, 1e-3, 5e-3, 1e-2, 1.35e-2])

@@ -136,6 +136,7 @@ def test_a_valve_of_one_degree_has_the_roots_of_its_cubic():
         assert np.abs(found - root).min() < 1e-8 * abs(root)
 
 
+@pytest.mark.slow
 def test_time_steps_work_against_the_pressure_downstream():
     z, area = passage()
     rate = 1e-4 * np.ones(len(z))

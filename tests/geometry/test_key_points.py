@@ -78,6 +78,7 @@ def test_the_command_says_which_keys_give_the_valve_back(tmp_path, command_line)
     assert two.rest_area - two.wall_deduction == pytest.approx(one.rest_area - one.wall_deduction, rel=1e-8)
 
 
+@pytest.mark.slow
 def test_a_wide_bill_by_points_and_by_parameters_is_one_valve(tmp_path):
     """Flow, opening and modes of a bill 1.86 times as wide as its pipe agree to 1e-10."""
     case = thesis_case(WIDE | {"mesh.around": 8, "steady.tolerance": 1e-12})

@@ -155,6 +155,7 @@ def given_valve(path):
     return Case().replace({"valve.key_points": str(path)}).valve
 
 
+@pytest.mark.slow
 def test_key_points_reproduce_the_parametric_surface(tmp_path):
     """Key points sampled from the parametric surface give it back, the lip's tight side edge as well as fifteen points
     allow.

@@ -67,6 +67,7 @@ def test_compiled_stress_and_tangent_are_those_of_the_energy(law):
         assert np.abs(found - stress).max() < 1e-12 * max(np.abs(stress).max(), scale)
 
 
+@pytest.mark.slow
 def test_derivatives_to_the_fourth_are_those_of_mooney_and_rivlin_where_both_are_one():
     """W = C10 (I1 - 3) + C01 (I2 - 3) is Ogden's with alpha 2 and -2; also at rest, where the stretches are equal."""
     polynomial = MooneyRivlin(4e5, 1e5, 0.0, 1000.0)
@@ -135,6 +136,7 @@ def pair():
     ]
 
 
+@pytest.mark.slow
 def test_a_valve_of_one_term_stands_as_the_neo_hookean_one(pair):
     known, found = (valve.steady(pressure=18e3) for valve in pair)
     assert found.mass_flow == pytest.approx(known.mass_flow, rel=1e-11)

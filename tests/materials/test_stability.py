@@ -225,6 +225,7 @@ def _states(reach):
     return np.stack([(c[:, 0, 0] - 1) / 2, (c[:, 1, 1] - 1) / 2, c[:, 0, 1], c[:, 0, 2], c[:, 1, 2]], axis=-1)
 
 
+@pytest.mark.slow
 @settings(max_examples=20)
 @given(st.floats(0.0, 1.0), st.floats(-8.0, 2.0), st.floats(0.0, 1e3), st.floats(0.0, 1e3))
 def test_softening_rubber_is_stable_whatever_its_constants(mu_inf, log_knee, c, c_3):

@@ -146,6 +146,7 @@ def test_force_is_the_derivative_of_the_energy(model, pressed_state):
     assert model.contact_force(q) @ direction == pytest.approx(slope, rel=1e-7)
 
 
+@pytest.mark.slow
 def test_higher_derivatives_against_differences(model, pressed_state):
     q = pressed_state
     a, b, c = (_direction(model, seed) for seed in (4, 5, 6))

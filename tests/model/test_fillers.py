@@ -27,6 +27,7 @@ def random_state(model: ValveModel) -> np.ndarray:
     return 2e-4 * np.random.default_rng(3).standard_normal(model.size)
 
 
+@pytest.mark.slow
 def test_each_part_is_the_wall_of_its_layers():
     """A valve with a filler on its inlet half has there the elements of one wall and before it those of the other."""
     breaks = {"mesh.breaks": [0.35]}
@@ -41,6 +42,7 @@ def test_each_part_is_the_wall_of_its_layers():
     assert energies[0][~behind] == pytest.approx(energies[2][~behind], rel=1e-12)
 
 
+@pytest.mark.slow
 def test_compiled_loops_follow_the_energy():
     """Force of a mixed wall against automatic differentiation, its tangent against differences; at rest the parts of
     the rubbers that relax are all of it.

@@ -75,6 +75,7 @@ def test_modes_satisfy_the_equations_of_motion(settled):
     assert half_rest == pytest.approx(rest / 4, rel=0.1)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("settled", ["terms"], indirect=True)
 def test_a_small_push_along_a_mode_follows_it_in_time(settled):
     """Growth and frequency of the leading oscillating mode, from half a period of time steps: to the square of the step

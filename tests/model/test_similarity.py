@@ -16,6 +16,7 @@ MESH |= {"fluid.continuity": "storage"}
 TWICE = {"valve.scale": 2, "supports.lip_stop_stiffness": 2e8, "damping.alpha": 2.0, "damping.beta": 4e-3}
 
 
+@pytest.mark.slow
 def test_twice_the_size_is_half_the_frequency():
     one = dbvfiv.load(thesis_case(), MESH).steady(pressure=6e3)
     two = dbvfiv.load(thesis_case(), MESH | TWICE).steady(pressure=6e3)

@@ -70,6 +70,7 @@ def test_fluid_behind_a_seal_has_the_inlet_pressure_at_rest(sealed, inlet, veloc
     assert steady_fluid(motion, np.zeros(2), inlet, velocity) == found
 
 
+@pytest.mark.slow
 def test_compression_moves_the_spectrum_by_little(valve):
     """Air at 2 kPa: growth of the leading mode +0.03 1/s of 143, frequency +0.05 Hz of 27.1 on this mesh."""
     plain, gas = (leading(valve(AIR | more), 2e3)[1] for more in ({}, SOUND))
@@ -77,6 +78,7 @@ def test_compression_moves_the_spectrum_by_little(valve):
     assert gas.imag - plain.imag == pytest.approx(0.307, abs=0.05)
 
 
+@pytest.mark.slow
 def test_a_kick_grows_as_the_eigenvalue_says(valve):
     """By exp(lambda t), with an error of the second order in the step."""
     model, duration = valve(AIR | SOUND), 4e-3

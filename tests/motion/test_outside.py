@@ -37,6 +37,7 @@ def run(changes):
     return Runner(model, RunOptions.of(model.case)).start()
 
 
+@pytest.mark.slow
 def test_energies_balance_on_a_smooth_run():
     found = run({"transient.kick_opening": 1e-4, "transient.step": 1e-4, "transient.duration": 0.02})
     h = found.history
@@ -46,6 +47,7 @@ def test_energies_balance_on_a_smooth_run():
     assert not np.any(h["outside_renewed"])
 
 
+@pytest.mark.slow
 def test_renewals_are_in_the_books():
     """A wall that opens from rest: the balance is the scheme's alone, and what renewals change is small and known."""
     found = run({"transient.start": "rest", "transient.step": 5e-4, "transient.duration": 0.06})

@@ -57,6 +57,7 @@ def test_order_of_accuracy(valve, open_state, law, name, nd, order):
     assert np.log2(first.max() / second.max()) > order - 0.35
 
 
+@pytest.mark.slow
 def test_work_and_damping_account_for_the_energy(valve):
     motion = ValveMotion(valve({"fluid.density": 300.0}))
     rest = np.zeros(motion.size)
@@ -70,6 +71,7 @@ def test_work_and_damping_account_for_the_energy(valve):
     assert defects[0] < 5e-3 and defects[1] < 0.5 * defects[0]
 
 
+@pytest.mark.slow
 def test_a_free_swing_keeps_its_energy(valve, open_state):
     start = steady_positions(valve(), 2e3)
     free = {"drive.kind": "uniform", "drive.pressure": 0.0, "supports.lip_stop": False}

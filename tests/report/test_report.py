@@ -73,6 +73,7 @@ def text_of(page):
     return " ".join(html.unescape(re.sub(r"<[^>]+>", " ", body)).split())
 
 
+@pytest.mark.slow
 def test_verdicts_are_those_of_modes(made):
     found, _ = made
     assert list(found.modes) == [2e3, 6e3]

@@ -76,6 +76,7 @@ def test_a_valve_can_be_copied_and_says_what_it_is(valve):
     assert repr(valve) == "<Valve 'dbv12': 6 x 8 elements, 5 layers, 2 kPa, 10 kg/m3>"
 
 
+@pytest.mark.slow
 def test_arrays_and_single_texts(valve):
     found = valve.steady(np.linspace(1e3, 2e3, 3))
     assert [state.pressure for state in found.states] == [1000, 1500, 2000] and found.nearest(1600).pressure == 1500

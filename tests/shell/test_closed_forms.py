@@ -187,6 +187,7 @@ def test_patch(name):
         assert np.linalg.norm(strains[..., 3:], axis=-1) == pytest.approx(1e-7 * np.sqrt(5), rel=1e-6)
 
 
+@pytest.mark.slow
 def test_energy_is_the_work_of_the_loads():
     """Along a path of equilibria the work of the loads is the stored energy; the trapezoidal rule misses by the square
     of the step.

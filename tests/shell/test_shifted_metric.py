@@ -80,6 +80,7 @@ def test_a_ring_that_swells():
     assert abs(energies["first-order"] / wanted - 1.0) > 0.03
 
 
+@pytest.mark.slow
 def test_rigid_motions_and_derivatives(cylinder_mesh, one_layer):
     shell = Shell(cylinder_mesh, one_layer, metric="shifted")
     q = shell.dofs.restrict(rigid_motion(cylinder_mesh, rotation_about((1, 1, 0.2), 2.0)))

@@ -67,6 +67,7 @@ def test_amplitude_is_the_root_of_the_distance_from_the_onset(found):
     assert first.stable and found.points[-1].stable
 
 
+@pytest.mark.slow
 def test_cycles_are_those_of_runs_in_time(found):
     """Steps come back to where they started but for their error of second order."""
     point = found.points[-1]
@@ -96,6 +97,7 @@ def test_a_record_is_the_cycle_of_its_frequency(found, file, tmp_path, command_l
     assert ring["says"] == "It is damped, and nothing that was computed is."
 
 
+@pytest.mark.slow
 def test_a_record_is_the_run_that_it_is(tmp_path, command_line):
     kick = {"start": "kick", "step": 2e-3, "duration": 0.8}
     session = session_of(damping__alpha=10.0, fluid__density=1000.0)

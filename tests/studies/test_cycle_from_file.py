@@ -179,6 +179,7 @@ def test_a_series_without_its_cycle_is_cut(file):
     assert study.rows_to_keep(record, result.case) == {study.CYCLES: 1, study.SERIES: 5}
 
 
+@pytest.mark.slow
 def test_over_another_parameter(file):
     """From the nearest cycle of a branch over the density to one over the pressure."""
     (there,) = (p for p in load_result(file).points if p.value == 230.0)

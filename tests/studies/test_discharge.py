@@ -176,6 +176,7 @@ def runs(tmp_path_factory):
     return kept
 
 
+@pytest.mark.slow
 def test_steady_runs_side_by_side(runs, command_line, tmp_path):
     figure = tmp_path / "beside.png"
     document = json.loads(command_line("compare", *runs, "-o", figure, "--json").out)

@@ -46,6 +46,7 @@ def test_heads_along_the_pipe():
     assert found.discharge_coefficient == pytest.approx(found.loss_coefficient**-0.5, rel=1e-12)
 
 
+@pytest.mark.slow
 def test_a_pressure_downstream_shifts_the_drive():
     free, held = load_small(LIGHT), load_small(LIGHT, {"downstream.pressure": "4 kPa"})
     one, other = free.steady(pressure="6 kPa"), held.steady(pressure="10 kPa")

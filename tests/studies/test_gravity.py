@@ -179,6 +179,7 @@ def test_each_density_has_a_model_of_its_levels(monkeypatch):
     assert taken == [redesigned(case, there.only("density", "thickness"))]
 
 
+@pytest.mark.slow
 def test_a_steady_state_of_another_density_is_a_periodic_motion():
     model, light = load_small(DOWN).model, load_small(DOWN, {"fluid.density": 300.0})
     mu = Mu.of(light.case).for_system()

@@ -88,6 +88,7 @@ def levels_of(result):
     return result.case.materials.levels(("CR", "SBR", "EPDM"))
 
 
+@pytest.mark.slow
 def test_auto_settles_once_at_the_largest_pressure_of_the_case(found):
     """On 14 x 24 elements, whatever the mesh: CR 18.5 % at 36 kPa where 8 x 14 elements give 17.9 %."""
     valve = dbvfiv.load(thesis_case(), AUTO | {"drive.pressure": 36e3})
@@ -105,6 +106,7 @@ def test_auto_settles_once_at_the_largest_pressure_of_the_case(found):
     assert given.mass_flow == pytest.approx(state.mass_flow, rel=1e-9)
 
 
+@pytest.mark.slow
 def test_a_state_beyond_the_settled_levels_is_told():
     """Settled at 6 kPa, asked at 36 kPa, where CR strains by some 16 to 18 %."""
     valve = dbvfiv.load(thesis_case(), AUTO | {"drive.pressure": 6e3})
@@ -154,6 +156,7 @@ def test_a_closed_valve_strains_its_rubbers():
     assert settled.where == "1 kPa and 28 kPa from outside"
 
 
+@pytest.mark.slow
 def test_a_closed_valve_has_no_weight_where_its_levels_are_settled():
     """As in the closure study; peaks of a hanging valve in water were 1 to 2 % off."""
     peaks = []

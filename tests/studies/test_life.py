@@ -143,6 +143,7 @@ def test_interlaminar_shear_of_a_sheared_strip():
     assert np.allclose(interlaminar_shear(shell, shell.dofs.restrict(nodal)), 1.5 * 5 / 6 * 1e6 * 1e-4, rtol=1e-3)
 
 
+@pytest.mark.slow
 def test_bonds_are_where_the_layers_meet():
     """A ply that ends half way, with a cloth outside it: each bond of the rubber lasts where it is not."""
     ply, patch = (

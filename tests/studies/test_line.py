@@ -62,6 +62,7 @@ def test_printed_pressures_say_where_they_are(command_line):
     assert "reservoir" not in out and "line loss" not in out
 
 
+@pytest.mark.slow
 def test_verdicts_name_the_continuity_law(command_line):
     options = settings(SMALL | LIGHT | LINE)
     for law in ("quasi-steady", "storage"):
@@ -76,6 +77,7 @@ def test_modes_over_the_length_are_those_of_each_length(name):
     check_sweep((CASES[name],), f"{name}=1:50:5:log", KEYS[name])
 
 
+@pytest.mark.slow
 def test_friction_moves_the_steady_state_with_the_length():
     moved, kept = (load_small(LIGHT, keys).case for keys in (FRICTION, LINE))
     assert not is_surrounding(moved, "pipe_length") and is_surrounding(kept, "pipe_length")

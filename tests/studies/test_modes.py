@@ -51,6 +51,7 @@ def test_a_light_fluid_flutters_at_a_small_opening(flutter):
     assert (flutter.eigenvalues.real[1:] < 0).all()
 
 
+@pytest.mark.slow
 def test_water_is_damped(model):
     path = LoadPath(model)
     for pressure in (2e3, 6e3, 18e3, 50e3):
@@ -164,6 +165,7 @@ def test_an_unstable_pair_is_proof(model, state):
     assert found.certificate.unstable_count > 0 and found.stable is False
 
 
+@pytest.mark.slow
 def test_the_critical_damping_is_sought_among_factors_that_the_materials_reach():
     """Ten times the factor is beyond the branches; from both sides of the critical one it is the same."""
     keys = {f"materials.{name}.loss_factor": 1.0 for name in ("CR", "SBR", "EPDM")}

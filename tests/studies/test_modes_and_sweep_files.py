@@ -65,6 +65,7 @@ def test_numbers_carry_units(stored):
         )
 
 
+@pytest.mark.slow
 def test_state_and_valve_say_the_same(coarse_valve, modes):
     other = coarse_valve.modes("6 kPa", count=5, **FLUTTER)
     assert [m.growth_rate for m in other.modes] == pytest.approx([m.growth_rate for m in modes.modes], rel=1e-6)
@@ -145,6 +146,7 @@ def test_sweep_comes_back(sweep, stored_sweep):
     assert stored_sweep.case.sweep.over == "density=1:1000:7:log" and stored_sweep.case.damping.alpha == 0
 
 
+@pytest.mark.slow
 def test_crossing_is_where_growth_vanishes(coarse_run, sweep):
     """Interpolated between samples half a decade apart, and better between closer ones."""
     left = []

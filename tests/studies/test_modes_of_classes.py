@@ -25,6 +25,7 @@ def four(coarse_run):
     return coarse_run.states[0].modes(count=3, symmetry="all", **FLUTTER)
 
 
+@pytest.mark.slow
 def test_all_classes_are_listed_by_growth_rate(four, coarse_run):
     assert {mode.symmetry for mode in four.modes} == set(SYMMETRIES)
     growth = [mode.growth_rate for mode in four.modes]

@@ -43,6 +43,7 @@ def test_two_equal_pieces_are_one_pipe(elastic):
     assert swing > 0 and np.abs(second - first).max() < 1e-8 * np.abs(first).max()
 
 
+@pytest.mark.slow
 def test_derivatives_by_the_pieces_add_up_to_those_by_one_pipe():
     one, two = (load_small(STATE, with_waves(keys)) for keys in (ONE, TWO))
     whole = one.sensitivity(["pipe_length", "wave_speed"]).sensitivities

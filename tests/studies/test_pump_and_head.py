@@ -43,6 +43,7 @@ def operating():
     return state
 
 
+@pytest.mark.slow
 def test_the_operating_point_is_where_the_curves_cross(operating):
     """Against a hand calculation: flows over pressure without a pump, by a cubic through states around."""
     curve = PchipInterpolator(*np.array(ROWS).T)
@@ -67,6 +68,7 @@ def test_the_command_line_gives_the_operating_point(command_line, operating, tmp
     assert f"{operating.pressure / 1e3:.6g}" in out
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "waves",
     [{}, pytest.param({"upstream.wave_speed": 1000.0, "mesh.along": 12, "mesh.around": 8}, marks=pytest.mark.slow)],

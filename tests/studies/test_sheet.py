@@ -22,6 +22,7 @@ def rows_of(path):
         return list(csv.DictReader(file))
 
 
+@pytest.mark.slow
 def test_a_sheet_of_two_sizes_in_units_of_choice(command_line, tmp_path):
     path = tmp_path / "catalogue.csv"
     asked = ("-p", "0.2 m", "-p", "1 m", "--scale", "131 mm", "--scale", 1, "--units", "ft, gpm, in")

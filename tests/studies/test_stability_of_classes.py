@@ -31,6 +31,7 @@ def onset():
     return make(onset__symmetry="all", onset__over="density=1:1000:5:log", **plain).onset()
 
 
+@pytest.mark.slow
 def test_onset_names_the_most_unstable_class(onset):
     said = json.loads(json.dumps(onset.summary()))
     assert [part["symmetry"] for part in said["classes"]] == OTHERS
@@ -120,6 +121,7 @@ def test_maps_hold_every_class():
     assert said["classes"][1]["growth_rate"][3][1] == pytest.approx(alone.growth_rate, rel=1e-6)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["SA", "AA"])
 @pytest.mark.parametrize("over", ["density=10:1000:3:log", "pressure=6e3:10e3:2"])
 def test_sweeps_follow_one_class(name, over):

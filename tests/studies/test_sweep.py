@@ -75,6 +75,7 @@ def test_certificate(over_density):
     assert {1.0, 1000.0} <= {round(check["value"], 6) for check in over_density.checks}
 
 
+@pytest.mark.slow
 def test_a_tolerance_beyond_the_reduced_order_model_takes_full_solves(model, state):
     full, reduced = (sweep(model, "alpha=0:10:3", state, **{"sweep.tolerance": t}) for t in (1e-13, 1e-6))
     assert full.certified and reduced.certified
@@ -116,6 +117,7 @@ def test_no_branch_beyond_the_limit_point(model, state):
     assert found.unstable_count[0] == 2 and found.unstable_count[-1] == 0
 
 
+@pytest.mark.slow
 def test_pressure(model):
     found = sweep(model, "pressure=2 kPa:14 kPa:4")
     assert [state["pressure"] for state in found.points] == list(found.axis.values) and found.certified
@@ -214,6 +216,7 @@ def test_what_is_done_is_kept_on_the_way(model, state, over_density, monkeypatch
     assert np.allclose(eigenvalues(whole), eigenvalues(over_density), rtol=1e-9, atol=0.0, equal_nan=True)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "over", [pytest.param("density=5:50:4:log", marks=pytest.mark.slow), "loss_factor=0.5:2:4:log"]
 )

@@ -89,6 +89,7 @@ def test_onset_behind_an_elastic_line():
     check_neutral((BASE,), "fluid.density", point["value"], 1e-5)
 
 
+@pytest.mark.slow
 def test_sensitivity_to_the_wave_speed():
     check_sensitivity((BASE,), "wave_speed", "upstream.wave_speed", 0.6)
 

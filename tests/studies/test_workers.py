@@ -49,6 +49,7 @@ def test_a_number_of_workers_may_be_a_text(kind, monkeypatch):
     assert (ask(workers="2"), ask(workers=None), ask(workers="tcp://host:1")) == (2, None, "tcp://host:1")
 
 
+@pytest.mark.slow
 def test_processes_give_what_one_gives_and_a_killed_one_costs_nothing_but_time():
     killed, said = [], []
 
@@ -121,6 +122,7 @@ def test_a_scheduler_that_does_not_answer_is_said(monkeypatch):
         shared("tcp://127.0.0.1:9")
 
 
+@pytest.mark.slow
 def test_a_server_that_is_no_scheduler_is_said(monkeypatch):
     pytest.importorskip("distributed")
     monkeypatch.setattr(module, "PATIENCE", 1)

@@ -171,6 +171,7 @@ FILLING: dict[str, tuple[str, ...]] = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", [k if k == "steady" else pytest.param(k, marks=pytest.mark.slow) for k in FILLING])
 def test_a_full_disk(small_disk, one_sentence, kind):
     path = small_disk / "r.h5"

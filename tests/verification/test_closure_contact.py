@@ -56,6 +56,7 @@ def _pressed_strip(elements: int, q: float):
     return model, steps.q
 
 
+@pytest.mark.slow
 def test_a_strip_pressed_on_a_plane_lifts_off_where_beam_theory_says():
     q = 10.0
     free, force = _beam(q)
@@ -163,6 +164,7 @@ def _elastica(force: float, radius=0.1, h=1e-3) -> tuple[float, float]:
     return float(quarter_arc(length)(1.0)[2]), quarter - length
 
 
+@pytest.mark.slow
 def test_a_squeezed_ring_follows_the_elastica_before_and_after_it_lies_flat():
     ei, radius = E * (1e-3) ** 3 / 12, 0.1
     forces = np.array([1.0, 6.0]) * ei / radius**2
@@ -178,6 +180,7 @@ def test_a_squeezed_ring_follows_the_elastica_before_and_after_it_lies_flat():
         assert 2 * state.total / WIDTH == pytest.approx(force, rel=tolerance)
 
 
+@pytest.mark.slow
 def test_forces_and_energies_of_a_pressed_strip_balance():
     model = _strip(40)
     ledger = EnergyLedger(model)

@@ -28,6 +28,7 @@ def test_brusselator(a, l1):
     assert point.values["criticality"] == "super"
 
 
+@pytest.mark.slow
 def test_brusselator_hopf_curve():
     """B = 1 + A^2 and omega = A over a range of A; l1 at A = 1 and 2 on the way."""
     hopf = hopf_of(brusselator(), [0.5, 1.0], {"A": 0.5, "B": 0.5}, "B", (0.0, 8.0))
@@ -126,6 +127,7 @@ def test_one_degree_valve():
     assert not opening.special and set(opening.unstable) == {0}
 
 
+@pytest.mark.slow
 def test_pipe_conveying_fluid_along_the_hopf_curve():
     """One curve through all tabulated mass ratios and the S-bend near 0.295 between them."""
     system = pipe(14)

@@ -56,6 +56,7 @@ def test_predator_and_prey():
     assert np.isclose(hopf.values["omega"] ** 2, hopf.u[1], rtol=1e-10)
 
 
+@pytest.mark.slow
 def test_explosion_in_a_cylinder_and_in_a_sphere():
     """Critical values "2 or ca. 3.32" of Frank-Kamenetskii (1938).
 

@@ -45,6 +45,7 @@ def certified(model: ValveModel, conditions: Mu, pencil, basis: TransferBasis):
     return certified_spectrum(pencil, 6, search.options, basis=basis)
 
 
+@pytest.mark.slow
 def test_a_line_of_more_waves_than_a_count_follows_is_counted_in_its_band():
     """Of 110 m and little damping; over all frequencies a thousand points leave the count open."""
     keys = {"mesh.around": 8, "mesh.along": 14, "fluid.density": 360.0, "damping.alpha": 0.0, "damping.beta": 4e-3}

@@ -77,6 +77,7 @@ def test_a_pressed_mass_stays_where_it_is(nd):
     assert found[-1].state.a[0] == pytest.approx(-3.0)  # without the contact's part
 
 
+@pytest.mark.slow
 def test_a_dropped_mass_comes_to_rest():
     """Rebounds of a mass under its weight die out, and what is left does not ring."""
     planes = Planes(np.array([0]), np.zeros(1), ContactLaw(1e5), Rebound(0.5))

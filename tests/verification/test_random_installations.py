@@ -167,6 +167,7 @@ def test_a_short_line_resolves_waves_far_above_the_modes():
         assert modes.verdict.outcome == sample.verdict.outcome and modes.verdict.certain
 
 
+@pytest.mark.slow
 def test_a_wall_with_loss_factors_is_counted_as_far_as_waves_are_resolved():
     keys = {"damping.model": "loss factor", "damping.loss_factor": 1.374, "materials.constants": "stable"}
     keys |= {"fluid.density": 370.6, "drive.pressure": 1853.8, "fluid.continuity": "storage"}

@@ -174,6 +174,7 @@ def away_from(growth_rates: np.ndarray, line: float, least: float = 1e-2, most: 
     return float(above[i] + min(0.5 * gaps[i], most))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("mesh", "number", "pressures"), [((6, 8), 2, 2), pytest.param((8, 14), 100, 12, marks=pytest.mark.slow)]
 )

@@ -54,6 +54,7 @@ def test_every_case_has_a_steady_state(name):
     assert state.converged and state.residual < 1e-7
 
 
+@pytest.mark.slow
 def test_the_wide_bill_from_rest_to_two_metres():
     examine(dbvfiv.load(CASES / "dbv4-wide.toml", SMALL), (0.1, 2.0))
 

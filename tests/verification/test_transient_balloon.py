@@ -38,6 +38,7 @@ def blow_up(shell, load: float, steps: int):
     return float(curve(turns[0])), turns[1] / UNIT
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("load", [2.0, pytest.param(1.0, marks=pytest.mark.slow)])
 def test_balloon(load):
     # the plain element: tied strains of warped elements reach their order on finer meshes than these

@@ -181,6 +181,7 @@ INSTALLED = {
 QUICK = ("short pipe", "pipe behind, storage")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", [n if n in QUICK else pytest.param(n, marks=pytest.mark.slow) for n in INSTALLED])
 def test_three_routes_of_installations(name):
     law, pressure, density, further, *mesh = INSTALLED[name]
@@ -188,6 +189,7 @@ def test_three_routes_of_installations(name):
     check_three_routes(three_routes(law, pressure, density, further=further, **fineness), name)
 
 
+@pytest.mark.slow
 def test_three_routes_with_the_default_mesh():
     """Mass and inertia of the fluid are the same in spectra and in time; they move the eigenvalue by more than these
     differ.
@@ -227,6 +229,7 @@ SOFT_LINE = {
 AIR = {"fluid.density": 1.2, "fluid.sound_speed": 340.0, "upstream.length": 3.0, "upstream.diameter": 0.3}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "law, more, number",
     [

@@ -33,6 +33,7 @@ def two_routes(
     return value, *rung_in_time(valve, abs(value.imag) / (2 * np.pi), steps)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "law, pressure, density, steps",
     [(STORAGE, 6e3, 10.0, (25, 50)), pytest.param(QUASI, 12e3, 1000.0, (50, 100), marks=pytest.mark.slow)],

@@ -108,6 +108,7 @@ def test_a_free_swing_keeps_its_energy_over_10_000_steps():
     assert abs(quarters[-1].mean() - quarters[0].mean()) < 5e-5
 
 
+@pytest.mark.slow
 def test_a_free_swing_with_the_averaged_mass_keeps_its_energy():
     """A swing and more, in which most of the energy turns into motion and back."""
     off, moving = free_swing(400, {"shell.mass": "averaged"})
@@ -123,6 +124,7 @@ def oscillator_start(motion, q: float, v: float):
     return consistent_state(motion, 0.0, np.array([q]), np.array([v]), 0.0)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "mu, period, amplitude", [(0.5, 6.380676, 2.002488), pytest.param(1.0, 6.663287, 2.008620, marks=pytest.mark.slow)]
 )

@@ -37,6 +37,7 @@ def approach(pressure: float, mesh, duration: float, step: float):
     return off, float(rate), valve.modes(count=2).modes[0].growth_rate
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "pressure, mesh, step", [(18e3, (6, 8), 4e-3), pytest.param(36e3, (8, 12), 2e-3, marks=pytest.mark.slow)]
 )

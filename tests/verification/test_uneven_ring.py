@@ -160,6 +160,7 @@ def missed(shell: dict[str, float], solid: dict[str, float]) -> dict[str, float]
     return found
 
 
+@pytest.mark.slow
 def test_cylinder_with_a_thin_strip():
     """Displacements and hoop strains of both faces within 2 %; a shell of even wall misses all of them by far more."""
     solid, ring = solid_ring(Ring(0.01, 0.02, 5e3)), Ring(0.01, 0.02, 5e3)

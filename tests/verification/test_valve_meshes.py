@@ -134,6 +134,7 @@ def test_earlier_meshes_go_to_the_same_onset():
 OTHERS = (13.49, 18.63, 23.96, 30.81, 39.70)
 
 
+@pytest.mark.slow
 def test_isotropic_valve():
     """Five lowest frequencies on 28 x 48 within 0.1 % of those of 112 x 192 (13.50, 18.65, 24.01, 30.83, 39.71), and
     within 0.3 % of those of other codes there (0.06, 0.12, 0.27, 0.15, 0.08); with the consistent mass and rows of

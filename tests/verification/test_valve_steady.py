@@ -38,6 +38,7 @@ def reference(level: str):
     return states(PRESSURES, materials__strain_level=level)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("level", ["10 %", pytest.param("20 %", marks=pytest.mark.slow)])
 def test_discharge(level):
     """Within 2 % of the first model; the 20 % set within 4 % and the 10 % set within 14 % of the published flow."""

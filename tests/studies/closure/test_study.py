@@ -128,6 +128,7 @@ def test_nothing_is_said_of_faces_that_do_not_start_beyond_the_plane(case):
     assert list(thin.start_warnings()) == []
 
 
+@pytest.mark.slow
 def test_the_answer_does_not_depend_on_the_penalty(case, pressed):
     """Three times softer faces carry the same forces."""
     state, reference = reach(case, 7e3, supports__contact_stiffness=3e9), pressed.states[0]
@@ -136,6 +137,7 @@ def test_the_answer_does_not_depend_on_the_penalty(case, pressed):
     assert state.max_displacement == pytest.approx(reference.max_displacement, rel=1e-3)
 
 
+@pytest.mark.slow
 def test_the_answer_does_not_depend_on_the_steps(case, pressed):
     one = reach(case, 28e3, closure__max_step=2.5e3)
     assert one.contact_force == pytest.approx(pressed.states[-1].contact_force, rel=1e-4)
@@ -241,6 +243,7 @@ def test_the_opening_at_rest_is_the_gap_over_the_lips_width():
     assert passage.area[-1] == pytest.approx(0.25 * np.pi * inner**2, rel=0.02)
 
 
+@pytest.mark.slow
 def test_the_first_load_step_stays_on_the_path_from_rest_which_is_stable():
     """At 50 Pa a step from rest ended with the lip curled up by 18 mm, and the walk went on from there."""
     coarse = {"mesh.around": 6, "mesh.along": 10, "closure.max_step": "1 kPa"}

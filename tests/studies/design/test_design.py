@@ -72,6 +72,7 @@ def check_gradients(changes, share, way):
         assert slope @ (widths * way) == pytest.approx(direct, rel=1e-6, abs=1e-6 * size), name
 
 
+@pytest.mark.slow
 def test_gradients_are_those_of_valves_solved_anew():
     """Away from the case itself, for a factor and lengths alike."""
     check_gradients({}, np.array([0.35, 0.55, 0.3]), np.array([0.6, -0.5, 0.8]))

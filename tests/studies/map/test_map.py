@@ -129,6 +129,7 @@ def test_columns_are_put_in_where_onsets_vanish(whole):
     assert numbers != sorted(set(numbers))
 
 
+@pytest.mark.slow
 def test_transposed_map_gives_the_same_cells(case, whole):
     turned = case.replace({"map.x": AXES["map.y"], "map.y": AXES["map.x"], "map.refine": 0, "map.checks": 0})
     other = run_map(turned)
@@ -162,6 +163,7 @@ def test_columns_of_a_bill_that_is_moulded_shut_follow_the_pressure_and_name_sea
     assert any("2500 Pa" in sentence for sentence in found.warnings)
 
 
+@pytest.mark.slow
 def test_both_laws_and_pairs_without_the_load(coarse_case):
     both = run_map(
         coarse_case.replace(
@@ -201,6 +203,7 @@ def test_a_missing_state_is_a_marked_gap(case, monkeypatch):
     assert np.isfinite(result.grid("growth_rate")[0][:, [0, 2]]).all()
 
 
+@pytest.mark.slow
 def test_json_and_figures(command_line, tmp_path):
     options = settings(AXES | {"mesh.around": 8, "mesh.along": 16, "damping.alpha": 0})
     shown = "--json", "--plots", tmp_path / "figures"
@@ -288,6 +291,7 @@ def undamped(coarse_case):
     return run_map(coarse_case.replace(UNDAMPED | axes))
 
 
+@pytest.mark.slow
 def test_a_map_without_damping_finds_what_modes_finds(undamped, coarse_case):
     assert undamped.grid("certified").all()
     for i, pressure in enumerate(undamped.plan.x.values):

@@ -70,6 +70,7 @@ def traced(coarse_case):
     return run_map(coarse_case.replace(axes | {"map.continuity": "both", "damping.beta": 0.001}))
 
 
+@pytest.mark.slow
 def test_curves_are_neutral_by_the_full_pencil(traced, coarse_case):
     walk = StabilityWalk(traced.plan.case)
     assert len(traced.curves) >= 2 and all(curve.exact and curve.mismatch < 1e-6 for curve in traced.curves)
@@ -104,6 +105,7 @@ def test_columns_put_in_certify_what_onsets_lie_between_and_nothing_else(traced)
             assert (np.delete(counted, certified) == -1).all()
 
 
+@pytest.mark.slow
 def test_a_column_is_put_in_under_the_law_that_asks_for_it(coarse_case):
     """Under the quasi-steady law no curve needs more than the grid where the other one has a tip."""
     axes = {"map.x": "pressure=6000:30000:4", "map.y": "density=1:1000:8:log", "map.checks": 0}

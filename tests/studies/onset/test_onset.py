@@ -44,6 +44,7 @@ def test_the_onset_is_neutral_and_confirmed_on_both_sides(over_density):
     assert [side.unstable_count for side in sides] == [2, 0] == [side.unstable_count_independent for side in sides]
 
 
+@pytest.mark.slow
 def test_onset_over_pressure_meets_onset_over_density(over_density, coarse_case):
     (point,) = over_density.points
     case = coarse_case.replace({"fluid.density": point.value})

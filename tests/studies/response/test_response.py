@@ -53,6 +53,7 @@ def valve(request):
     return SimpleNamespace(case=case, transfer=transfer_of(case))
 
 
+@pytest.mark.slow
 def test_a_lip_that_stops_hold_answers_as_exactly_as_the_rest():
     """It moves by a millionth of the wall."""
     patch = [{"begin": "0 mm", "end": "60 mm", "thickness": "2.1 mm"}]
@@ -184,6 +185,7 @@ def test_noise_in_time_has_the_root_mean_square(valve, tmp_path):
         assert rms == pytest.approx(expected[number], rel=0.05)
 
 
+@pytest.mark.slow
 def test_the_reduced_operator_is_the_full_one():
     transfer = transfer_of(
         load_small(STATES["storage-rayleigh"], {"fluid.density": 1000.0}).case, FREQUENCIES[12:170:4]

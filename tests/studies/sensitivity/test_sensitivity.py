@@ -26,6 +26,7 @@ def found(valve, tmp_path_factory):
     return valve.sensitivity(NAMES, output=tmp_path_factory.mktemp("sensitivity") / "s.h5")
 
 
+@pytest.mark.slow
 def test_the_eigenvalue_is_that_of_modes_and_changes_as_said(valve, found):
     modes = valve.modes(count=2).modes
     assert found.growth_rate == pytest.approx(modes[0].growth_rate, rel=1e-7)

@@ -93,6 +93,7 @@ def test_lengths_move_the_rows_of_the_mesh(valve, name):
     check(valve, name, NEAR_RAYLEIGH, 1e-4)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["loss_factor", "pressure", "density", "thickness", "layer 2 mu_0", "layer 3 angle"])
 def test_derivatives_of_a_wall_that_relaxes(lossy, name):
     """Through the change that the equilibrium makes to what relaxes, too."""
@@ -109,6 +110,7 @@ def test_derivatives_in_water(in_water, name):
     check(in_water, name, NEAR_RAYLEIGH, 3e-5)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("changes", "name"),
     [

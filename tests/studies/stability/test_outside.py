@@ -22,6 +22,7 @@ def walk_of(**keys):
     return case, StabilityWalk(case)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("law", "fluid"),
     [
@@ -49,6 +50,7 @@ def test_columns_over_density_agree_with_full_spectra(law, fluid):
         assert single.growth_rate[0] == pytest.approx(full.growth_rate[0], abs=1e-6)
 
 
+@pytest.mark.slow
 def test_most_cells_need_no_direct_solution():
     """Counts that jump over a mode of the laden structure would all be repaired directly, at many times the cost."""
     case, walk = walk_of(**{"outside.fluid": "same", "fluid.continuity": "storage"})
@@ -101,6 +103,7 @@ def test_an_onset_has_a_kind_and_names_what_is_outside():
     assert found.summary()["fixed"]["outside"] == "with the same fluid outside, unbounded"
 
 
+@pytest.mark.slow
 def test_verdicts_name_what_is_outside():
     changes = MESH | {"outside.fluid": 1000.0, "outside.pipe_diameter": 0.33, "drive.pressure": 6e3}
     found = dbvfiv.load(thesis_case(), changes).modes(count=4)

@@ -44,6 +44,7 @@ def lossy_walk(lossy_case):
     return StabilityWalk(lossy_case)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "parameter, values, storage",
     [
@@ -65,6 +66,7 @@ def test_cells_agree_with_the_full_pencil(lossy_case, lossy_walk, parameter, val
         assert column.unstable[i] == column.cells[i].certificate.counted == full.unstable_count
 
 
+@pytest.mark.slow
 def test_cells_of_dense_fluids_over_the_loss_factor_need_no_full_pencil(lossy_case, lossy_walk):
     """Vectors corrected once left 1e-5 of the leading eigenvalue there, and every cell to the full pencil."""
     base = Mu.of(lossy_case).at(storage=0.0, density=1000.0)
@@ -84,6 +86,7 @@ def test_an_elastic_wall_is_one_without_loss_factors(lossy_case, lossy_walk):
     assert barely == pytest.approx(elastic, rel=1e-3)
 
 
+@pytest.mark.slow
 @LAWS
 @pytest.mark.parametrize(
     "second", ["density=1:1000:4:log", pytest.param("loss_factor=0.3:3:4:log", marks=pytest.mark.slow)]
@@ -131,6 +134,7 @@ def test_loss_factors_beyond_the_branches_of_a_rubber_cost_their_own_cells_alone
     assert len(line.scan.run(line.values)) == 0 and list(line.scan.failures) == [3.0]
 
 
+@pytest.mark.slow
 @LAWS
 def test_onset_over_the_loss_factor_is_between_growth_and_decay(lossy_case, lossy_walk, continuity):
     density = 300.0 if continuity == "quasi-steady" else 20.0

@@ -53,6 +53,7 @@ def test_a_valve_that_shuts_has_no_negative_area_and_its_energy_is_accounted_for
     assert set(run.dissipated()) == {"Rayleigh damping", "contact of the faces"}
 
 
+@pytest.mark.slow
 def test_columns_of_the_contact_are_there_where_it_is(tmp_path, valve, all_restart_points):
     """And a run that was stopped goes on with the same digits."""
     pressed = {"drive.kind": "uniform", "drive.side": "outside", "drive.pressure": 2e3, "downstream.pressure": 0.0}

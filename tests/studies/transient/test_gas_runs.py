@@ -16,6 +16,7 @@ LINE = {f"upstream.{name}": value for name, value in {"length": 3.0, "wave_speed
 LINE_ENERGIES = "line_kinetic_energy", "line_elastic_energy"
 
 
+@pytest.mark.slow
 def test_a_steady_start_stays(valve):
     keys = SHORT | AIR | {"transient.duration": 2e-3, "transient.step": 5e-4, "transient.start": "steady"}
     run = transient(valve(keys))

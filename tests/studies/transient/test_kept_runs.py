@@ -85,6 +85,7 @@ LOSSY = WAVES | {
 AIR = {"fluid.density": 1.2, "fluid.continuity": "storage", "fluid.sound_speed": 343.0, "drive.pressure": 6e3}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "keys, after, column",
     [
@@ -115,6 +116,7 @@ def test_a_resumed_run_gives_the_same_numbers(tmp_path, valve, keys, after, colu
     assert np.array_equal(resumed.states[-1].nodal, whole.states[-1].nodal)
 
 
+@pytest.mark.slow
 def test_nothing_is_kept_of_what_is_not_there(tmp_path, valve):
     """A rigid column in front, an elastic wall, a fluid that is not compressed, lips with stops."""
     rigid = {name: value for name, value in WAVES.items() if "wave" not in name and "elements" not in name}
@@ -199,6 +201,7 @@ def test_a_state_in_whose_write_a_run_is_interrupted_is_kept_once(tmp_path, valv
     assert run.interrupted and [state.time for state in run.states] == pytest.approx([0, 0.005])
 
 
+@pytest.mark.slow
 def test_torn_restart_points_are_passed_over(tmp_path, valve, all_restart_points):
     path = tmp_path / "run.h5"
     whole = transient(valve(SHORT), output=path)
@@ -246,6 +249,7 @@ def test_restart_points_take_little_of_the_file(tmp_path, valve, monkeypatch):
     assert StoredRecord(tmp_path / "run.h5", tables_of, Case).rows(RESTART) == 2 + 600 // 7
 
 
+@pytest.mark.slow
 def test_a_run_that_fails_keeps_everything_and_says_where(tmp_path, valve, monkeypatch):
     step = stepper.Stepper.step
 

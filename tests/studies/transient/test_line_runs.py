@@ -16,6 +16,7 @@ WAVES = {
 }
 
 
+@pytest.mark.slow
 def test_a_line_at_rest_has_the_pressure_behind_the_valve(valve):
     """Nothing is drawn in before the wave of the far end arrives, after 10 ms."""
     keys = {"transient.duration": 5e-3, "transient.step": 2e-4, "fluid.density": 100.0, "downstream.pressure": 2e4}

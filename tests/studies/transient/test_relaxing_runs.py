@@ -23,6 +23,7 @@ def test_a_loss_factor_of_zero_is_an_undamped_wall(valve):
         assert np.array_equal(zero.history[name], plain.history[name])
 
 
+@pytest.mark.slow
 def test_energy_is_balanced_and_each_material_has_its_share(valve):
     """A smooth run: the pressure rises in a tenth of a second. Corrections end where they no longer show; those that
     the default tolerance leaves out do work of some 2e-7, as much as the error of a step of 0.4 ms.
@@ -64,6 +65,7 @@ def test_a_valve_that_was_loaded_long_ago_stays_where_it_is(valve):
     assert np.abs(run.progress.state.memory.branches).max() < 1e-6 * np.abs(run.progress.state.memory.slow).max()
 
 
+@pytest.mark.slow
 def test_staggered_coupling_has_the_same_wall(valve):
     changes = LOSSY | {
         "drive.kind": "flow",

@@ -18,6 +18,7 @@ from tests.small_valves import SMALL
 from .runs import SHORT, transient
 
 
+@pytest.mark.slow
 def test_rest_start_opens_the_valve(valve):
     run = Runner(valve({"transient.duration": 0.05})).start()
     h = run.history
@@ -104,6 +105,7 @@ def test_storage_law_lets_the_wall_displace_fluid(valve):
     assert stored[-1] - stored[0] == pytest.approx(gained, rel=0.01)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kpa", [18, pytest.param(36, marks=pytest.mark.slow)])
 def test_storage_law_draws_water_in_through_shut_lips_and_opens(valve, kpa):
     """The saddle grows while the lips are shut; the valve opens all the same and rests where load steps lead."""
@@ -195,6 +197,7 @@ def test_a_valve_without_pressure_stays_as_it_is(tmp_path, valve, command_line, 
     assert command_line("info", tmp_path / "run.h5").status == 0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("start, density", [("steady", 1000.0), ("rest", 1.2)])
 def test_a_stiff_valve_that_stands_at_its_gap_is_open(valve, start, density):
     """It opens by a thousandth of its gap at rest, and lets flow what a jet of that area carries."""
@@ -207,6 +210,7 @@ def test_a_stiff_valve_that_stands_at_its_gap_is_open(valve, start, density):
     assert run.history["mass_flow"][-1] == pytest.approx(area * np.sqrt(2 * density * 500.0), rel=1e-3)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("back", [0.0, pytest.param(1e3, marks=pytest.mark.slow)])
 def test_a_valve_whose_drive_turns_around_closes_and_without_one_stands_at_its_gap(tmp_path, valve, back):
     """Lips that are pressed on their stops are shut; those that nothing presses let fluid pass."""
@@ -279,6 +283,7 @@ def test_faces_that_part_and_meet_again_and_again_chatter(valve):
             assert chatter["mean_flow"] == pytest.approx(1e-3) and chatter["shut_share"] == pytest.approx(0.5, abs=0.1)
 
 
+@pytest.mark.slow
 def test_the_verdict_ends_the_run(valve):
     model = valve(
         {

@@ -50,6 +50,7 @@ def found(valve):
     return valve.uncertainty(inputs=OWN)
 
 
+@pytest.mark.slow
 def test_outcomes_are_those_of_modes(valve, found):
     samples = found.at(found.plan.values[0])
     names = [one.name for one in found.plan.inputs]
@@ -201,6 +202,7 @@ def test_interruptions_change_no_digit(valve, found, tmp_path):
     assert whole.complete and whole.summary() == found.summary() == load_result(path).summary()
 
 
+@pytest.mark.slow
 def test_inputs_without_a_verdict_are_not_kept_twice(valve, found, tmp_path, monkeypatch):
     """A run that is killed after the inputs of some samples, before their verdicts."""
     path, extend, inner = tmp_path / "samples.h5", [], GrowingRecord.extend
@@ -220,6 +222,7 @@ def test_inputs_without_a_verdict_are_not_kept_twice(valve, found, tmp_path, mon
         assert np.array_equal(record.column("numbers", name), found.record.column("numbers", name))
 
 
+@pytest.mark.slow
 def test_surroundings_are_asked_side_by_side(valve):
     """Inputs that leave the steady state alone share it and its reduced model."""
     inputs = {"beta": "lognormal(0.002, 2)", "density": "uniform(10, 40)"}
@@ -236,6 +239,7 @@ def test_surroundings_are_asked_side_by_side(valve):
         assert alone.state.volume_flow == pytest.approx(samples["flow"][3], rel=1e-9)
 
 
+@pytest.mark.slow
 def test_a_pressure_may_be_uncertain(valve):
     """By its parameter and by its key, which are one input."""
     own = {"beta": "lognormal(0.002, 2)"}
