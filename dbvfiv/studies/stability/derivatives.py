@@ -168,7 +168,7 @@ class Neighbourhood:
         """
         require_number(self.model, name)
         value = _value(self.model, self.pressure, self.mu, name)
-        size = abs(value) or self._usual_size(name)
+        size = max(abs(value), self._least_size(name)) or 1.0
         spans = spans_about(self.model.case, name, value, self.step * size)
         near, *far = (self._between(name, value, *ends) for ends in spans)
         if not far:
@@ -179,14 +179,16 @@ class Neighbourhood:
             raise SolveError(f"Nothing can be differentiated by {name} at {value:g}: next to it is another valve.")
         return self._behind_pump(near.towards(*far))
 
-    def _usual_size(self, name: str) -> float:
-        """Size of numbers that stand beside a parameter which is 0, SI: of a constant of a rubber its shear modulus."""
+    def _least_size(self, name: str) -> float:
+        """Size of a parameter, SI, by a share of which it is stepped at least: of a constant of a rubber, which may be
+        small or 0, its shear modulus.
+        """
         if unit_of(self.model.case, name) != "Pa" or not name.startswith(("layer ", "materials.")):
-            return 1.0
+            return 0.0
         layers, by_name = self.model.shell.section.layers, not name.startswith("layer ")
         its = [one for one in layers if one.name == name.split(".")[1]] if by_name else [layers[_layer(name)[0]]]
         laws = [one.law for one in its]
-        return max((law.small_strain_shear_modulus for law in laws if law.kind == MOONEY_RIVLIN), default=1.0)
+        return max((law.small_strain_shear_modulus for law in laws if law.kind == MOONEY_RIVLIN), default=0.0)
 
     def _behind_pump(self, found: Sensitivity) -> Sensitivity:
         """Derivatives with the pressure that a pump gives at the flow that changes with a parameter."""
