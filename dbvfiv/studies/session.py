@@ -431,7 +431,7 @@ def kept_run(kind: str, session: Session, path: Path, observer: Observer | None 
     kind : str
         Of the study.
     path : path
-        Result file. One of another case is written over.
+        Result file. One of another case, or of another version of the program, is written over.
     observer : Observer, optional
     choices
         What the study takes that is no key of the case.
@@ -440,7 +440,8 @@ def kept_run(kind: str, session: Session, path: Path, observer: Observer | None 
     kept = _load_if_readable(path)
     # these compute nothing, and say how it is told
     sheet = {name: getattr(session.case, name) for name in ("project", "report")}
-    if kept is not None and kept.kind == kind and kept.case.model_copy(update=sheet) == session.case:
+    own = kept is not None and (kept.kind, kept.header.program) == (kind, Header.program)
+    if own and kept.case.model_copy(update=sheet) == session.case:
         result = kept if kept.record.complete else resume_result(path, observer, **choices)
     else:
         result = session.perform(kind, path, observer, **choices)

@@ -6,6 +6,7 @@ from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 
+import h5py
 import pytest
 
 from dbvfiv import resume
@@ -216,6 +217,10 @@ def test_a_kept_run_that_missed_a_pressure_and_was_interrupted_goes_on(coarse_ca
         assert [limit.pressure for limit in kept.limits] == [1002.0]  # of the attempt that came to its end
     told = kept_run("steady", session.replace({"project.units": "ft"}), path)
     assert told.case.project.units == "ft" and len(attempts) == 2
+    with h5py.File(path, "r+") as file:
+        file.attrs["program"] = "dbvfiv 0.0.1"
+    kept_run("steady", session, path)  # another program may find another number
+    assert len(attempts) == 3
 
 
 def test_what_settled_levels_said_is_said_again(coarse_case, tmp_path, attempts):
