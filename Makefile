@@ -27,7 +27,7 @@ verify: setup
 
 # the random sets: one outcome and one count at thousands of states; `make verify` has samples of some hundred
 random: setup
-	@$(PYTHON) -m pytest -n $(JOBS) --dist worksteal -m random tests/verification tests/model tests/studies/identify
+	@$(PYTHON) -m pytest -n $(JOBS) --dist worksteal -m random tests/verification tests/model tests/studies/identify tests/trial tests/case
 
 # flow and wall in three dimensions, end to end; installs Debian's OpenFOAM where there is none
 verify-3d: setup

@@ -136,6 +136,7 @@ def test_a_hundred_damaged_files(tmp_path, one_sentence):
 
 
 @pytest.mark.slow
+@pytest.mark.random
 @pytest.mark.parametrize("first", range(100, 10_000, 990))
 def test_ten_thousand_damaged_files(tmp_path, one_sentence, first):
     fuzz(range(first, first + 990), tmp_path / "case.toml", one_sentence)
