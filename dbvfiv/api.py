@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from functools import cached_property
+from functools import cached_property, partial
 from pathlib import Path
 from typing import Any, overload
 
 from .case.axis import is_single, read_pressures, write_axis
-from .case.model import Changes, change_case
+from .case.model import Changes, change_case, made_with
 from .drawing.style import draw_figures, write_figures
 from .drawing.views import valve_figure
 from .errors import CaseError, SolveError, as_path
@@ -531,8 +531,9 @@ def load(case: str | Path | Case | None = None, changes: Changes | None = None) 
         One sentence: which key, what was given, what is allowed.
     """
     name = "dbv12" if case is None else "case" if isinstance(case, Case) else as_path(case, "A case file").stem
-    made = case if isinstance(case, Case) else load_case(case)
-    return Valve(made if changes is None else change_case(made, changes), name)
+    if isinstance(case, Case):
+        return Valve(case if changes is None else change_case(case, changes), name)
+    return Valve(made_with(partial(load_case, case), {} if changes is None else changes), name)
 
 
 #: What a resumed study may be given anew, the studies that take it, and what it is called in a sentence.

@@ -110,8 +110,10 @@ def parse_point(text: str, density: float | None = None) -> dict[str, float]:
             raise ValueError(f"which gives {name} twice")
         row = PARAMETERS[name]
         value = _value(row, given, found.get("density", density))
-        if not row.low <= value <= row.high:
-            raise ValueError(f"whose {name} is not within {row.low:g} to {row.high:g} {row.quantity.si}".rstrip())
+        if not row.low <= value <= row.high or (value == row.low and not row.low_included):
+            above = "" if row.low_included else "more than "
+            ends = f"{above}{row.low:g} to {row.high:g} {row.quantity.si}".rstrip()
+            raise ValueError(f"whose {name} is not within {ends}")
         found[name] = value
     return {name: found[name] for name, *_ in parts}
 

@@ -223,7 +223,11 @@ _LARGEST_FILE = 10_000_000
 Model = TypeVar("Model", bound=Section)
 
 
-def read_case_file(model: type[Model], path: str | Path | None = None, overrides: Iterable[str] = ()) -> Model:
+#: Changes of keys: texts as after ``--set``, or values by keys.
+Overrides = Iterable[str] | Mapping[str, Any]
+
+
+def read_case_file(model: type[Model], path: str | Path | None = None, overrides: Overrides = ()) -> Model:
     """Read and check a case file. Raises CaseError: one sentence: which key, in which line, what was given, what is
     allowed.
 
@@ -233,7 +237,7 @@ def read_case_file(model: type[Model], path: str | Path | None = None, overrides
         The sections that the file may hold.
     path : path, optional
         TOML file; without it the 12-inch valve of the defaults.
-    overrides : iterable of str
+    overrides : iterable of str, or mapping
         ``"drive.pressure=18 kPa"``; list elements by index from 0, ``"layers.2.angle=45"``.
 
     Returns
@@ -246,6 +250,9 @@ def read_case_file(model: type[Model], path: str | Path | None = None, overrides
         text = _read(path)
         data = parse_toml(text, name)
     overridden = set()
+    if isinstance(overrides, Mapping):
+        overridden |= {put(model, data, dotted, plain(value)) for dotted, value in overrides.items()}
+        overrides = ()
     for override in overrides:
         overridden.add(_apply(model, data, override))
     model.make_way(data, overridden)
@@ -343,8 +350,19 @@ def toml_value(text: str) -> Any:
 
 
 def key_path(dotted: str) -> tuple[str, ...]:
-    """The parts of a key as an override writes it."""
-    return tuple(part.strip() for part in dotted.strip().split("."))
+    """The parts of a key as an override writes it; one with a dot in it stands in quotes."""
+    quoted = "'" in dotted or '"' in dotted
+    parts = re.findall(r"""\"[^\"]*\"|'[^']*'|[^.\"']+""", dotted) if quoted else dotted.split(".")
+    return tuple(part.strip().strip("\"'") for part in parts)
+
+
+def plain(value: Any) -> Any:
+    """Numbers and lists of Python for those of numpy."""
+    if isinstance(value, Mapping):
+        return {name: plain(each) for name, each in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [plain(each) for each in value]
+    return value.tolist() if hasattr(value, "tolist") else value
 
 
 def put(model: type[Section], data: dict[str, Any], dotted: str, value: Any) -> tuple[str, ...]:

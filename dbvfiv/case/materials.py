@@ -199,8 +199,8 @@ class HalpinTsai(Relaxing):
     fibre_fraction: Percent = key(0.45, "Volume fraction of the fibre.", gt=0, lt=1)
     fibre_modulus: Modulus = key(3460e6, "Young's modulus of the fibre.", gt=0, le=1e13)
     matrix_modulus: Modulus = key(4.37e6, "Young's modulus of the matrix.", gt=0, le=1e13)
-    fibre_poisson: Number = _poisson("Poisson ratio of the fibre.", 0.21)
-    matrix_poisson: Number = _poisson("Poisson ratio of the matrix.", 0.35)
+    fibre_poisson: Number = key(0.21, "Poisson ratio of the fibre.", gt=0, lt=0.5)
+    matrix_poisson: Number = key(0.35, "Poisson ratio of the matrix.", gt=0, lt=0.5)
     xi: Number = key(120000.0, "Halpin-Tsai coefficient along the fibre (twice its slenderness).", gt=0, le=1e12)
     density: Density = _density(1270.0)
 

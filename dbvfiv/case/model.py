@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 import difflib
-from collections.abc import Collection, Iterable, Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping
 from typing import Any, Self
 
 from pydantic import ValidationInfo, model_validator
 
 from ..errors import CaseError
 from . import physics
-from .damping import MEANINGLESS, SHIPPED_LOSSES, Damping
-from .load import make_case, put, toml_value
+from .damping import MEANINGLESS, SHIPPED_LOSSES, WAYS, Damping
+from .load import make_case, plain, put, toml_value
 from .materials import AUTO, DEFAULT_LAYERS, RUBBERS, Layer, Materials
 from .mesh import Mesh
 from .parameters import PARAMETERS
@@ -30,8 +30,13 @@ FACE_STIFFNESS, SPREADING_STIFFNESS = 1e10, 1e9
 #: Share of the gap between rough faces in contact below which no passage of a bill that is moulded shut narrows.
 PRESET_FILM = 0.75
 #: Keys of a section, and of a table of a material, that say one thing in different ways.
-_ALTERNATIVES = {"drive": ("pressure", "head"), "upstream": ("friction", "roughness"), "valve": PRESETS}
-_STIFFNESS = ("hardness", "shear_modulus")
+_ALTERNATIVES = {
+    "drive": ("pressure", "head"),
+    "upstream": ("friction", "roughness"),
+    "valve": PRESETS,
+    "transient": ("ramp", "drive_table"),
+}
+_OF_MATERIALS, _OF_PATCHES = (("hardness", "shear_modulus"), WAYS), ("thickness", "extra")
 
 
 class Case(Section):
@@ -203,6 +208,12 @@ class Case(Section):
                 f"{boils:g} Pa without fluid.sound_speed",
                 "how a liquid fills a cavity depends on its waves, so give both or neither",
             )
+        if self.has_tail:
+            raise BrokenRule(
+                "fluid.vapour_pressure",
+                f"{boils:g} Pa with downstream.pipe_diameter = {self.downstream.pipe_diameter:g} m",
+                "the pressure around the jet is not that at the end of the pipe, so leave one of them out",
+            )
         if boils >= around:
             raise BrokenRule(
                 "fluid.vapour_pressure",
@@ -353,21 +364,34 @@ class Case(Section):
     @classmethod
     def make_way(cls, data: dict[str, Any], changed: Collection[tuple[str, ...]]) -> None:
         """A key that is asked for stands in the place of one that was there before and says the same otherwise."""
-        super().make_way(data, changed)
-        own = data.get("materials")
-        tables = {(name,): (data.get(name), keys) for name, keys in _ALTERNATIVES.items()}
-        if isinstance(own, dict):
-            tables |= {("materials", name): (card, _STIFFNESS) for name, card in own.items()}
-        for path, (before, keys) in tables.items():
+        own, valve = (data.get(name) if isinstance(data.get(name), dict) else {} for name in ("materials", "valve"))
+        tables = [((name,), data.get(name), keys) for name, keys in _ALTERNATIVES.items()]
+        tables += [(("materials", name), card, keys) for name, card in own.items() for keys in _OF_MATERIALS]
+        patches = valve.get("patches")
+        for i, patch in enumerate(patches if isinstance(patches, list) else ()):
+            tables.append((("valve", "patches", str(i)), patch, _OF_PATCHES))
+        for path, before, keys in tables:
             asked = {key for key in keys if (*path, key) in changed}
             if asked and isinstance(before, dict):
                 for other in set(keys) - asked:
                     before.pop(other, None)
+                if not before.keys() & {"loss_data", "relaxation_data"}:
+                    before.pop("loss_temperature", None)
+        super().make_way(data, changed)
         damping = data.get("damping")
         if ("damping", "model") in changed and isinstance(damping, dict):
             meaningless = MEANINGLESS.get(str(damping.get("model")), "")
             if ("damping", meaningless) not in changed:
                 damping.pop(meaningless, None)
+
+    @classmethod
+    def take_along(cls, data: dict[str, Any], changed: Collection[tuple[str, ...]] | None = None) -> None:
+        """As of any table; with the last preset of a bill goes how far it is moulded shut."""
+        super().take_along(data, changed)
+        valve, asked = data.get("valve"), {path[1] for path in changed or () if path[0] == "valve" and len(path) > 1}
+        taken = changed is None or (asked & {*PRESETS} and "moulded_length" not in asked)
+        if isinstance(valve, dict) and taken and not any(valve.get(name) for name in PRESETS):
+            valve.pop("moulded_length", None)
 
     def to_dict(self) -> dict[str, Any]:
         """Return plain SI data (numbers, strings, lists, dicts) that JSON and HDF5 can hold."""
@@ -402,7 +426,7 @@ class Case(Section):
         `dbvfiv.case.load.make_case` does.
         """
         data = self.to_dict()
-        changed = {put(type(self), data, dotted, _plain(value)) for dotted, value in changes.items()}
+        changed = {put(type(self), data, dotted, plain(value)) for dotted, value in changes.items()}
         self.make_way(data, changed)
         if ("drive", "head") in changed:
             changed.add(("drive", "pressure"))
@@ -421,17 +445,30 @@ _FORM = """a mapping such as {"drive.pressure": "18 kPa"} or texts such as "driv
 
 
 def change_case(case: Case, changes: Changes) -> Case:
-    """A case with some keys changed. Raises CaseError: one sentence: which key, what was given, what is allowed.
+    """A case with some keys changed, which files that these name must exist for. Raises CaseError: one sentence: which
+    key, what was given, what is allowed.
 
     Parameters
     ----------
     changes : mapping, text or iterable of texts
         ``{"drive.pressure": "18 kPa", "mesh.around": 8}``, or ``"drive.pressure=18 kPa"`` as after ``--set``.
     """
+    names = _as_mapping(changes)
+    made = made_with(case.replace, names)
+    try:
+        make_case(type(case), made.to_dict())
+    except CaseError as error:  # files of the case itself may have gone since it was read
+        if any(f"{error.key}.".startswith(f"{name}.") for name in names):
+            raise
+    return made
+
+
+def made_with(make: Callable[[Mapping[str, Any]], Case], changes: Changes) -> Case:
+    """A case as it is made with changes, see `change_case`; texts that are no value of their key are read as TOML."""
     wanted = _as_mapping(changes)
     while True:
         try:
-            return case.replace(wanted)
+            return make(wanted)
         except CaseError as error:
             # of a list its first bad element is blamed
             name = next((name for name in wanted if f"{error.key}.".startswith(f"{name}.")), error.key)
@@ -460,12 +497,3 @@ def _pair(text: Any) -> tuple[str, str]:
     if not equals or not key.strip():
         raise CaseError(f"A change is given as {text!r}; changes must be {_FORM}.")
     return key.strip(), value.strip()
-
-
-def _plain(value: Any) -> Any:
-    """Numbers and lists of Python for those of numpy."""
-    if isinstance(value, Mapping):
-        return {name: _plain(each) for name, each in value.items()}
-    if isinstance(value, (list, tuple)):
-        return [_plain(each) for each in value]
-    return value.tolist() if hasattr(value, "tolist") else value

@@ -206,6 +206,12 @@ def check_preset(valve: Valve) -> None:
             f"{getattr(valve, told[1]):g} beside {told[0]} = {getattr(valve, told[0]):g}",
             f"one of {', '.join(PRESETS)} says how firmly the bill is moulded shut, so leave the others out",
         )
+    if not told and not valve._follows("moulded_length"):
+        raise BrokenRule(
+            "moulded_length",
+            f"{valve.moulded_length:g} m of a bill that is not moulded shut",
+            f"give one of {', '.join(PRESETS)} with it, or leave it out",
+        )
     if valve.moulded_length > valve.duckbill_length * (1 + 1e-9):
         raise BrokenRule(
             "moulded_length",
@@ -298,6 +304,8 @@ class Valve(FollowingSection):
     `lip_radius`, `cuff_radius`, `duckbill_wall_deduction` and `flange_wall_deduction` hold numbers also where they were
     not given, and all sizes are those of the valve as it is built: `scale` times what the case gives.
     """
+
+    needs = {"key_point_skin": "key_points"}
 
     duckbill_length: Length = key(0.21, "Length of the duckbill, from the lip.", gt=0, le=100)
     saddle_length: Length = key(

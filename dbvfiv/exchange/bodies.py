@@ -102,7 +102,7 @@ def passage_grid(inner: np.ndarray) -> np.ndarray:
         except ValueError:
             raise CaseError(
                 f"The inner faces of the lips meet at z = {1e3 * row[0, 2]:.4g} mm (x = 0), so this state has no open "
-                "passage; a higher pressure opens one."
+                "passage; a higher pressure opens one, and the shapes middle and outer need none."
             ) from None
         rows.append(path if len(path) == len(row) and np.array_equal(path[:-1], row[:-1]) else _divided(path, row))
     return np.array(rows)
@@ -132,13 +132,17 @@ class WallFaces:
     part: Part = QUARTER  #: Of the valve.
 
     @classmethod
-    def of(cls, mesh: MeshData, nodal: np.ndarray) -> WallFaces:
-        """Faces of the deformed wall from nodal unknowns (nn, c). Raises CaseError if the passage is shut."""
+    def of(cls, mesh: MeshData, nodal: np.ndarray, open_passage: bool = True) -> WallFaces:
+        """Faces of the deformed wall from nodal unknowns (nn, c). Raises CaseError if the passage is shut; without an
+        open one the inner faces may cross.
+        """
         inner, outer = faces(mesh, nodal)
         grids = [inner[mesh.rows], 0.5 * (inner + outer)[mesh.rows], outer[mesh.rows]]
         for grid in grids:  # the planes of symmetry, to the last digit
             for column, across in mesh.part.edges:
                 grid[:, column, across] = 0.0
+        if not open_passage:
+            return cls(*grids, mesh.part)
         if mesh.part.is_quarter:
             grids[0] = passage_grid(grids[0])
         else:

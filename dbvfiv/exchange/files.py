@@ -212,7 +212,7 @@ def write_shapes(
         unknown = [value for value in given if value not in allowed]
         if unknown:
             raise CaseError(f"There is no {what} {unknown[0]!r}; there are {', '.join(allowed)}.")
-    faces, written = WallFaces.of(mesh, nodal), []
+    faces, written = WallFaces.of(mesh, nodal, bool({"inner", "wall", "fluid"} & {*(shapes or SHAPES)})), []
     try:
         Path(folder).mkdir(parents=True, exist_ok=True)
         for one in shapes or SHAPES:

@@ -292,7 +292,8 @@ class PeriodicValve:
         self._known_forces: tuple[ValveModel, np.ndarray, np.ndarray] | None = None
         scale = np.ones(model.shell.dofs.free.shape)
         scale[:, 3:] = 2.0 / float(np.mean(model.shell.geometry.thickness))
-        jet = np.sqrt(2.0 * abs(mu["inlet"]) / mu["density"])
+        drive = max(abs(mu["inlet"] - model.flow.back), model.load_unit)  # a hanging column may be all that drives
+        jet = np.sqrt(2.0 * drive / mu["density"])
         #: (n + l,): m and rad that are alike at the face of the wall, and m/s that go with them.
         self.scales = np.append(scale[model.shell.dofs.free], np.full(self.inner, 10.0 * jet))
         self._wall = WallSlopes(self.size, self.scales[: model.size])

@@ -17,7 +17,7 @@ from pydantic import create_model, model_validator
 
 from ..case.axis import parse_stability_axis
 from ..case.describe import page
-from ..case.load import key_path, read_case_file
+from ..case.load import Overrides, key_path, read_case_file
 from ..case.model import Case as PhysicsCase
 from ..case.physics import LIQUID
 from ..case.quantity import head_of
@@ -144,7 +144,7 @@ THESIS = {
 }
 
 
-def load_case(path: str | Path | None = None, overrides: Iterable[str] = ()) -> Case:
+def load_case(path: str | Path | None = None, overrides: Overrides = ()) -> Case:
     """Read and check a case file. Raises CaseError: one sentence: which key, in which line, what was given, what is
     allowed.
 
@@ -152,14 +152,14 @@ def load_case(path: str | Path | None = None, overrides: Iterable[str] = ()) -> 
     ----------
     path : path, optional
         TOML file; without it the 12-inch valve of the defaults.
-    overrides : iterable of str
+    overrides : iterable of str, or mapping
         ``"drive.pressure=18 kPa"``; list elements by index from 0, ``"layers.2.angle=45"``.
 
     Returns
     -------
     Case
     """
-    overrides = tuple(overrides)
+    overrides = overrides if isinstance(overrides, Mapping) else tuple(overrides)
     case = read_case_file(Case, path, overrides)
     case._replace_list_by_pressure({key_path(override.partition("=")[0]) for override in overrides})
     return case

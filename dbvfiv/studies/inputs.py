@@ -12,8 +12,9 @@ import numpy as np
 
 from eigen.columns import ColumnSolver
 
-from ..case.describe import quantity_of
+from ..case.describe import quantity_of, toml_name
 from ..case.distribution import ALLOWED, FORMS, Distribution
+from ..case.load import key_path
 from ..case.parameters import PARAMETERS, Mu
 from ..case.quantity import Quantity
 from ..errors import CaseError
@@ -65,7 +66,7 @@ class Input:
         """Name for figures and tables."""
         if self.name in PARAMETERS:
             return PARAMETERS[self.name].title
-        material = self.name.split(".")
+        material = key_path(self.name)
         if material[0] == "materials" and len(material) == 3:
             return f"{material[1]}: {material[2].replace('_', ' ')}"
         return self.name
@@ -301,10 +302,10 @@ def _shipped(case: Case) -> Iterator[tuple[str, str, str]]:
         kind = "fibre" if name == "fibre" else case.materials.card(name).kind
         if kind in ("fibre", "halpin-tsai", "orthotropic", "isotropic"):
             source = "an estimate: share of fibres and bond between them"
-            yield f"materials.{name}.stiffness_factor", "lognormal(1.1)", source
+            yield f"materials.{toml_name(name)}.stiffness_factor", "lognormal(1.1)", source
         else:
             source = "hardness within 5 Shore A of what was ordered, a fifth of the shear modulus (Gent 1958)"
-            yield f"materials.{name}.stiffness_factor", f"lognormal({HARDNESS:.4g})", source
+            yield f"materials.{toml_name(name)}.stiffness_factor", f"lognormal({HARDNESS:.4g})", source
     yield from _losses(case, used)
     wall = 1e3 * case.valve.thickness_at(0.0)
     tolerance = next((t for upto, t in CLOSURE if wall <= upto), CLOSURE_BEYOND * wall)
@@ -341,7 +342,7 @@ def _losses(case: Case, used: Sequence[str]) -> Iterator[tuple[str, str, str]]:
         data = case.materials.loss(name)
         if data is None or data.loss_factor is None:
             continue
-        key = f"materials.{name}.loss_factor"
+        key = f"materials.{toml_name(name)}.loss_factor"
         if data.loss_factor in shipped_loss_names():
             low, high = shipped_loss(data.loss_factor).range
             yield key, f"uniform({low:g}, {high:g})", "the range of published compounds"

@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import dbvfiv
 from dbvfiv.case import Case as PhysicsCase
 from dbvfiv.case import CaseError, make_case, parse_axis
 from dbvfiv.case.axis import parse_point
@@ -23,6 +24,7 @@ from dbvfiv.case.model import change_case
 from dbvfiv.case.parameters import PARAMETERS
 from dbvfiv.case.quantity import Quantity
 from dbvfiv.case.tables import read_drive_table, read_pump_table
+from dbvfiv.case.valve import PRESETS
 from dbvfiv.case.write import case_toml
 from dbvfiv.fit.curves import read_curves
 from dbvfiv.studies import KINDS
@@ -308,6 +310,10 @@ def test_parameter_ranges():
         parse_axis("alpha=-1:5:3")
     with pytest.raises(ValueError, match="gives pressure twice"):
         parse_point("pressure=1 kPa, pressure=2 kPa")
+    for text in ("pressure=0", "density=0", "pipe_length=0 m"):
+        with pytest.raises(ValueError, match="is not within more than 0 to"):
+            parse_point(text)
+    assert parse_point("alpha=0") == {"alpha": 0.0}
     assert load_case(None, ["damping.alpha=.5", "drive.pressure=5."]).damping.alpha == 0.5
     assert parse_axis("pressure=0.5 kPa, 2 kPa,1 m", density=1000.0).values == (500.0, 2000.0, 1000.0 * 9.80665)
 
@@ -515,3 +521,54 @@ def test_unknown_key_names_the_one_that_holds_it(given, key):
     with pytest.raises(CaseError) as raised:
         load_case(None, [given])
     assert f"the nearest valid key is {key}" in str(raised.value)
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        "fluid.density=800",
+        "drive.pressure=7 kPa",
+        "mesh.around=8",
+        "transient.drive_table=drive.csv",
+        "layers.0.angle=3",
+    ],
+)
+def test_changes_in_python_are_those_of_set(tmp_path, change):
+    """In the units of the file, with file names relative to it."""
+    (tmp_path / "drive.csv").write_text("0, 1000\n1, 2000\n")
+    (tmp_path / "own.toml").write_text('[drive]\npressure = "2 m"\n')
+    set_, key = load_case(tmp_path / "own.toml", [change]), change.partition("=")[0]
+    for changes in ([change], {key: change.partition("=")[2]}):
+        made = dbvfiv.load(tmp_path / "own.toml", changes).case
+        assert made == set_ and made.units == set_.units
+
+
+@pytest.mark.parametrize("key", ["transient.drive_table", "steady.measured", "valve.key_points", "cycle.start_file"])
+def test_a_missing_file_is_refused_by_every_door(tmp_path, key):
+    (tmp_path / "own.toml").write_text("")
+    with pytest.raises(CaseError, match=f"{key} is .*"):
+        dbvfiv.load(tmp_path / "own.toml", {key: "nope.csv"})
+    with pytest.raises(CaseError, match=f"{key} is .*"):
+        dbvfiv.load(tmp_path / "own.toml").replace({key: "nope.csv"})
+
+
+@pytest.mark.parametrize(
+    "change, name",
+    [
+        ("materials.rubber.prony=[[0.1, 0.01]]", "rubber"),
+        ("materials.rubber.loss_data=tan-delta.csv", "rubber"),
+        ('valve.patches.0.thickness="10 mm"', ""),
+    ],
+)
+def test_a_key_that_is_set_takes_the_place_of_what_says_the_same(change, name):
+    """Of damping data and of patches too."""
+    case = load_case(ROOT / "cases/dbv4-wide.toml", [change])
+    assert case.materials.named[name].loss_factor is None if name else case.valve.patches[0].extra is None
+
+
+def test_how_far_a_bill_is_moulded_shut_goes_with_its_preset():
+    case = load_case(ROOT / "cases/dbv4-moulded.toml", ["valve.moulded_length=20 mm"])
+    given = next(name for name in PRESETS if getattr(case.valve, name))
+    open_ = case.replace({f"valve.{given}": None})
+    assert not open_.valve.is_preset and open_.valve.moulded_length == open_.valve.duckbill_length
+    assert case.replace({"valve.overlap": "1 mm"}).valve.moulded_length == 0.02

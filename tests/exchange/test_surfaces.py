@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from dbvfiv.errors import CaseError
 from dbvfiv.exchange.bodies import SHAPES, WallFaces, shape_of, trim_section
-from dbvfiv.exchange.files import open_gmsh, state_name, triangulated, write_step
+from dbvfiv.exchange.files import open_gmsh, state_name, triangulated, write_shapes, write_step
 
 
 @pytest.fixture(scope="module")
@@ -83,11 +83,15 @@ def test_wall_holds_the_rubber(coarse_run):
     assert wall.volume == pytest.approx(cell_area * mean, rel=0.03)
 
 
-def test_shut_passage_is_a_sentence(coarse_run, refused):
+def test_shut_passage_is_a_sentence(coarse_run, refused, tmp_path):
     mesh = coarse_run.mesh
     with refused(CaseError) as caught:
         WallFaces.of(mesh, np.zeros((len(mesh.nodes), 5)))  # the saddle's thicker wall meets itself at rest
     assert "no open passage" in str(caught.value)
+    with refused(CaseError):
+        write_shapes(mesh, np.zeros((len(mesh.nodes), 5)), tmp_path, "shut", shapes=["outer", "fluid"])
+    open_ = write_shapes(mesh, np.zeros((len(mesh.nodes), 5)), tmp_path, "shut", shapes=["outer", "middle"])
+    assert [path.name for path in open_] == ["shut-outer.stl", "shut-middle.stl"]
 
 
 @given(st.integers(5, 30), st.floats(0.3, 3.0), st.floats(0.01, 0.4), st.integers(0, 4), st.integers(0, 2**32 - 1))

@@ -176,6 +176,13 @@ def test_what_branches_hold_is_what_steps_find():
     assert np.abs(4 * found[1] - found[0]).max() / 3 < 1e-4 * np.abs(exact).max()
 
 
+def test_a_column_that_hangs_sets_the_scale_of_velocities_where_nothing_else_drives():
+    model = make_valve({"gravity.direction": "-z", "drive.pressure": 0.0, "fluid.density": 20.0})
+    head = -model.case.rest_pressure
+    scales = PeriodicValve(lambda _: model, {"inlet": 0.0, "density": 20.0}).scales
+    assert np.all(scales > 0) and scales[-1] == pytest.approx(10.0 * np.sqrt(2.0 * head / 20.0), rel=0.01)
+
+
 def test_cases_without_cycles_are_refused():
     model = make_valve({"drive.kind": "uniform"})
     with pytest.raises(SolveError, match="Without flow"):

@@ -239,7 +239,7 @@ class Neighbourhood:
             except ValueError as error:
                 raise SolveError(str(error)) from error
         found = self.sums @ np.array(each)
-        if self.model.outside is not None and places[0] is not places[1]:
+        if self.model.outside is not None and (places[0] is not places[1] or ends[0][0] is not ends[1][0]):
             found = found + self._resisting_change(ends, places) / apart
         return tuple(map(complex, found))
 

@@ -86,8 +86,11 @@ class Neighbours:
         )
 
     def square(self, row: np.ndarray) -> float:
-        """Square of the distance from the first valve over the numbers that move its state, one at least."""
-        return max(float((self.steps(row)[self.slopes.any(axis=1)] ** 2).sum()), 1.0)
+        """Square of the distance from the first valve over the numbers that move its state or change its added mass,
+        one at least.
+        """
+        moving = self.slopes.any(axis=1) | self.images.any(axis=tuple(range(1, self.images.ndim)))
+        return max(float((self.steps(row)[moving] ** 2).sum()), 1.0)
 
 
 def find_neighbours(
@@ -145,11 +148,10 @@ def _tangents(at: At, near: Neighbours, axes: np.ndarray) -> tuple[np.ndarray, n
         other, beside = at(near.origin + STEP * near.scales * (np.arange(len(near.origin)) == axis))
         end = other.built(beside).model, beside.pressure
         tangent = hood.tangent([(model, place.pressure), end], STEP)
-        if tangent is None:
-            continue
-        slope[:] = tangent
-        if added is not None:
-            ahead = hood.resisting(end[0], near.q + STEP * tangent, added.motions)
+        if tangent is not None:
+            slope[:] = tangent
+        if added is not None and (tangent is not None or end[0].outside.radius != model.outside.radius):
+            ahead = hood.resisting(end[0], near.q + STEP * slope, added.motions)
             image[:] = (ahead - here) / STEP
     return slopes, images
 

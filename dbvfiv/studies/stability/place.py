@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from functools import lru_cache
 from typing import Any
 
@@ -11,7 +11,9 @@ from pydantic.fields import FieldInfo
 
 from ...case.damping import LARGEST_LOSS
 from ...case.describe import numeric_limits, quantity_of
+from ...case.load import key_path
 from ...case.materials import AUTO, BUILT_IN, RUBBERS, BuiltIn, Materials
+from ...case.model import Case as PhysicsCase
 from ...case.parameters import OUTSIDE, PARAMETERS, PIPES, SYSTEM_NAMES, Mu
 from ...case.quantity import Quantity
 from ...case.section import Section
@@ -27,6 +29,8 @@ PARTS = ("duckbill_length", "saddle_length", "cuff_length", "flare_length", "fla
 PLACES = ("valve.wall_map", "valve.patches", "valve.moulded_length", "layers", "mesh.breaks", "mesh.row_positions")
 #: Sizes of a valve that follow from the others by rules that jump where it is no longer the 12-inch one.
 KEPT = ("lip_radius", "duckbill_wall_deduction", "flange_wall_deduction")
+#: Sections of a case that describe neither the valve nor what surrounds it.
+UNREAD = ("mesh", "project", "report", "life")
 #: Keys that are turned into a parameter before anything is computed, and that parameter.
 READ_AS = {"drive.head": "pressure", "valve.cracking_head": "sealing"}
 
@@ -205,21 +209,22 @@ def number_of(case: Case, name: str, key: str) -> tuple[FieldInfo, Any]:
     has none. `key` is the one that names it. Raises CaseError.
     """
     target: Any = case
-    field = None
-    for part in name.split("."):
+    field = owner = None
+    path = key_path(name)
+    for part in path:
         if isinstance(target, Materials) and part not in type(target).model_fields and part in target.names:
             target, field = target.named.get(part) or _card(target, part), None
         elif isinstance(target, tuple) and part.isdigit() and int(part) < len(target):
             target, field = target[int(part)], None
         elif isinstance(target, Section) and part in type(target).model_fields:
-            field, target = type(target).model_fields[part], getattr(target, part)
+            owner, field, target = target, type(target).model_fields[part], getattr(target, part)
         else:
             field = None
             break
         if isinstance(target, Valve):  # sizes before its scale, as they are written
             target = target.as_given
     if field is None or quantity_of(field) is None:
-        material = name.removeprefix("materials.").partition(".")[0]
+        material = path[1] if path[0] == "materials" and len(path) > 1 else path[0]
         more = f"; other numbers of {material} need a table [materials.{material}] with its kind"
         raise CaseError(
             f"{key} is given, and {name!r} is neither a parameter ({', '.join(PARAMETERS)}) nor a key of the case that "
@@ -229,7 +234,22 @@ def number_of(case: Case, name: str, key: str) -> tuple[FieldInfo, Any]:
         )
     if other := "strain" if target == AUTO else READ_AS.get(name):
         raise CaseError(f"{key} names {name!r}, in whose place {other} is used; name that.", key=key)
+    if why := _says_nothing(case, path, owner):
+        raise CaseError(f"{key} names {name!r}, {why}.", key=key)
     return field, target
+
+
+def _says_nothing(case: Case, path: Sequence[str], owner: Section) -> str:
+    """Why nothing of the valve depends on a key of the case, as a clause; empty where something does."""
+    if path[0] in UNREAD or path[0] not in PhysicsCase.model_fields:
+        return "which describes no valve but how it is computed or told"
+    other = owner.needs.get(path[-1])
+    if other and getattr(owner, other) == type(owner).model_fields[other].default:
+        return f"which says nothing without {other}"
+    wall = {"wall_thickness": "uniform", "wall_map": "measured"}.get(path[1]) if path[0] == "valve" else None
+    if wall and case.valve.wall != wall:
+        return f"which says nothing with valve.wall = {case.valve.wall!r}"
+    return ""
 
 
 def _card(materials: Materials, name: str) -> Section:
@@ -253,7 +273,7 @@ def plain_number(case: Case, name: str, value: Any) -> float | None:
     """Number of a key of the case from what it holds; that of the material of a loss factor without one."""
     if isinstance(value, (int, float)) and not isinstance(value, bool):
         return float(value)
-    parts = name.split(".")
+    parts = key_path(name)
     if parts[0] != "materials" or parts[-1] != "loss_factor":
         return None
     data = case.materials.loss(parts[1])
@@ -279,6 +299,9 @@ def _shape_beside(case: Case, changed: Mapping[str, float], beside: Mapping[str,
     if valve.key_points is not None and "lip_radius" in kept:  # which the points give
         kept.remove("lip_radius")
     found: dict[str, object] = {f"valve.{key}": getattr(valve, key) for key in kept}
+    if "lip_radius" in sizes and "duckbill_wall_deduction" in kept and valve.key_points is None:
+        # half the wall, of which a smaller radius leaves no more than itself
+        found["valve.duckbill_wall_deduction"] = min(valve.duckbill_wall_deduction, sizes["lip_radius"])
     if sizes.keys().isdisjoint(PARTS):
         return found
     lengths = [getattr(valve, each) for each in PARTS]

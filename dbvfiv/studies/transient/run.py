@@ -24,6 +24,7 @@ from ...record.files import Header, kind_of
 from ...record.mesh import MeshData
 from ...record.record import GrowingRecord, Record, StoredRecord
 from ...record.states import state_table
+from ...texts import listed
 from ...verdict import Shuttings, Verdict, judge
 from ..case import Case
 from .history import HISTORY, STATES, Keeper, Progress, Reader, pumped_flow, supplied_pressure, tables_of
@@ -340,8 +341,21 @@ class Runner:
 
     def _first(self, inlet: float):
         if self.case.transient.start == "state":
+            self._say_what_is_lost()
             return stored_state(self.motion, self.case, inlet), None
         return first_state(self.motion, self.case, inlet, self.record)
+
+    def _say_what_is_lost(self) -> None:
+        """Warn of what states of a run do not hold, without which a run that starts from one begins."""
+        parts = {
+            "what its relaxing layers remember": self.motion.wall is not None,
+            "the flow of its gas": self.model.case.is_compressed,
+            "the waves in its line": self.model.case.has_waves,
+        }
+        lost = listed(words for words, there in parts.items() if there)
+        if lost and kind_of(self.case.transient.start_file) == "transient":
+            said = f"A state of a run does not hold {lost}, so this run begins without"
+            self.record.warn(f"{said}; `dbvfiv resume` goes on with all of it.")
 
     def _judge_rubber(self, state: MotionState, inlet: float) -> None:
         """Say what is worth knowing of the rubbers in the first state, and note where constants of those with loss

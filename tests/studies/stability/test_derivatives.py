@@ -110,6 +110,13 @@ def test_derivatives_in_water(in_water, name):
     check(in_water, name, NEAR_RAYLEIGH, 3e-5)
 
 
+def test_a_pipe_around_the_wall_changes_its_modes_alone(in_water):
+    """It moves no steady state, and is so near that steps of a thousandth leave differences of 1e-3 of themselves."""
+    check(in_water, "outside.pipe_diameter", NEAR_RAYLEIGH, 5e-4)
+    found = in_water.slope("outside.pipe_diameter")
+    assert abs(found.derivative) > 50 and not any(found.performance.values())
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("changes", "name"),

@@ -23,6 +23,16 @@ def test_a_loss_factor_of_zero_is_an_undamped_wall(valve):
         assert np.array_equal(zero.history[name], plain.history[name])
 
 
+def test_a_start_from_a_run_says_what_its_states_do_not_hold(valve, tmp_path):
+    short = {"transient.duration": 2e-3, "drive.pressure": 6e3}
+    again = {"transient.start": "state", "transient.start_file": str(tmp_path / "run.h5")}
+    for changes, said in ((LOSSY | short, "what its relaxing layers remember"), (short, "")):
+        (tmp_path / "run.h5").unlink(missing_ok=True)
+        transient(valve(changes), output=tmp_path / "run.h5")
+        found = [one for one in transient(valve(changes | again)).warnings if "does not hold" in one]
+        assert len(found) == bool(said) and all(said in one for one in found)
+
+
 @pytest.mark.slow
 def test_energy_is_balanced_and_each_material_has_its_share(valve):
     """A smooth run: the pressure rises in a tenth of a second. Corrections end where they no longer show; those that

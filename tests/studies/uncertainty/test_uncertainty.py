@@ -389,6 +389,10 @@ MALFORMED = [
     ('inputs."materials.CR.loss_factor" = "uniform(0.1, 3)"', "cannot be"),
     ('inputs."materials.fibre.fibre_fraction" = "normal(5 %)"', "of fibre need a table .materials.fibre. with its"),
     ('inputs."materials.CR.density" = "normal(5 %)"', "other numbers of CR need a table"),
+    ('inputs."mesh.grading" = "normal(5 %)"', "describes no valve but how it is computed"),
+    ('inputs."transient.step" = "normal(5 %)"', "describes no valve but how it is computed"),
+    ('inputs."valve.wall_thickness" = "normal(5 %)"', "says nothing with valve.wall = 'measured'"),
+    ('inputs."fluid.heat_capacity_ratio" = "normal(5 %)"', "says nothing without sound_speed"),
     ('inputs.density = "normal(5 %)"\ninputs."fluid.density" = "normal(2 %)"', "density twice"),
     ('inputs.pressure = "normal(5 %)"\nover = "pressure=0.1 m:1 m:3"', "uncertainty.over moves"),
     ('inputs."fluid.density" = "normal(5 %)"\nover = "density=10:100:3"', "uncertainty.over moves"),
@@ -496,13 +500,37 @@ def test_numbers_that_are_taken_as_inputs_can_be_set(level):
     assert {key.rpartition(".")[2] for key, _ in taken} == {"stiffness_factor", "loss_factor"} | rubber
 
 
+def test_materials_may_have_dots_in_their_names():
+    card = {"kind": "neo-hookean", "shear_modulus": 1e6, "density": 1200.0, "loss_factor": 0.1}
+    case = load_case("cases/dbv12.toml").replace(
+        {"materials": {"EPDM 60.1": card}, "layers": [{"material": "EPDM 60.1", "thickness": 0.01}]}
+    )
+    plan = Plan(case.replace({"damping.model": "loss factor", "damping.beta": None}))
+    names = [one.name for one in plan.inputs]
+    assert names[:2] == ['materials."EPDM 60.1".stiffness_factor', 'materials."EPDM 60.1".loss_factor']
+    assert plan.inputs[0].title == "EPDM 60.1: stiffness factor"
+    sampled = plan.redescribed(np.array([1.1, 0.2, *(one.distribution.median for one in plan.inputs[2:])]))
+    own = sampled.materials.named["EPDM 60.1"]
+    assert (own.stiffness_factor, own.loss_factor) == (1.1, 0.2)
+
+
+@pytest.mark.parametrize("share", [0.9, 0.98, 1.02])
+def test_a_radius_of_the_lip_that_varies_makes_the_valve_that_has_it(share):
+    """No more of the bill than its radius is taken from the passage; a smaller one left none."""
+    case = load_case("cases/dbv6.toml")
+    radius = share * case.valve.as_given.lip_radius
+    typed = load_case("cases/dbv6.toml", [f"valve.lip_radius={radius}"])
+    made = redesigned(case, {"valve.lip_radius": radius})
+    assert made.valve.rest_areas == pytest.approx(typed.valve.rest_areas)
+
+
 def test_lengths_and_sizes_of_a_sampled_valve_move_as_those_of_a_design():
     """Places along the wall with the parts; sizes that follow by rules of the 12-inch valve stay."""
     inputs = {"valve.duckbill_length": "normal(2 %)", "valve.saddle_length": "normal(2 %)"}
     inputs |= {"valve.lip_half_width": "normal(1 %)", "materials.CR.stiffness_factor": "lognormal(1.1)"}
     rows = [0.0, 0.1, 0.21, 0.3, 0.4, 0.49, 0.52, 0.56]
     keys = {"valve.patches": [{"end": 0.49, "extra": 0.002}], "valve.moulded_length": 0.21, "layers.0.end": 0.3}
-    keys |= {"mesh.row_positions": rows, "mesh.breaks": [0.525]}
+    keys |= {"mesh.row_positions": rows, "mesh.breaks": [0.525], "valve.sealing_pressure": 800.0}
     plan = Plan(load_case("cases/dbv12.toml").replace({"uncertainty.inputs": inputs} | keys))
     valve, sampled = plan.case.valve, plan.redescribed(np.array([0.22, 0.29, 0.126, 1.2]))
     ends = [step.to for step in sampled.valve.wall_map]
