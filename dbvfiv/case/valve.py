@@ -206,17 +206,17 @@ def check_preset(valve: Valve) -> None:
             f"{getattr(valve, told[1]):g} beside {told[0]} = {getattr(valve, told[0]):g}",
             f"one of {', '.join(PRESETS)} says how firmly the bill is moulded shut, so leave the others out",
         )
-    if not told and not valve._follows("moulded_length"):
-        raise BrokenRule(
-            "moulded_length",
-            f"{valve.moulded_length:g} m of a bill that is not moulded shut",
-            f"give one of {', '.join(PRESETS)} with it, or leave it out",
-        )
     if valve.moulded_length > valve.duckbill_length * (1 + 1e-9):
         raise BrokenRule(
             "moulded_length",
             f"{valve.moulded_length:g} m",
             f"it must be at most duckbill_length = {valve.duckbill_length:g} m: behind it the walls stand apart",
+        )
+    if not told and not valve._follows("moulded_length"):
+        raise BrokenRule(
+            "moulded_length",
+            f"{valve.moulded_length:g} m of a bill that is not moulded shut",
+            f"give one of {', '.join(PRESETS)} with it, or leave it out",
         )
     if told and valve.lip_rise > 0:
         raise BrokenRule(
