@@ -30,12 +30,7 @@ FACE_STIFFNESS, SPREADING_STIFFNESS = 1e10, 1e9
 #: Share of the gap between rough faces in contact below which no passage of a bill that is moulded shut narrows.
 PRESET_FILM = 0.75
 #: Keys of a section, and of a table of a material, that say one thing in different ways.
-_ALTERNATIVES = {
-    "drive": ("pressure", "head"),
-    "upstream": ("friction", "roughness"),
-    "valve": PRESETS,
-    "transient": ("ramp", "drive_table"),
-}
+_ALTERNATIVES = {"drive": ("pressure", "head"), "upstream": ("friction", "roughness"), "valve": PRESETS}
 _OF_MATERIALS, _OF_PATCHES = (("hardness", "shear_modulus"), WAYS), ("thickness", "extra")
 
 
@@ -386,7 +381,7 @@ class Case(Section):
 
     @classmethod
     def take_along(cls, data: dict[str, Any], changed: Collection[tuple[str, ...]] | None = None) -> None:
-        """As of any table; with the last preset of a bill goes how far it is moulded shut."""
+        """Take out what any table does, and with the last preset of a bill how far it is moulded shut."""
         super().take_along(data, changed)
         valve, asked = data.get("valve"), {path[1] for path in changed or () if path[0] == "valve" and len(path) > 1}
         taken = changed is None or (asked & {*PRESETS} and "moulded_length" not in asked)

@@ -55,8 +55,8 @@ class MeshData:
     part_name: tuple[str, ...] = _kept("", "Part of the valve that the mesh is", TEXT, (QUARTER.name,))
 
     def differs_from(self, model: ValveModel) -> str:
-        """Whose mesh it is, where a state on it is none of a model's: the mesh has as many nodes, within the thickness
-        of the wall from the model's, and the same supports. Empty where it is.
+        """Words for the mesh where a state on it is none of a model's; empty where the model has as many nodes, no
+        further away than the wall is thick, and the same supports.
         """
         nodes, own = self.nodes, model.mesh.nodes
         if nodes.shape != own.shape:
@@ -64,9 +64,8 @@ class MeshData:
         distance = float(np.linalg.norm(nodes - own, axis=1).max())
         if distance > self.thickness.min():
             return f"another valve, whose nodes lie up to {1e3 * distance:.3g} mm from those of this case"
-        return (
-            "" if np.array_equal(self.free, model.shell.dofs.free) else "a valve with other supports than this case's"
-        )
+        alike = np.array_equal(self.free, model.shell.dofs.free)
+        return "" if alike else "a valve with other supports than this case's"
 
     @classmethod
     def of(cls, model: ValveModel) -> MeshData:

@@ -534,7 +534,7 @@ def test_unknown_key_names_the_one_that_holds_it(given, key):
     ],
 )
 def test_changes_in_python_are_those_of_set(tmp_path, change):
-    """In the units of the file, with file names relative to it."""
+    """Units are those of the file, and names of files begin in its folder."""
     (tmp_path / "drive.csv").write_text("0, 1000\n1, 2000\n")
     (tmp_path / "own.toml").write_text('[drive]\npressure = "2 m"\n')
     set_, key = load_case(tmp_path / "own.toml", [change]), change.partition("=")[0]
@@ -561,7 +561,7 @@ def test_a_missing_file_is_refused_by_every_door(tmp_path, key):
     ],
 )
 def test_a_key_that_is_set_takes_the_place_of_what_says_the_same(change, name):
-    """Of damping data and of patches too."""
+    """Damping data and the thickness of patches too."""
     case = load_case(ROOT / "cases/dbv4-wide.toml", [change])
     assert case.materials.named[name].loss_factor is None if name else case.valve.patches[0].extra is None
 

@@ -37,7 +37,7 @@ def test_a_killed_run_loses_nothing_and_ends_with_the_same_numbers(tmp_path, ask
 @pytest.mark.parametrize("kills, reads", [(3, 10), pytest.param(16, 40, marks=pytest.mark.random)])
 @pytest.mark.parametrize("kind", KINDS)
 def test_many_kills_and_reads(tmp_path, ask, kind, kills, reads):
-    """Of all kinds together some 40 kills and 130 reads, or 200 and 500."""
+    """Some 40 kills and 130 reads of all kinds together, or 200 and 500."""
     found = ask(kind=kind, folder=str(tmp_path), kills=kills, in_a_row=3, seed=100 + KINDS.index(kind))
     assert not found["wrong"] and found["kills"] >= kills, found
     seen = found["reads"]

@@ -240,7 +240,7 @@ def number_of(case: Case, name: str, key: str) -> tuple[FieldInfo, Any]:
 
 
 def _says_nothing(case: Case, path: Sequence[str], owner: Section) -> str:
-    """Why nothing of the valve depends on a key of the case, as a clause; empty where something does."""
+    """Clause on why nothing of the valve depends on a key of the case; empty where something does."""
     if path[0] in UNREAD or path[0] not in PhysicsCase.model_fields:
         return "which describes no valve but how it is computed or told"
     other = owner.needs.get(path[-1])

@@ -144,7 +144,7 @@ LIGHT = {"mesh.around": 5, "mesh.along": 6, "damping.alpha": 0.0}
     "beta, density, pressure", [(2e-5, 262.0, 5.43e3), pytest.param(5.6e-6, 295.0, 3.2e3, marks=pytest.mark.slow)]
 )
 def test_short_lists_of_a_lightly_damped_valve_hold_the_leading_modes(beta, density, pressure):
-    """Those of all up to the frequency that verdicts hold to; one search near the lowest modes missed up to five."""
+    """Modes of all up to the frequency that verdicts hold to; one search near the lowest ones missed up to five."""
     case = thesis_case(LIGHT | {"damping.beta": beta, "fluid.density": density, "drive.pressure": pressure})
     walk, place = StabilityWalk(case), Mu.of(case)
     pencil, asked = walk.family(place).at(place), walk.search(place)
