@@ -259,7 +259,10 @@ def test_intervals_hold_hidden_inputs_and_onsets(valves, least, most, tmp_path):
         ([{"frequency": 20.0}], "needs frequency and frequency_interval"),
         ([{"frequency": 20.0, "frequency_interval": 0.1, "damping_ratio": 0.1}], "give both"),
         ([{"frequency": 20.0, "frequency_interval": 0.1, "at": "head=1 m"}], "must be such as 'pressure=1 m'"),
-        ([{"frequency": 20.0, "frequency_interval": 0.1, "at": "pressure=1e9"}], "pressure is not within 0 to 1e"),
+        (
+            [{"frequency": 20.0, "frequency_interval": 0.1, "at": "pressure=1e9"}],
+            "pressure is not within more than 0 to 1e",
+        ),
         ([{"frequency": 20.0, "frequency_interval": 0.1, "at": "pressure=1 kg"}], "pressure=1 kg.* is not a pressure"),
         ([{"frequency": 20.0, "frequency_interval": 0.1, "at": "thickness=1"}], "must be such as"),
         ([{"frequency": 20.0, "frequency_interval": 0.1, "at": "tail_length=5 m"}], "no tail_length to change"),
