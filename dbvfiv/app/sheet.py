@@ -11,7 +11,7 @@ from typing import Any
 
 from ..case.describe import quantity_of, show_value, toml_name
 from ..case.distribution import samples_file
-from ..case.load import make_case, parse_toml, put, toml_value
+from ..case.load import held, make_case, parse_toml, put, toml_value
 from ..case.parameters import PARAMETERS
 from ..case.physics import LIQUID
 from ..case.quantity import GRAVITY
@@ -97,9 +97,7 @@ def _lines(table: Mapping[str, Any]) -> list[str]:
 
 def given(data: Mapping[str, Any], key: str) -> str:
     """Value of a key as it was given; empty where it was not."""
-    value: Any = data
-    for part in key.split("."):
-        value = value.get(part) if isinstance(value, Mapping) else None
+    value = held(data, key)
     return "" if value is None else value if isinstance(value, str) else show_value(value, None)
 
 

@@ -351,9 +351,7 @@ def toml_value(text: str) -> Any:
 
 def key_path(dotted: str) -> tuple[str, ...]:
     """The parts of a key as an override writes it; one with a dot in it stands in quotes."""
-    quoted = "'" in dotted or '"' in dotted
-    parts = re.findall(r"""\"[^\"]*\"|'[^']*'|[^.\"']+""", dotted) if quoted else dotted.split(".")
-    return tuple(part.strip().strip("\"'") for part in parts)
+    return _split(dotted) if {*dotted} & {*"'\""} else tuple(part.strip() for part in dotted.split("."))
 
 
 def plain(value: Any) -> Any:
@@ -363,6 +361,13 @@ def plain(value: Any) -> Any:
     if isinstance(value, (list, tuple)):
         return [plain(each) for each in value]
     return value.tolist() if hasattr(value, "tolist") else value
+
+
+def held(data: Any, dotted: str) -> Any:
+    """Value of plain data under a key; None where that is no key of tables in tables."""
+    for part in key_path(dotted):
+        data = data.get(part) if isinstance(data, Mapping) else None
+    return data
 
 
 def put(model: type[Section], data: dict[str, Any], dotted: str, value: Any) -> tuple[str, ...]:

@@ -11,7 +11,7 @@ from pydantic import ValidationInfo, model_validator
 from ..errors import CaseError
 from . import physics
 from .damping import MEANINGLESS, SHIPPED_LOSSES, WAYS, Damping
-from .load import key_path, make_case, plain, put, toml_value
+from .load import held, make_case, plain, put, toml_value
 from .materials import AUTO, DEFAULT_LAYERS, RUBBERS, Layer, Materials
 from .mesh import Mesh
 from .parameters import PARAMETERS
@@ -452,7 +452,7 @@ def change_case(case: Case, changes: Changes) -> Case:
     made = made_with(case.replace, names)
     data = made.to_dict()
     for name, value in names.items():
-        if _held(data, name) == [str(value)]:  # of the files of a key one was named
+        if held(data, name) == [str(value)]:  # of the files of a key one was named
             put(type(case), data, name, str(value))
     try:
         make_case(type(case), data)
@@ -460,13 +460,6 @@ def change_case(case: Case, changes: Changes) -> Case:
         if any(f"{error.key}.".startswith(f"{name}.") for name in names):
             raise
     return made
-
-
-def _held(data: Any, dotted: str) -> Any:
-    """What plain data has under a key; None where that is no key of tables in tables."""
-    for part in key_path(dotted):
-        data = data.get(part) if isinstance(data, dict) else None
-    return data
 
 
 def made_with(make: Callable[[Mapping[str, Any]], Case], changes: Changes) -> Case:

@@ -81,12 +81,16 @@ class Section(BaseModel):
         fields = type(self).model_fields
         for name, other in self.needs.items():
             value = getattr(self, name)
-            if value != fields[name].default and getattr(self, other) == fields[other].default:
+            if value != fields[name].default and self.is_usual(other):
                 quantity = mark_of(fields[name], Quantity)
                 shown = quantity.show(value) if quantity else value
                 given = f"{shown:g}" if isinstance(shown, float) else str(shown)
                 raise BrokenRule(name, f"{given} without {other}", "it says nothing alone, so give both or neither")
         return self
+
+    def is_usual(self, name: str) -> bool:
+        """True where a key has its default, so that those that need it say nothing."""
+        return bool(getattr(self, name) == type(self).model_fields[name].default)
 
     @classmethod
     def make_way(cls, data: dict[str, Any], changed: Collection[tuple[str, ...]]) -> None:

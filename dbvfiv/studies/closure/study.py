@@ -314,8 +314,10 @@ class ClosureResult(StudyResult):
         """Pressure on the path, Pa, up to which the load had to rise for some section to be shut; 0 for a bill that is
         moulded shut; None if none was, or supports hold the lips.
         """
-        if self.supports == HELD_LIPS or self.case.valve.is_preset:
-            return None if self.supports == HELD_LIPS else 0.0
+        if self.supports == HELD_LIPS:
+            return None
+        if self.case.valve.is_preset:
+            return 0.0
         highest = 0.0
         for point in self.walk:
             if point.sealed_length > 0:

@@ -159,7 +159,7 @@ class OnsetSearch:
         return point
 
     def _twin(self, point: OnsetPoint) -> OnsetPoint | None:
-        """The same onset, located from another growth rate; None where there is none."""
+        """Onset that was located from another growth rate before; None without one."""
         value, frequency = ASIDE * abs(point.value), SAME * point.frequency  # no further apart than its two sides
         alike = (p for p in self.points.values() if p.key != point.key and p.gains == point.gains)
         near = (p for p in alike if abs(p.value - point.value) <= value)

@@ -25,6 +25,7 @@ from eigen.operator import CoupledPencil
 from eigen.pairs import eigenvalue_derivative
 from eigen.spectrum import Mode
 
+from ...case.load import key_path
 from ...case.parameters import DESIGN, PARAMETERS, SURROUNDINGS, Mu
 from ...case.quantity import GRAVITY
 from ...errors import CaseError, SolveError
@@ -186,7 +187,7 @@ class Neighbourhood:
         if unit_of(self.model.case, name) != "Pa" or not name.startswith(("layer ", "materials.")):
             return 0.0
         layers, by_name = self.model.shell.section.layers, not name.startswith("layer ")
-        its = [one for one in layers if one.name == name.split(".")[1]] if by_name else [layers[_layer(name)[0]]]
+        its = [one for one in layers if one.name == key_path(name)[1]] if by_name else [layers[_layer(name)[0]]]
         laws = [one.law for one in its]
         return max((law.small_strain_shear_modulus for law in laws if law.kind == MOONEY_RIVLIN), default=0.0)
 

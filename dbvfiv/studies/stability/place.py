@@ -244,7 +244,7 @@ def _says_nothing(case: Case, path: Sequence[str], owner: Section) -> str:
     if path[0] in UNREAD or path[0] not in PhysicsCase.model_fields:
         return "which describes no valve but how it is computed or told"
     other = owner.needs.get(path[-1])
-    if other and getattr(owner, other) == type(owner).model_fields[other].default:
+    if other and owner.is_usual(other):
         return f"which says nothing without {other}"
     wall = {"wall_thickness": "uniform", "wall_map": "measured"}.get(path[1]) if path[0] == "valve" else None
     if wall and case.valve.wall != wall:
