@@ -25,9 +25,9 @@ test: setup
 verify: setup
 	@$(PYTHON) -m pytest -n $(JOBS) --dist worksteal -rP -m "slow and not random" $(CORE)
 
-# the random sets: one outcome and one count at thousands of states; `make verify` has samples of some hundred
+# the random sets: one outcome and one count at thousands of states, and what `make verify` has samples of
 random: setup
-	@$(PYTHON) -m pytest -n $(JOBS) --dist worksteal -m random tests/verification tests/model tests/studies/identify tests/trial tests/case
+	@$(PYTHON) -m pytest -n $(JOBS) --dist worksteal -m random $(CORE)
 
 # flow and wall in three dimensions, end to end; installs Debian's OpenFOAM where there is none
 verify-3d: setup

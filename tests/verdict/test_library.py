@@ -58,7 +58,7 @@ def test_the_rows_are_those_of_the_page():
 
 
 @pytest.mark.slow
-@pytest.mark.long
+@pytest.mark.random
 def test_the_library_is_told_right_and_intervals_hold_the_truth():
     """Row by row, but for one record or interval of each."""
     found = {row: np.zeros(4, int) for row in ROWS}

@@ -83,12 +83,15 @@ def _swing(lip: np.ndarray, first: int, last: int) -> float:
 
 
 @pytest.mark.long
-def test_the_branch_on_the_mesh_of_the_cases():
-    """28 x 48 elements, six densities: amplitude within 0.5 %, period within 0.1 %."""
+@pytest.mark.parametrize(
+    "densities", [(45.0, 25.0), pytest.param((50.0, 40.0, 35.0, 30.0), marks=pytest.mark.random)]
+)
+def test_the_branch_on_the_mesh_of_the_cases(densities):
+    """28 x 48 elements: amplitude within 0.5 %, period within 0.1 %."""
     mesh = {"mesh.around": 28, "mesh.along": 48, "cycle.over": "density=25:60:8"}
     branch = Session(thesis_case(CASE | mesh)).perform("cycle")
     wrong = []
-    for value in (50.0, 45.0, 40.0, 35.0, 30.0, 25.0):
+    for value in densities:
         point = branch.nearest(value)
         assert point.value == value and point.stable
         period, share = point.orbit.motion.period, np.exp(point.exponents[0].real * point.orbit.motion.period)

@@ -189,7 +189,7 @@ def test_two_inputs_that_act_alike_are_said_to_be_confounded():
 
 @pytest.mark.slow
 def test_confounded_inputs_are_said_in_all_runs():
-    for seed in range(1, 11):
+    for seed in range(1, 4):
         says_confounded(two_that_act_alike(seed))
 
 
@@ -236,7 +236,7 @@ def found_of(valve, seed, folder):
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    "valves, least, most", [(2, 0.75, 1.0), pytest.param(25, 0.90, 0.99, marks=pytest.mark.random)]
+    "valves, least, most", [(1, 0.75, 1.0), pytest.param(25, 0.90, 0.99, marks=pytest.mark.random)]
 )
 def test_intervals_hold_hidden_inputs_and_onsets(valves, least, most, tmp_path):
     """Shares of valves under each kind of damping; of few, the binomial distribution leaves more room beside 95 %."""

@@ -148,7 +148,7 @@ def in_time(case, folder, time, pressure, step, duration):
 @pytest.mark.parametrize("frequency", [3.0, 12.0, 25.0])
 def test_a_sine_in_time_has_the_amplitude_and_the_phase(valve, tmp_path, frequency):
     inlet, amplitude = valve.case.drive.pressure, 5.0
-    step, duration = 1 / frequency / 200, max(12 / frequency, 1.2)
+    step, duration = 1 / frequency / 100, max(12 / frequency, 1.2)
     time = np.arange(0.0, duration, step / 2)
     pressure = inlet + amplitude * np.sin(2 * np.pi * frequency * time)
     history = in_time(valve.case, tmp_path, time, pressure, step, duration - step)
@@ -165,7 +165,7 @@ def test_a_sine_in_time_has_the_amplitude_and_the_phase(valve, tmp_path, frequen
 
 @pytest.mark.slow
 def test_noise_in_time_has_the_root_mean_square(valve, tmp_path):
-    inlet, sigma, step, duration = valve.case.drive.pressure, 10.0, 1e-3, 20.0
+    inlet, sigma, step, duration = valve.case.drive.pressure, 10.0, 1e-3, 8.0
     time = np.arange(0.0, duration + 4 * step, 4 * step)  # straight between values at random
     random = sigma * np.random.default_rng(7).standard_normal(len(time))
     history = in_time(valve.case, tmp_path, time, inlet + random, step, duration)

@@ -21,7 +21,7 @@ SINGLY = PAYS - 8
 pytestmark = pytest.mark.slow
 
 
-@pytest.fixture(scope="module", params=["quasi-steady", "storage"])
+@pytest.fixture(scope="module", params=["quasi-steady", pytest.param("storage", marks=pytest.mark.random)])
 def valve(request):
     return dbvfiv.load(LINE, {**MESH, "drive.pressure": "2 m", "fluid.continuity": request.param})
 
