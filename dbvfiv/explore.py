@@ -99,7 +99,7 @@ class Explorer:
         check_scan(session.case)
         if session.case.seeks_operating_point:
             raise CaseError("The head follows from the pump here, so it cannot be chosen; leave out upstream.pump.")
-        self.model = session.model
+        self.model, self._session = session.model, session
         self.case = self.model.case
         self.walk = StabilityWalk(self.case, model=self.model)
         self.base = Mu.of(self.case)
@@ -116,7 +116,16 @@ class Explorer:
                 highest = min(above + high * (own - above), PARAMETERS[name].high)
                 if name == "loss_factor":
                     highest = self.model.relaxation.highest(own, highest)
+                while name == "pressure" and not self._bears(highest):
+                    highest = 0.5 * (highest + own)  # which it bears
                 yield name, (above + low * (own - above), highest)
+
+    def _bears(self, pressure: float) -> bool:
+        try:
+            self._session.require_borne(self.model, pressure=pressure)
+        except CaseError:
+            return False
+        return True
 
     def _can_ask(self, name: str) -> bool:
         try:
@@ -145,6 +154,8 @@ class Explorer:
             if not (row.low < value <= row.high or (value == row.low and row.low_included)):
                 least = f"from {row.low:g}" if row.low_included else f"above {row.low:g}"
                 raise CaseError(f"{name} is given as {given!r}; it must lie {least} up to {row.high:g}.")
+        if "pressure" in found:
+            self._session.require_borne(self.model, pressure=found["pressure"])
         return self.base.at(**found)
 
     def state(self, place: Mu) -> SteadyState:

@@ -68,6 +68,7 @@ def offered(keys) -> dict:
     found.case = Case().replace(keys)
     flow, relaxation = SimpleNamespace(back=0.0), SimpleNamespace(highest=lambda own, highest: highest)
     found.base, found.model = Mu.of(found.case), SimpleNamespace(flow=flow, relaxation=relaxation)
+    found._session = SimpleNamespace(require_borne=lambda *_, **__: None)
     return dict(found._offered())
 
 
@@ -212,3 +213,11 @@ def test_a_move_takes_so_much_of_a_processor(tmp_path):
         middle, most = np.percentile(seconds, (50, 95))
         print(f"state {'moves' if moves else 'stays'}: median {middle:.3f} s, 95 % {most:.3f} s of a processor")
     assert np.median(taken[False]) <= 0.2 and np.median(taken[True]) <= 2.0
+
+
+def test_heads_that_no_wall_bears_are_not_offered():
+    keys = COARSE | {"materials.strain_level": "10 %", "drive.pressure": "20 m"}
+    explorer = dbvfiv.load("cases/dbv4-wide.toml", keys).explore()
+    explorer.place({"pressure": explorer.ranges["pressure"][1]})
+    with pytest.raises(CaseError, match="strains the round wall"):
+        explorer.place({"pressure": "46 m"})

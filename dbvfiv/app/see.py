@@ -34,16 +34,17 @@ PICTURES = {
 
 
 def arguments_of(case: Any, title: str) -> list[str]:
-    """Arguments of the study of a picture for a case: heads over that downstream up to 1.5 times its own, damping from
-    a quarter to three times its own.
+    """Arguments of the study of a picture for a case: heads over that downstream up to 1.5 times its own, or that of
+    its column of fluid, damping from a quarter to three times its own, or to the end of its range.
     """
     name = Mu.of(case).damping or "density"
     own = Mu.of(case)[name]
     back = case.least_drive
-    low, high = (back + share * (case.drive.pressure - back) for share in (0.15, 1.5))
+    span = (case.drive.pressure - back) or abs(case.level_pressure)
+    low, high = (back + share * span for share in (0.15, 1.5))
     unit, scale = case.units.name("pressure"), case.units.factor("pressure")  # in any other the command would tell all
     heads = {"low": low, "high": high, "shown_low": low / scale, "shown_high": high / scale, "unit": unit}
-    values = heads | {"damping": f"{name}={0.25 * own:.6g}:{3 * own:.6g}"}
+    values = heads | {"damping": f"{name}={0.25 * own:.6g}:{min(3 * own, PARAMETERS[name].high):.6g}"}
     return [argument.format(**values) for argument in PICTURES[title][1]]
 
 

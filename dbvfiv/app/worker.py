@@ -139,7 +139,7 @@ class Desk:
     def motion(self, values: dict[str, float], frames: int = 12) -> dict[str, Any]:
         """One cycle of the leading mode that oscillates, as corners of the skin, m, with a sentence on it."""
         rest = dict(values)
-        found = self.valve.modes(rest.pop("pressure"), **rest)
+        found = self.valve.modes(rest.pop("pressure", None), **rest)
         mode = next((mode for mode in found.modes if mode.frequency > 0), None)
         if mode is None:
             raise CaseError("No mode that is listed oscillates.")

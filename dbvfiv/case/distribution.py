@@ -93,6 +93,15 @@ class Distribution:
             raise ValueError("whose bounds do not rise")
         return cls(form, (low, high))
 
+    @classmethod
+    def is_relative(cls, text: Any, quantity: Quantity, density: float | None = None) -> bool:
+        """True for a distribution that counts from the value of the case, or that cannot be read."""
+        try:
+            cls.parse(text, quantity, None, density)
+        except ValueError:
+            return True
+        return False
+
     def at(self, normal: np.ndarray) -> np.ndarray:
         """Values whose probability is that of standard normal ones of any shape."""
         import numpy as np  # here as below: keys of a case are read without it

@@ -287,7 +287,7 @@ class Case(Section):
 
     @property
     def vacuum_pressure(self) -> float:
-        """Pressure of a vacuum, Pa, over that around the jet."""
+        """Pressure of a vacuum, Pa, over that at the far end downstream: around the jet without a pipe there."""
         return -self.fluid.ambient_pressure - self.downstream.pressure
 
     @property

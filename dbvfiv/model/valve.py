@@ -383,11 +383,18 @@ class ValveModel(PressedShell):
         """Height at rest, m, of the middle of one lip over where its face meets the other; 0 of lips that touch at rest
         or rest on stops.
         """
-        if self.contact is None or not self.mesh.stands_apart:
+        left = (1.0 - self.case.film_share) * self.case.valve.initial_gap
+        return max(0.0, self.room - left) if self.mesh.stands_apart else 0.0
+
+    @cached_property
+    def room(self) -> float:
+        """Way, m, that the middle of one lip has from rest to where its face meets the other; 0 of lips that rest on
+        stops, or are moulded shut.
+        """
+        if self.contact is None or self.case.valve.is_preset:
             return 0.0
         middle = int(np.searchsorted(self.contact.nodes, self.mesh.centre_line[0]))
-        left = (1.0 - self.case.film_share) * self.case.valve.initial_gap
-        return max(0.0, float(self.contact.start[middle]) - left)
+        return max(0.0, float(self.contact.start[middle]))
 
     @property
     def parting(self) -> float:

@@ -10,7 +10,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..case.model import Case
-from ..case.tables import read_drive_table
 from .scheme import Scheme, scheme
 from .stepper import MotionState, StepFailure, StepOptions, Stepper, StepResult
 
@@ -144,8 +143,7 @@ class Drive:
         """Drive of a case: constant, a ramp, or a table."""
         transient = case.transient
         if transient.drive_table is not None:
-            times, pressures = zip(*read_drive_table(transient.drive_table))
-            return cls(times, pressures)
+            return cls(*zip(*transient.drive_rows))
         if transient.ramp > 0:
             return cls((0.0, transient.ramp), (0.0, case.drive.pressure))
         return cls((0.0,), (case.drive.pressure,))

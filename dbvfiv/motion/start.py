@@ -26,9 +26,10 @@ from .stepper import MotionState, consistent_state
 
 def first_state(
     motion: ValveMotion, case: Case, inlet: float, observer: Observer
-) -> tuple[MotionState, complex | None]:
-    """State that a case starts from, with inlet pressure (Pa) of the first instant; and the eigenvalue, 1/s, of the
-    mode that it was kicked along, if it was. Raises SolveError if the steady state or the mode was not found.
+) -> tuple[MotionState, np.ndarray, complex | None]:
+    """State that a case starts from, with inlet pressure (Pa) of the first instant; positions (n,) at rest or of the
+    steady state; and the eigenvalue, 1/s, of the mode that it was kicked along, if it was. Raises SolveError if the
+    steady state or the mode was not found.
 
     Parameters
     ----------
@@ -37,14 +38,15 @@ def first_state(
     """
     model, transient = motion.model, case.transient
     if transient.start == "rest":
-        return consistent_state(motion, 0.0, model.rest(), np.zeros(model.size), inlet), None
+        return consistent_state(motion, 0.0, model.rest(), np.zeros(model.size), inlet), model.rest(), None
     observer.progress(f"steady state at {inlet:.6g} Pa")
     q = steady_positions(model, inlet, SteadyOptions.of(case))
     inner = steady_fluid(motion, q, inlet)
     if transient.start == "steady":
-        return consistent_state(motion, 0.0, q, np.zeros(model.size), inlet, inner), None
+        return consistent_state(motion, 0.0, q, np.zeros(model.size), inlet, inner), q, None
     observer.progress("mode to follow")
-    return kicked(motion, q, inner, inlet, case)
+    state, eigenvalue = kicked(motion, q, inner, inlet, case)
+    return state, q, eigenvalue
 
 
 def steady_fluid(motion: ValveMotion, q: np.ndarray, inlet: float, velocity: float | None = None) -> np.ndarray | None:
@@ -81,7 +83,8 @@ def kicked(
     motion: ValveMotion, q: np.ndarray, inner: np.ndarray | None, inlet: float, case: Case
 ) -> tuple[MotionState, complex]:
     """Steady state pushed along one of its leading modes, and the eigenvalue of that, 1/s. Raises SolveError if there
-    is no such mode, or it does not move the lip.
+    is no such mode, or it does not move the lip. Where a seal holds the lips the push is measured where the wall moves
+    most.
 
     Parameters
     ----------
@@ -103,8 +106,9 @@ def kicked(
         raise SolveError(f"The mode to push along at {inlet:.6g} Pa was not found: {said}.") from error
     mode, opening = found.mode(index), case.transient.kick_opening
     nodal = model.nodal(mode.q)
-    lip = nodal[model.mesh.centre_line[0], 1]
-    if abs(lip) < 1e-6 * np.abs(nodal[:, :3]).max():
+    most = nodal[:, :3].ravel()[np.argmax(np.abs(nodal[:, :3]))]
+    lip = most if linear.seal is not None else nodal[model.mesh.centre_line[0], 1]
+    if abs(lip) < 1e-6 * abs(most):
         raise SolveError(
             f"Mode {case.transient.kick_mode} does not move the middle of the lip, so no push can be measured there."
         )

@@ -57,7 +57,7 @@ class Journal(AbstractContextManager):
     Parameters
     ----------
     path : path
-        A result of that name is replaced when the new one has its first contents; any other file is left alone.
+        A result of that name is left until `take_name`, any other file for good.
     mesh : MeshData, optional
     tables : iterable of TableSpec
     known : Record, optional
@@ -82,13 +82,14 @@ class Journal(AbstractContextManager):
             self.path.parent.mkdir(parents=True, exist_ok=True)
         except OSError as error:
             raise unwritable(self.path, error) from None
+        replaces = self.path.exists() and self.path.stat().st_size > 0
         self._lock = WriterLock(self.path)
         self._file: h5py.File | None = None
-        new = self.path.with_name(f".{self.path.name}.{os.getpid()}.new")
+        self._new: Path | None = self.path.with_name(f".{self.path.name}.{os.getpid()}.new")
         try:
             _remove_left_over(self.path)
             self._require_room(_size_of(mesh))
-            file = self._file = h5py.File(new, "w", libver="latest", locking=False)
+            file = self._file = h5py.File(self._new, "w", libver="latest", locking=False)
             write_header(file, header)
             if mesh is not None:
                 write_mesh(file, mesh)
@@ -99,12 +100,17 @@ class Journal(AbstractContextManager):
             if known is not None:
                 self._copy(known)
             file.swmr_mode = True  # before it has the name: whoever opens it then sees that it grows
-            self._lock.move(new)
+            if not replaces:
+                self.take_name()
         except BaseException:
             self.close()
             raise
-        finally:
-            new.unlink(missing_ok=True)
+
+    def take_name(self) -> None:
+        """Let the file take its name: once there is something in it that must not be lost."""
+        if self._new is not None:
+            self._lock.move(self._new)
+            self._new = None
 
     def extend(self, table: str, columns: Mapping[str, np.ndarray]) -> None:
         """Add rows to a table, column by column, and see them into the file. Raises DiskFull."""
@@ -151,6 +157,8 @@ class Journal(AbstractContextManager):
                 self._file.close()
         finally:
             self._file = None
+            if self._new is not None:
+                self._new.unlink(missing_ok=True)
             self._lock.release()
 
     def __exit__(self, *error: object) -> None:
@@ -327,6 +335,7 @@ class GrowingRecord(Record, Observer, AbstractContextManager):
             for name, block in blocks.items():
                 self._rows[table][name].append(block)
             if self._journal is not None:
+                self._take_name()
                 self._journal.extend(table, blocks)
 
     def note(self, what: str, **data: Any) -> None:
@@ -337,13 +346,20 @@ class GrowingRecord(Record, Observer, AbstractContextManager):
             if self._journal is not None:
                 self._journal.write_log(text)
 
+    def _take_name(self) -> None:
+        """Replace an earlier result: a run that is refused before it begins leaves that alone."""
+        if self._journal is not None:
+            self._journal.take_name()
+
     def fail(self, sentence: str) -> None:
         """Keep what was not reached, and say it."""
+        self._take_name()
         self.note("failure", text=sentence)
         self.watcher.warn(sentence)
 
     def conclude(self, complete: bool) -> None:
         """Note that the run is over."""
+        self._take_name()
         self.note("end", complete=complete)
 
     def close(self) -> None:
@@ -362,6 +378,7 @@ class GrowingRecord(Record, Observer, AbstractContextManager):
     # -- as an observer ----
 
     def begin(self, study: str, total: int | None) -> None:
+        self._take_name()
         self.watcher.begin(study, total)
         told, self.first = self.first, ()
         for sentence in told:
@@ -443,7 +460,8 @@ class StoredRecord(Record):
 
 def copy_record(record: Record, tables: Iterable[TableSpec], path: str | Path) -> None:
     """Write a record into a file of its own. Raises CaseError if it cannot be written."""
-    Journal(path, record.header, record.mesh, tables, record).close()
+    with Journal(path, record.header, record.mesh, tables, record) as journal:
+        journal.take_name()
 
 
 def plain(value: Any) -> Any:

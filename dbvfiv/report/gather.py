@@ -130,6 +130,12 @@ def heads_of(case: Case) -> tuple[float, ...]:
     rest = case.least_drive
     given = case.steady.pressures if "pressures" in case.steady.model_fields_set else ()
     top = max([case.drive.pressure, *given])
+    if not top > max(rest, 0.0):
+        raise CaseError(
+            f"drive.pressure is {case.drive.pressure:g} Pa, and nothing is driven but by the valve's own column; "
+            "give report.heads, those that the report examines.",
+            key="report.heads",
+        )
     return (*(float(f"{rest + share * (top - rest):.9g}") for share in _HEADS[:-1]), top)
 
 

@@ -15,13 +15,14 @@ from typing import Any, Self
 
 from pydantic import create_model, model_validator
 
-from ..case.axis import parse_stability_axis
+from ..case.axis import parse_point, parse_stability_axis
 from ..case.describe import page
 from ..case.load import Overrides, key_path, read_case_file
 from ..case.model import Case as PhysicsCase
 from ..case.physics import LIQUID
 from ..case.quantity import head_of
 from ..case.section import BrokenRule, Section, key
+from ..case.statement import parse_statement
 from ..case.write import case_toml
 from ..errors import CaseError
 from ..texts import digits
@@ -62,7 +63,19 @@ class _CaseOfStudies(PhysicsCase):
         texts = {f"{kind}.{name}": getattr(section, name, None) for name in ("over", "x", "y")}
         axes = {key: parse_stability_axis(text) for key, text in texts.items() if text and "=" in text}
         found = [(key, tuple(axis.values)) for key, axis in axes.items() if axis.parameter == "pressure"]
-        return found + ([("levels.pressures", section.pressures)] if kind == "levels" else [])
+        density = self.fluid.density
+        if kind == "levels":
+            found.append(("levels.pressures", section.pressures))
+        elif kind == "transient" and section.drive_rows:
+            found.append(("transient.drive_table", tuple(pressure for _, pressure in section.drive_rows)))
+        elif kind == "identify":
+            points = [parse_point(one.at, density) for one in section.records]
+            found += [("identify.records", (p["pressure"],)) for p in points if "pressure" in p]
+        elif kind == "design":
+            said = [("design.aim", section.aim), *(("design.constraints", text) for text in section.constraints)]
+            read = [(key, parse_statement(text, key == "design.aim", density)) for key, text in said if text]
+            found += [(key, one.pressures) for key, one in read if one.pressures]
+        return found
 
     @model_validator(mode="after")
     def _steps_take_what_is_upstream(self) -> Self:

@@ -273,7 +273,7 @@ def _input(case: Case, name: str, text: str, source: str) -> Input:
             require_parameter(case, name)
         except CaseError as error:
             raise CaseError(f"{key} is given, but {lowered(str(error))}", key=key) from None
-        own = design_value(case, name) if row.design else Mu.of(case)[name]
+        own = design_value(case, name) if row.design else getattr(Mu.of(case), name)
         quantity, limits = row.quantity, (row.low, row.high)
     else:
         field, value = number_of(case, name, key)

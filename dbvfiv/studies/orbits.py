@@ -118,7 +118,7 @@ class Orbit:
     @property
     def clearance(self) -> float:
         """Least height of the middle of the lip over where it touches the other, m."""
-        return self.lip_extremes[0] + self.model.lens
+        return self.lip_extremes[0] + self.model.room
 
     @property
     def lip_harmonics(self) -> np.ndarray:
@@ -204,7 +204,7 @@ class Follower:
         model = self.system.model(place.for_system())
         #: Number of the displacement in y of the lip at x = z = 0 among the unknowns.
         self.lip = int(model.shell.dofs.index[model.mesh.centre_line[0], 1])
-        self.lens = model.lens
+        self.room = model.room
 
     def _flow(self, mu: Mapping[str, float]) -> FlowLaw:
         """Flow law behind a pump, with the static lift that makes the pressure that of the steady state, as spectra
@@ -222,12 +222,16 @@ class Follower:
             self._flows[value] = with_static_lift(model.flow, area, model.flow.steady_inner(area, mu), mu)
         return self._flows[value]
 
+    @property
+    def _first_harmonics(self) -> int:
+        return min(HARMONICS, self.case.cycle.max_harmonics)
+
     def at_rest(self, onset: Onset) -> Cycle:
         """The steady state at an onset, as a cycle at rest. Raises SolveError."""
         mu, q = onset.place.for_system(), self.walk.equilibrium(onset.place)
         model = self.system.model(mu)
         rest = np.concatenate([q, model.flow.steady_inner(model.rows.areas(model.nodal(q)), mu)])
-        motion = PeriodicMotion.of_waves((rest, np.zeros_like(rest)), HARMONICS, abs(onset.eigenvalue.imag))
+        motion = PeriodicMotion.of_waves((rest, np.zeros_like(rest)), self._first_harmonics, abs(onset.eigenvalue.imag))
         return Cycle(motion, mu, 0.0, 0, 0)
 
     def from_onset(self, onset: Onset, values: Sequence[float]) -> tuple[Cycle, Cycle, Cycle, bool]:
@@ -263,7 +267,7 @@ class Follower:
                 "The mode that becomes unstable does not move the middle of the lips, by which cycles are told."
             )
         waves = still, 0.5 * amplitude * shape / shape[self.lip]
-        small = PeriodicMotion.of_waves(waves, HARMONICS, abs(onset.eigenvalue.imag))
+        small = PeriodicMotion.of_waves(waves, self._first_harmonics, abs(onset.eigenvalue.imag))
         row = np.zeros_like(small.coefficients)
         row[1, self.lip] = 1.0
         for ratio in (SECOND, NEARER):

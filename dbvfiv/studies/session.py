@@ -9,6 +9,7 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any
 
+from ..case.distribution import Distribution
 from ..case.materials import HIGHEST_LEVEL
 from ..case.parameters import PARAMETERS
 from ..errors import CaseError, attempt
@@ -173,15 +174,18 @@ class Session:
         """
         free_memory()
         model = attempt(lambda: ValveModel(self.case))
-        self._require_borne(model)
+        self.require_borne(model)
         return model
 
-    def _require_borne(self, model: ValveModel, kind: str = "") -> None:
-        """Refuse pressures of the case, those of the ranges of a study too, that no wall like its bears."""
+    def require_borne(self, model: ValveModel, kind: str = "", **asked: float) -> None:
+        """Refuse pressures of the case, those that a study names and that are asked too, that no wall like its
+        bears.
+        """
         behind = self.case.rest_pressure - self.case.level_pressure  # what is around the wall bears it too
         opening, closed = self.case.straining_pressures()
         named = [("drive.pressure", opening, behind), ("closure.rated_pressure", closed, 0.0)]
         named += [(key, max(values), behind) for key, values in self.case.ranged_pressures(kind)]
+        named += [(name, pressure, behind) for name, pressure in asked.items()]
         for name, pressure, around in named:
             if pressure and (strain := hoop_strain(model, pressure - around)) > HIGHEST_LEVEL:
                 said = (
@@ -209,7 +213,7 @@ class Session:
         if {key.partition(".")[0] for key in changes} <= set(KINDS):
             session.__dict__.update({name: self.__dict__[name] for name in _MODELS if name in self.__dict__})
             if "described" in self.__dict__:
-                session._require_borne(self.described)
+                session.require_borne(self.described)
         return session
 
     def prepared(self, kind: str, changes: Mapping[str, Any]) -> Session:
@@ -224,6 +228,15 @@ class Session:
             if row is not None and row.key in given:
                 raise CaseError(
                     f"{row.name} is given as {given[row.key]!r}, but {key} = {text!r} moves it; one of them has to go."
+                )
+        inputs = given.get("uncertainty.inputs", self.case.uncertainty.inputs) if kind == "uncertainty" else {}
+        for name, text in inputs.items():
+            row = next((row for row in PARAMETERS.values() if name in (row.name, row.key) and row.key in given), None)
+            if row is not None and not Distribution.is_relative(text, row.quantity, self.case.fluid.density):
+                raise CaseError(
+                    f"{row.name} is given as {given[row.key]!r}, but uncertainty.inputs holds {name} = {text!r}; one "
+                    "of them has to go, or the input be relative, such as 'normal(5 %)'.",
+                    key="uncertainty.inputs",
                 )
         return self.replace(given)
 
@@ -288,7 +301,7 @@ class Session:
         study.check(self.case)
         refuse_read(self.case, output)
         if self.case.ranged_pressures(kind):
-            self._require_borne(self.described, kind)
+            self.require_borne(self.described, kind)
         session = self.asked(kind, observer)
         if session is not self:
             return session.perform(kind, output, observer, **choices)

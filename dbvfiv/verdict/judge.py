@@ -210,6 +210,9 @@ def within_noise(series: Series, options: JudgeOptions, residual: float | None, 
 
 #: Samples without which nothing is said.
 _FEWEST = 16
+#: Share of the power of a motion that grows or decays that its own harmonic holds where a weaker motion lengthens the
+#: period.
+_NEARLY_ALL = 0.8
 
 
 def judge(
@@ -341,6 +344,10 @@ def _oscillation(series: Series, options: JudgeOptions, size: float) -> Verdict 
     direction = _direction(cycles, options)
     if direction in ("growing", "decaying"):
         facts["mean"] = float(cycles.mean[-1])
+        if (times := _strongest_multiple(cycles.last(3))) > 1:  # a weaker motion repeats with so many of its cycles
+            facts |= {"period": period / times, "cycles": times * len(recent)}
+            facts["amplitude_trend"] = (1.0 + facts["amplitude_trend"]) ** (1.0 / times) - 1.0
+            facts["harmonics"] = harmonics(series, period / times, min(times * len(cycles), options.cycles))
     if small and direction != "growing":
         return None
     return _name(series, cycles, recent, facts, direction, options)
@@ -457,6 +464,13 @@ def _direction(cycles: Cycles, options: JudgeOptions) -> str:
     if whole.significant and abs(whole.change) > options.drift and (goes_on or hidden):
         return "growing" if whole.slope > 0 else "decaying"
     return name
+
+
+def _strongest_multiple(cycles: Cycles) -> int:
+    """Harmonic of cycles that holds nearly all of their power; 1 without such a one."""
+    power = (np.abs(np.fft.rfft(cycles.shape - cycles.mean[:, None], axis=1)) ** 2).sum(axis=0)[1:]
+    most = int(np.argmax(power))
+    return most + 1 if power[most] > _NEARLY_ALL * power.sum() else 1
 
 
 def _slackens(spread: np.ndarray) -> bool:

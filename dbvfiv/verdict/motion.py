@@ -169,6 +169,9 @@ _LEFT = 0.01
 _HELD = 0.3
 #: Cycles below which a level is not told from an oscillation.
 _FEW = 12
+#: Change of the amplitude over a record, logarithmic, below which multiples of a cycle could be the cause, and those
+#: that are fitted beside it.
+_SLOW, _OF_CYCLES = 0.5, range(2, 9)
 #: Least of a ring-down, of its amplitude at the start, that is left where it has not died.
 _DIED = 0.02
 
@@ -185,7 +188,7 @@ class Motion:
     start: float = np.nan  #: s; beginning of what was fitted.
     noise: float = np.nan  #: Root mean square of the noise.
     returns: bool = False  #: True where oscillations die and come back.
-    base: float = np.nan  #: Hz; frequency of a limit cycle, of which its lines are multiples.
+    base: float = np.nan  #: Hz; frequency of a cycle, of which its lines are multiples.
     level: float | np.ndarray = 0.0  #: float or (k,); what the lines of a limit cycle lie on, at all samples.
 
 
@@ -237,6 +240,8 @@ def judge_record(
         return shut
     if found.name not in _LINES:
         level = judged()
+        if level.name == "limit cycle" and level.decided and abs(level.frequency - found.base) < 1.0 / series.duration:
+            return level  # of more multiples than are sought
         goes_one_way = level.name in ("decaying", "growing")
         peaks = () if found.returns or goes_one_way else resonances(series)
         level = replace(level, lines=tuple(map(_summary, peaks)))
@@ -381,6 +386,10 @@ def _ringing(series: Series, frequency: float, cell: tuple[int, int], level: int
         degree = (min(level, 3) if part.duration * frequency > _FEW else min(level, 1)) if level else 0
         found = ring(part, frequency, degree)
         line = found.lines[0]
+        if abs(line.rate) * part.duration < _SLOW:  # multiples of a cycle that is no sine would leak into its rate
+            multiples = (Line(k * line.frequency) for k in _OF_CYCLES if k * line.frequency * part.step < _FASTEST)
+            found = fit(part, [line, *multiples], degree, rates=True, rounds=40)
+            line = found.lines[0]
         if not 0.5 < line.frequency / frequency < 2.0:
             continue
         change = line.rate * part.duration
@@ -428,10 +437,12 @@ def _named(fitted: Fit, whole: bool, series: Series) -> Motion:
     strong = own[0]
     _, margin, rest, _ = strongest(fitted.left, series.step, 0.5 * strong.frequency)
     bursts = margin > 0 and rest > 0.05 * strong.amplitude**2 * series.duration / 4.0
-    if not whole or bursts or _hump(fitted.left, series, strong, 0.5 * sum(line.amplitude**2 for line in own)):
-        return Motion("irregular", "Neither its phase nor its spectrum is a line.", fitted.lines, **facts)
     resolution = 1.0 / series.duration
     base = _fundamental(own, resolution)
+    if not whole or bursts or _hump(fitted.left, series, strong, 0.5 * sum(line.amplitude**2 for line in own)):
+        if not whole and len(own) > 2:  # more multiples than are sought
+            facts["base"] = base
+        return Motion("irregular", "Neither its phase nor its spectrum is a line.", fitted.lines, **facts)
     if base:
         lead = min(own, key=lambda line: abs(line.frequency - base))
         base = lead.frequency / max(1, round(lead.frequency / base))

@@ -13,9 +13,10 @@ from hypothesis import given as drawn
 from hypothesis import strategies as st
 
 from dbvfiv.app.ask import AskPanel
-from dbvfiv.app.see import RECORD, RunsPanel, arguments_of, map_figure
+from dbvfiv.app.see import PICTURES, RECORD, RunsPanel, arguments_of, map_figure
 from dbvfiv.app.sheet import bring, change, check, data_files, given, read_sheet, stay_inside, usual_value, write_sheet
 from dbvfiv.app.worker import text_for_page
+from dbvfiv.case.axis import parse_stability_axis
 from dbvfiv.case.quantity import GRAVITY
 from dbvfiv.case.valve import Valve
 from dbvfiv.errors import CaseError
@@ -300,3 +301,15 @@ def test_a_record_is_compared_with_the_wall_that_the_sliders_move(monkeypatch, t
     monkeypatch.setattr("dbvfiv.studies.session.settle_levels", settle)
     assert command_line("modes", file, *arguments).err.strip() == "Enough."
     assert asked == [(50e3, 0.1, 998.0, "m")]
+
+
+@pytest.mark.parametrize(
+    "keys",
+    [{"damping.model": "loss factor", "damping.loss_factor": 5.0}, {"drive.pressure": 0.0, "gravity.direction": "-z"}],
+)
+def test_ranges_of_pictures_can_be_read(keys):
+    case = Case().replace(keys)
+    for title, (study, _) in PICTURES.items():
+        for text in arguments_of(case, title):
+            if "=" in text and study != "steady":
+                parse_stability_axis(text)

@@ -177,3 +177,19 @@ def test_a_folder_that_cannot_be_written(tmp_path, refused):
         folder.mkdir(mode=0o500)
     with refused(CaseError):
         Journal(folder / "a.h5", header(), None, tables())
+
+
+def test_an_earlier_result_stays_until_a_run_begins(tmp_path):
+    """A command that is refused for its arguments took away what another had found."""
+    path = tmp_path / "a.h5"
+    with GrowingRecord(header(), None, tables(), path) as record:
+        record.append("states", row(0))
+        record.conclude(True)
+    before = path.read_bytes()
+    with pytest.raises(CaseError), GrowingRecord(header(), None, tables(), path) as record:
+        record.warn("Look out.")
+        raise CaseError("It is refused.")
+    assert path.read_bytes() == before and list(tmp_path.iterdir()) == [path]
+    with GrowingRecord(header(), None, tables(), path) as record:
+        record.begin("steady", 1)
+        assert not StoredRecord(path, tables, Case).rows("states")

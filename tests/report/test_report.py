@@ -699,3 +699,10 @@ def test_a_report_of_several_processes_ends_when_it_is_told_to_and_goes_on(tmp_p
         _, said = child.communicate(timeout=600)
         assert child.returncode == 0, said
     assert "Does it chatter" in text_of(tmp_path / "page.html")
+
+
+def test_a_valve_that_its_own_column_drives_needs_heads():
+    keys = ["drive.pressure=0", "gravity.direction=-z"]
+    with pytest.raises(CaseError, match=r"give report\.heads"):
+        heads_of(load_case(None, keys))
+    assert heads_of(load_case(None, [*keys, "report.heads=1 m"])) == (9806.65,)

@@ -147,7 +147,7 @@ def test_modes_of_a_flow_without_inertia_have_its_unknowns():
 
 
 def test_lips_that_stand_apart_touch_where_their_faces_meet():
-    orbit = Orbit(SimpleNamespace(lens=3e-3), {}, None)
+    orbit = Orbit(SimpleNamespace(room=3e-3), {}, None)
     vars(orbit)["lip"] = 1e-3 - 2e-3 * np.cos(orbit.phases)
     assert orbit.lip_extremes[0] == pytest.approx(-1e-3) and orbit.clearance == pytest.approx(2e-3)
 

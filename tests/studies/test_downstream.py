@@ -14,8 +14,10 @@ from dbvfiv.model import ValveModel, linearise, select_search
 from dbvfiv.model.equilibria import LoadPath
 from dbvfiv.model.sizes import hoop_strain
 from dbvfiv.studies.case import load_case, require_consistent, thesis_case
+from dbvfiv.studies.inputs import inputs_of
 from dbvfiv.studies.session import Session
 from dbvfiv.studies.stability.walk import StabilityWalk
+from dbvfiv.studies.transient.run import rise_around
 from eigen import SearchOptions, TransferBasis, certified_spectrum
 from tests.small_valves import FORMER, load_small
 from tests.studies.along import check_neutral
@@ -76,6 +78,9 @@ def test_the_pressure_downstream_bears_the_wall():
         lambda valve: valve.levels("46 m"),
         lambda valve: valve.sweep("pressure=45.9 m:46 m:2"),
         lambda valve: valve.map("pressure=1 m:46 m:2", "density=10:1000:2"),
+        lambda valve: valve.design({"thickness": "0.9:1.1"}, aim="loss coefficient at 46 m down"),
+        lambda valve: valve.explore().place({"pressure": "46 m"}),
+        lambda valve: valve.identify([{"frequency": 9.0, "frequency_interval": 0.1, "at": "pressure=46 m"}]),
     ],
 )
 def test_no_study_asks_for_a_pressure_that_no_wall_bears(ask):
@@ -84,6 +89,14 @@ def test_no_study_asks_for_a_pressure_that_no_wall_bears(ask):
     _ = valve.model
     with pytest.raises(CaseError, match="strains the round wall"):
         ask(valve)
+
+
+def test_no_run_follows_a_table_to_such_a_pressure(tmp_path):
+    table = tmp_path / "drive.csv"
+    table.write_text("0, 0\n1, 460e3\n")
+    valve = dbvfiv.load("cases/dbv4-wide.toml", {"mesh.around": 6, "mesh.along": 8, "materials.strain_level": "10 %"})
+    with pytest.raises(CaseError, match="transient.drive_table is 460 kPa at most, which strains the round wall"):
+        valve.transient("1 ms", drive_table=str(table))
 
 
 def test_a_drive_that_does_not_overcome_it_is_refused():
@@ -194,3 +207,26 @@ def test_onset_over_the_length_of_the_pipe():
     for point in found.points:
         assert point["confirmed"] and point["criticality"] in ("super", "sub")
         check_neutral((PIPE, KEYS, FORMER), "downstream.length", point["value"], 1e-4)
+
+
+def test_the_length_of_a_pipe_without_one_may_be_uncertain():
+    keys = {"downstream.pipe_diameter": "400 mm", "uncertainty.inputs": {"tail_length": "uniform(1 m, 3 m)"}}
+    (found,) = inputs_of(load_small(keys).case)
+    assert found.own == 0.0 and found.distribution.median == 2.0
+
+
+def test_the_pressure_around_the_jet_in_time_is_that_of_steady_flow():
+    """A steady history; and what it takes to move the column of the pipe."""
+    valve = load_small(LIGHT, PIPE)
+    state = valve.steady(pressure="3 m")
+    time = np.linspace(0.0, 1.0, 11)
+    columns = {"inlet_velocity": state.station_velocity[-1], "outlet_velocity": state.outlet_velocity}
+    columns |= {"outlet_area": state.outlet_area}
+    history = {name: np.full(11, value) for name, value in columns.items()} | {"time": time}
+    assert rise_around(history, valve.model) == pytest.approx(np.full(11, state.outlet_pressure), rel=1e-9)
+    history["outlet_velocity"] = np.zeros(11)
+    faster = history | {"inlet_velocity": columns["inlet_velocity"] * (1 + time)}
+    rises = [rise_around(one, valve.model)[0] for one in (history, faster)]
+    speed = float(valve.model.tail.speed(state.station_area[-1], columns["inlet_velocity"]))
+    assert rises[1] - rises[0] == pytest.approx(10.0 * 5.0 * speed, rel=1e-6)
+    assert rise_around(history, load_small(LIGHT).model) == 0.0

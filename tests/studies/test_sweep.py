@@ -18,6 +18,7 @@ from dbvfiv.studies.modes.search import run_modes
 from dbvfiv.studies.session import Session
 from dbvfiv.studies.stability import walk
 from dbvfiv.studies.sweep import study as tracked
+from dbvfiv.studies.sweep.study import Branch
 from eigen import SearchOptions
 from eigen.columns import ReducedColumn
 from tests.observers import Stop
@@ -232,3 +233,9 @@ def test_a_wall_that_relaxes_agrees_with_full_solves(over):
         here = Mu.of(case).at(**{found.parameter: found.values[column]})
         full = run_modes(model, state, here, Keys(count=3))
         assert max(nearest(found, column, value) for value in full.eigenvalues) < 1e-5
+
+
+def test_growth_that_is_rounding_crosses_nothing():
+    """An undamped wall changed from stable to unstable seven times beside no unstable mode."""
+    branch = Branch(1, np.array([1e-12, -2e-12, np.nan, 3.0]), np.full(4, 120.0), np.ones(4))
+    assert np.array_equal(branch.growth_beyond_rounding, [0.0, 0.0, np.nan, 3.0], equal_nan=True)

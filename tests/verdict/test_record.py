@@ -231,3 +231,31 @@ def test_what_grows_without_oscillating_grows(values, certain, detrend):
 def test_few_samples_have_their_size():
     found = judge_record(np.arange(8.0), np.arange(8.0) % 2)
     assert (found.name, found.mean, found.amplitude, found.rms) == ("undecided", 0.5, 0.5, 0.5)
+
+
+@pytest.mark.parametrize("frequency, phase", [(7.407, 0.021), (7.602, 0.242), (6.654, 0.447), (4.548, 0.21)])
+def test_cycles_that_are_no_sines_neither_ring_down_nor_grow(frequency, phase):
+    """Open for 0.3 of each cycle: multiples leaked into the rate of the one oscillation that was fitted."""
+    time = np.arange(0.0, 4.0, 2e-3)
+    share = (frequency * time + phase) % 1
+    open_ = np.where(share < 0.3, np.sin(np.pi * share / 0.3), 0.0)
+    found = judge_record(time, open_ + 0.01 * np.random.default_rng(1).standard_normal(time.size))
+    assert found.name == "limit cycle" and found.frequency == pytest.approx(frequency, rel=1e-3)
+
+
+def test_a_slow_ring_down_with_multiples_is_one():
+    time = np.arange(0.0, 4.0, 2e-3)
+    ring = np.exp(-0.05 * time) * (np.sin(2 * np.pi * 7.4 * time) + 0.5 * np.sin(4 * np.pi * 7.4 * time + 1))
+    found = judge_record(time, ring + 0.01 * np.random.default_rng(1).standard_normal(time.size))
+    assert found.name == "decayed" and found.lines[0]["rate"] == pytest.approx(-0.05, rel=0.05)
+
+
+@pytest.mark.parametrize("noise", [0.0, 0.01])
+@pytest.mark.parametrize("kind", ["spikes", "saw"])
+def test_cycles_of_many_multiples_are_limit_cycles(kind, noise):
+    """More multiples than are sought made them irregular."""
+    time = np.arange(0.0, 10.0, 1e-3)
+    share = 5.03 * time % 1
+    values = np.exp(-(((share - 0.5) / 0.02) ** 2)) if kind == "spikes" else 2 * share - 1
+    found = judge_record(time, values + noise * np.random.default_rng(3).standard_normal(time.size))
+    assert found.name == "limit cycle" and found.decided and found.frequency == pytest.approx(5.03, rel=1e-3)

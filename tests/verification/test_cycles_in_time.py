@@ -83,9 +83,7 @@ def _swing(lip: np.ndarray, first: int, last: int) -> float:
 
 
 @pytest.mark.long
-@pytest.mark.parametrize(
-    "densities", [(45.0, 25.0), pytest.param((50.0, 40.0, 35.0, 30.0), marks=pytest.mark.random)]
-)
+@pytest.mark.parametrize("densities", [(45.0, 25.0), pytest.param((50.0, 40.0, 35.0, 30.0), marks=pytest.mark.random)])
 def test_the_branch_on_the_mesh_of_the_cases(densities):
     """28 x 48 elements: amplitude within 0.5 %, period within 0.1 %."""
     mesh = {"mesh.around": 28, "mesh.along": 48, "cycle.over": "density=25:60:8"}

@@ -107,7 +107,7 @@ def _value(case: Case, name: str, key: str) -> tuple[Quantity, float]:
     if name not in PARAMETERS:
         return key_of(case, name, key)
     require_parameter(case, name)
-    own = design_value(case, name) if name in DESIGN else Mu.of(case)[name]
+    own = design_value(case, name) if name in DESIGN else getattr(Mu.of(case), name)
     if own is None:
         raise CaseError(f"{key} is given, and the valve has no one value of {name}; name keys of layers.", key)
     return PARAMETERS[name].quantity, own

@@ -96,7 +96,7 @@ def command(
     if not records and (at or column):
         raise CaseError("--at and --column say where records were taken; no record is given.")
     places, columns = _each(at, records, "--at"), _each(column, records, "--column")
-    given = [{"file": str(f), "at": p, "column": c} for f, p, c in zip(records or (), places, columns)]
+    given = [{"file": str(f.resolve()), "at": p, "column": c} for f, p, c in zip(records or (), places, columns)]
     changes = {
         "identify.records": given or None,
         "identify.over": over,

@@ -131,7 +131,7 @@ def _answered(plan: MapPlan, near: CycleCells, follower: Follower, onset: Onset,
             if beside is None:
                 break
             equation, rest = follower.amplitude(beside)
-            if not equation.residual <= TRUSTED or rest + follower.lens + equation.extremes()[0] <= 0:
+            if not equation.residual <= TRUSTED or rest + follower.room + equation.extremes()[0] <= 0:
                 break
             expected = beside.eigenvalue
             low, high = equation.extremes()

@@ -399,6 +399,12 @@ class MapResult(StudyResult):
         """Probability of flutter with the ends of its 95 % interval on the grid (3, y, x); NaN where there is none."""
         return chances.chance_grid(self.record, self.plan)
 
+    @property
+    def _own_law(self) -> int:
+        """Number of the picture of the case's own flow model; the first where none is its own."""
+        laws, own = self.plan.laws, self.plan.base.storage
+        return laws.index(own) if own in laws else 0
+
     def _has_chances(self, law: int) -> bool:
         return bool(self.case.map.samples) and self.plan.laws[law] == self.plan.base.storage
 
@@ -432,7 +438,7 @@ class MapResult(StudyResult):
             "warnings": list(self.warnings),
             "interrupted": not self.complete,
         }
-        document = shared | pictures[0] | {"classes": self.classes}
+        document = shared | pictures[self._own_law] | {"classes": self.classes}
         if len(pictures) > 1:
             document["laws"] = pictures
         return document

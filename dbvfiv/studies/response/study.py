@@ -23,7 +23,7 @@ from scipy.linalg import qr
 from eigen.factor import SingularShiftError, Workspace
 from eigen.family import DenseOperator
 from eigen.operator import real_apply
-from eigen.pairs import all_eigenvalues
+from eigen.pairs import acceptable, all_pairs, newton
 
 from ...case.parameters import PARAMETERS, PIPES, Mu
 from ...drawing.style import ACCENT, COMPUTED, headline, new_figure, parameter_label, some_of
@@ -46,6 +46,8 @@ from ..stability.walk import StabilityWalk
 OUTPUTS = {"lip_displacement": "m", "outlet_area": "m^2", "flow": "m^3/s", "flange_pressure": "Pa"}
 #: Relative error of the reduced response at which its space is accepted, and full solutions at most.
 ACCURACY, MOST = 1e-5, 40
+#: Residual of eigenvalues on the full operator, and their distance, relative, within which two are one.
+EXACT, SAME = 1e-8, 1e-6
 #: Directions of the space weaker than these are left out.
 WEAK = 1e-13
 #: Half widths of a peak between which its square is integrated, and nodes on each piece.
@@ -234,12 +236,30 @@ class Transfer:
             found.append(self._outputs(s, self._small_lip @ x, self._motion @ x, u))
         return np.array(found).reshape(-1, len(OUTPUTS))
 
+    @cached_property
     def modes(self) -> np.ndarray:
-        """Oscillating eigenvalues of the reduced operator in the range of frequencies, by falling growth rate."""
-        values = all_eigenvalues(self.reduced)
-        low, high = 2 * np.pi * self.frequencies[[0, -1]]
-        kept = values[(values.imag > max(low, 1e-6 * high)) & (values.imag < high) & (-values.real < values.imag)]
+        """Oscillating eigenvalues in the range of frequencies, by falling growth rate."""
+        values = self._eigenvalues()
+        kept = values[self._is_in_range(values)]
         return kept[np.argsort(-kept.real)]
+
+    def _is_in_range(self, values):
+        low, high = 2 * np.pi * self.frequencies[[0, -1]]
+        return (values.imag > max(low, 1e-6 * high)) & (values.imag < high) & (-values.real < values.imag)
+
+    def _eigenvalues(self) -> np.ndarray:
+        """Eigenvalues of the reduced operator in that range, corrected on the full one; without those that belong to
+        none.
+        """
+        values, x, u, *_ = all_pairs(self.reduced, left=False)
+        found: list[complex] = []
+        for i in np.flatnonzero(self._is_in_range(values)):
+            start = values[i], self._V @ x[:, i], u[:, i]
+            value, *_, residual, backward = newton(self.pencil, *start, workspace=self._workspace, tolerance=EXACT)
+            known = any(abs(value - other) <= SAME * abs(value) for other in found)
+            if acceptable(residual, backward, EXACT) and not known:
+                found.append(complex(value))
+        return np.array(found, complex)
 
     def spread(self, density: Callable[[np.ndarray], np.ndarray], breaks=()) -> Spread:
         """Random motion under a pressure of a given one-sided power density, Pa2/Hz over Hz, within the range of
@@ -247,7 +267,7 @@ class Transfer:
         """
         low, high = self.frequencies[[0, -1]]
         places = [low, high, *np.linspace(low, high, 33), *np.geomspace(low, high, 17), *breaks]
-        for value in self.modes():
+        for value in self.modes:
             places += [(value.imag + width * value.real) / (2 * np.pi) for width in WIDTHS]
         edges = np.unique([place for place in places if low <= place <= high])
         nodes, weights = np.polynomial.legendre.leggauss(NODES)
@@ -398,7 +418,7 @@ def _respond(walk: StabilityWalk, place: Mu, value: float, rows, record: Growing
         columns |= {f"{name}_real": row.real, f"{name}_imag": row.imag}
     table = np.array(rows)
     found = transfer.spread(lambda f: np.interp(f, *table.T, left=0.0, right=0.0), table[:, 0])
-    modes = transfer.modes()
+    modes = transfer.modes
     peaks = np.abs(transfer.at(modes.imag / (2 * np.pi)))
     record.extend(CURVE, columns)
     for mode, heights in zip(modes, peaks):

@@ -213,7 +213,8 @@ class SensitivityResult(StudyResult):
 
 
 def _line(result: SensitivityResult, found: Sensitivity) -> str:
-    row = PARAMETERS.get(found.parameter)
+    """Row of the table; two blanks before the unit keep it from being told in another one."""
+    row = result.case.units.parameter(found.parameter) if found.parameter in PARAMETERS else None
     scale, unit = (row.scale, row.shown_unit) if row else (1.0, unit_of(result.case, found.parameter))
     value = found.value / scale
     percent = found.per_percent
@@ -221,7 +222,7 @@ def _line(result: SensitivityResult, found: Sensitivity) -> str:
     widths = zip(result.elasticity(found).values(), (9, 11, 9, 9))
     further = "".join("-".rjust(width) if value is None else f"{value:{width}.3g}" for value, width in widths)
     return (
-        f"{found.parameter:<24}{value:>12.6g} {unit:<8}{found.growth_rate * scale:>12.4g}"
+        f"{found.parameter:<24}{value:>12.6g}  {unit:<7}{found.growth_rate * scale:>12.4g}"
         f"{found.frequency * scale:>13.4g}{relative}{further}"
     )
 

@@ -103,6 +103,16 @@ class Sensitivity:
         return Sensitivity(self.parameter, self.value, eigenvalues, performance)
 
 
+def is_key(name: str) -> bool:
+    """True for a key of the case, and not a parameter of all valves or a number of a layer."""
+    return name not in PARAMETERS and not name.startswith("layer ")
+
+
+def _another_valve(found: Sensitivity) -> SolveError:
+    name, value = found.parameter, found.value
+    return SolveError(f"Nothing can be differentiated by {name} at {value:g}: next to it is another valve.")
+
+
 class Neighbourhood:
     """A steady state and those beside it.
 
@@ -173,12 +183,23 @@ class Neighbourhood:
         spans = spans_about(self.model.case, name, value, self.step * size)
         near, *far = (self._between(name, value, *ends) for ends in spans)
         if not far:
+            if is_key(name):
+                self._require_smooth(near, size)
             return self._behind_pump(near)
         values = [mode.eigenvalue for mode in self.modes]
         sizes = np.array([*(np.abs(self.sums) @ np.abs(values) if values else ()), *self.performance.values()])
         if not near.is_like(*far, np.abs(sizes) / size):
-            raise SolveError(f"Nothing can be differentiated by {name} at {value:g}: next to it is another valve.")
+            raise _another_valve(near)
         return self._behind_pump(near.towards(*far))
+
+    def _require_smooth(self, near: Sensitivity, size: float) -> None:
+        """Compare central differences of one and of two steps: a wall that ends on a joint of the bill jumps there.
+        Raises SolveError if they differ.
+        """
+        step = 2.0 * self.step * size
+        wide = self._between(near.parameter, near.value, near.value - step, near.value + step, eigenvalues=False)
+        if not replace(near, eigenvalues=()).is_like(wide, np.abs([*self.performance.values()]) / size):
+            raise _another_valve(near)
 
     def _least_size(self, name: str) -> float:
         """Size of a parameter, SI, by a share of which it is stepped at least: of a constant of a rubber, which may be
@@ -207,7 +228,7 @@ class Neighbourhood:
     def _by_pressure(self) -> Sensitivity:
         return self.slope(_PRESSURE[0])
 
-    def _between(self, name: str, value: float, low: float, high: float) -> Sensitivity:
+    def _between(self, name: str, value: float, low: float, high: float, eigenvalues: bool = True) -> Sensitivity:
         """Differences between two values of a parameter."""
         ends = [changed(self.model, self.pressure, self.mu, name, end) for end in (low, high)]
         places, moved = [self.q, self.q], self.tangent([end[:2] for end in ends], high - low)
@@ -215,7 +236,8 @@ class Neighbourhood:
             places = [self.q + (end - value) * moved for end in (low, high)]
         below, above = (_performance(model, q, pressure, mu) for (model, pressure, mu), q in zip(ends, places))
         performance = {key: (above[key] - below[key]) / (high - low) for key in below}
-        return Sensitivity(name, value, self._eigenvalues(ends, places, high - low), performance)
+        moves = self._eigenvalues(ends, places, high - low) if eigenvalues else ()
+        return Sensitivity(name, value, moves, performance)
 
     def tangent(self, ends: Sequence[tuple[ValveModel, float]], apart: float) -> np.ndarray | None:
         """Derivative (n,) of the state from two valves with their inlet pressures, which lie `apart` in a parameter;
@@ -379,14 +401,24 @@ def _inward(case: Case, name: str, value: float, h: float) -> int:
         name.split()[-1] in ("mu_inf", "mu_0", "c", "c_3") and value < h
     ):  # constants of a softening layer, none negative
         return 1
-    is_key = name not in PARAMETERS and not name.startswith("layer ")
-    if is_key and all(row.low_included for row in PARAMETERS.values() if row.key == name):
+    if is_key(name) and all(row.low_included for row in PARAMETERS.values() if row.key == name):
         low, high = limits_of(number_of(case, name, "sensitivity.of")[0], name)
+        if low <= value - h and value + h <= high:  # rules between keys end it too
+            below, above = (_is_allowed(case, name, end) for end in (value - h, value + h))
+            return above - below
     elif name != "thickness" and name in (*DESIGN, "loss_factor"):
         low, high = PARAMETERS[name].low, PARAMETERS[name].high
     else:
         return 0
     return 1 if value - h < low else -1 if value + h > high else 0
+
+
+def _is_allowed(case: Case, name: str, value: float) -> bool:
+    try:
+        redesigned(case, {name: value})
+    except CaseError:
+        return False
+    return True
 
 
 def _layer(name: str) -> tuple[int, str]:

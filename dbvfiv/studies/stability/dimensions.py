@@ -105,6 +105,8 @@ def _require_two_laws(case: Case, study: str) -> None:
     axes = getattr(keys, "axes", (getattr(keys, "axis", None),))
     if not why and any(axis is not None and axis.parameter == "storage" for axis in axes):
         why = f"{'an axis' if study == 'map' else f'{study}.over'} moves the flow model itself"
+    if not why and study == "uncertainty" and "storage" in case.uncertainty.inputs:
+        why = "uncertainty.inputs moves the flow model itself"
     if why:
         said = f"{study}.continuity is given as 'both', but {why}; it must be 'case' then."
         raise CaseError(said, key=f"{study}.continuity")

@@ -140,7 +140,7 @@ def _shade(axes, result: StudyResult, x: np.ndarray) -> None:
     met = np.array([crossing.value for crossing in crossings]) / PARAMETERS[result.parameter].scale
     edges = np.unique([*x, *met]) if len(x) > 1 else np.array(limits(x, result.axis.log))
     middles = 0.5 * (place(edges[:-1]) + place(edges[1:]))
-    growth = np.array([np.interp(middles, place(x), branch.growth_rate) for branch in result.branches])
+    growth = np.array([np.interp(middles, place(x), branch.growth_beyond_rounding) for branch in result.branches])
     # a mode that is not followed is counted at both ends of a strip without a crossing
     counted = np.interp(middles, place(x), result.unstable_count > 0) == 1.0
     counted &= ~(np.isin(edges[:-1], met) | np.isin(edges[1:], met))

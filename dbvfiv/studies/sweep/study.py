@@ -34,7 +34,7 @@ from ..stability.dimensions import variants
 from ..stability.line import ParameterLine
 from ..stability.place import is_surrounding, require_kept_head, require_parameter
 from ..stability.samples import SAMPLE_TABLE, SAMPLES, Sample, SampleKey, keep_samples, read_samples
-from ..stability.verdict import Verdict, not_valid_at
+from ..stability.verdict import NEUTRAL, Verdict, not_valid_at
 from ..stability.walk import StabilityWalk, name_state_in_failures
 
 #: Writing branches so far may take this share of the time; a sweep of small cost is written once.
@@ -253,7 +253,7 @@ def check(case: Case) -> None:
     """Refuse a range of what the case does not have."""
     require_parameter(case, case.sweep.axis.parameter)
     require_kept_head(case, case.sweep.axis.parameter)
-    if case.sweep.axis.parameter == "density" and case.drive.kind != "flow":
+    if case.sweep.axis.parameter == "density" and case.drive.kind != "flow" and case.outside.fluid != "same":
         raise CaseError(
             "sweep.over ranges over density, but drive.kind is 'uniform' and there is no fluid; choose "
             "pressure, alpha, beta or loss_factor."
@@ -315,6 +315,12 @@ class Branch:
     def frequency(self) -> np.ndarray:
         """(p,) Hz, not negative."""
         return np.abs(self.angular_frequency) / (2 * np.pi)
+
+    @property
+    def growth_beyond_rounding(self) -> np.ndarray:
+        """(p,) 1/s; growth rates, 0 where they are rounding, as of an undamped wall."""
+        growth = self.growth_rate
+        return np.where(np.abs(growth) <= NEUTRAL * np.hypot(growth, self.angular_frequency), 0.0, growth)
 
     def summary(self) -> dict[str, Any]:
         """Plain numbers for JSON; None where the branch does not exist."""
@@ -435,7 +441,7 @@ class SweepResult(StudyResult):
         place = scale(self.values)
         found = []
         for branch in self.branches:
-            growth = branch.growth_rate
+            growth = branch.growth_beyond_rounding
             for i in np.flatnonzero(growth[:-1] * growth[1:] < 0):
                 share = growth[i] / (growth[i] - growth[i + 1])
                 at = place[i] + share * (place[i + 1] - place[i])

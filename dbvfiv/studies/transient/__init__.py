@@ -10,6 +10,7 @@ from pydantic import StrictBool, StrictInt, model_validator
 from ...case.quantity import Length, Number, Time
 from ...case.section import BrokenRule, Section, key
 from ...case.tables import ExistingFile, read_drive_table, readable_file
+from ...errors import CaseError
 from ..request import AnimationOption, Request, require_start_file
 
 ORDER = 40
@@ -62,7 +63,11 @@ class Keys(Section):
         1, "Which oscillating mode the push follows, counted by growth rate from 1.", ge=1, le=100
     )
     kick_opening: Length = key(
-        1e-4, "Displacement in y of one lip by the push; the clear opening changes by twice that.", gt=0, le=1
+        1e-4,
+        "Displacement in y of one lip by the push; the clear opening changes by twice that. Of a sealed bill, that of "
+        "the wall where it moves most.",
+        gt=0,
+        le=1,
     )
     start_file: ExistingFile | None = key(None, "Result file of the state to start from, relative to the case file.")
     start_state: StrictInt = key(-1, "Which state of start_file, from 0; negative ones count from the end.")
@@ -84,6 +89,19 @@ class Keys(Section):
         "Verdicts that end the run once they are certain: steady, decaying, limit cycle, growing, closed, chatters, "
         "irregular.",
     )
+
+    @property
+    def drive_rows(self) -> list[tuple[float, float]]:
+        """Times, s, and pressures, Pa, of `drive_table`; empty without one. Raises CaseError if it cannot be read any
+        more.
+        """
+        if self.drive_table is None:
+            return []
+        try:
+            return read_drive_table(self.drive_table)
+        except ValueError as error:
+            said = f'transient.drive_table is given as "{self.drive_table}", {error}.'
+            raise CaseError(said, key="transient.drive_table") from None
 
     @model_validator(mode="after")
     def _fits_together(self) -> Keys:

@@ -57,21 +57,25 @@ class RunVerdict:
     chatter: Mapping[str, Any] = field(default_factory=dict)
 
     @property
+    def _telling(self) -> tuple[Verdict, ...]:
+        """Verdicts on mass flow and lip displacement; a flow that never was tells nothing."""
+        lip = self.lip_displacement
+        return (self.mass_flow, lip) if self.mass_flow.largest > self.mass_flow.smallest else (lip,)
+
+    @property
     def name(self) -> str:
         """The livelier of the two: a flow can look settled while the lip still moves."""
-        names = (self.mass_flow.name, self.lip_displacement.name)
-        return max(names, key=_LIVELINESS.index)
+        return max((verdict.name for verdict in self._telling), key=_LIVELINESS.index)
 
     @property
     def decided(self) -> bool:
         """True where the verdicts on mass flow and lip displacement agree and a longer run would not change them."""
-        lip = self.lip_displacement
-        return self.mass_flow.decided and lip.decided and self.mass_flow.name == lip.name
+        return all(verdict.decided and verdict.name == self.name for verdict in self._telling)
 
     @property
     def governing(self) -> Verdict:
         """The verdict that gives the name."""
-        return self.mass_flow if self.mass_flow.name == self.name else self.lip_displacement
+        return next(verdict for verdict in self._telling if verdict.name == self.name)
 
     def summary(self) -> dict[str, Any]:
         """Plain SI numbers for JSON: name and numbers of the mass flow, then each signal by itself."""
@@ -182,7 +186,20 @@ def lip_gap(model: ValveModel) -> float:
     return model.mesh.part.copies * model.mesh.lip_gap
 
 
-def beyond_model(history: Columns, vacuum: float) -> str | None:
+def rise_around(history: Columns, model: ValveModel) -> np.ndarray | float:
+    """Pressure (k,), Pa, around the jet over that at the far end of a pipe behind the valve; 0 without one."""
+    tail = model.tail
+    if tail is None or model.case.is_compressed:
+        return 0.0
+    inlet = float(model.mesh.rest_area[-1] - model.mesh.wall_deduction[-1])
+    speed = tail.speed(inlet, history["inlet_velocity"])
+    jet_area = model.flow.open_area(history["outlet_area"] / model.mesh.part.copies)
+    gained = np.asarray(tail.gained(jet_area, history["outlet_velocity"], speed))
+    faster = tail.length * np.gradient(speed, history["time"])
+    return model.case.fluid.density * (faster + np.asarray(tail.lost_head(speed)) - gained)
+
+
+def beyond_model(history: Columns, vacuum: float, around: np.ndarray | float = 0.0) -> str | None:
     """Sentence on speeds and pressures beyond what the equations are for, None without any.
 
     An ideal incompressible fluid pays any price for passing a gap that shuts; a real one separates, cavitates or is
@@ -192,7 +209,9 @@ def beyond_model(history: Columns, vacuum: float) -> str | None:
     ----------
     history : mapping of str to array
     vacuum : float, Pa
-        Pressure of a vacuum, over that around the jet; no fluid's pressure falls below it.
+        Pressure of a vacuum, over that at the far end downstream; no fluid's pressure falls below it.
+    around : (k,) array or float, Pa
+        See `rise_around`.
     """
     fastest = np.asarray(history["mach"]) if "mach" in history else np.zeros(1)
     if fastest.max() > 1.0:
@@ -202,7 +221,7 @@ def beyond_model(history: Columns, vacuum: float) -> str | None:
             f"{100 * np.mean(fastest > 1.0):.2g} % of the steps and up to Mach {fastest.max():.3g}: what shocks take "
             "is a loss of head here, and the air that lips draw in then is a rough estimate."
         )
-    lowest = np.min(history["station_pressure"], axis=1)
+    lowest = np.min(history["station_pressure"], axis=1) + around
     beyond = np.flatnonzero(lowest < vacuum)
     if not len(beyond):
         return None
@@ -312,13 +331,13 @@ class Runner:
         """
         self._begin(0)
         inlet = self.drive(0.0)
-        state, eigenvalue = (first, None) if first is not None else self._first(inlet)
+        state, resting, eigenvalue = (first, first.q, None) if first is not None else self._first(inlet)
         energy = sum(self.motion.energies(state.q, state.v)) + self.motion.outside_energy(state.q, state.v)
         energy += self.model.weight_energy(state.q)
         self.progress = progress = Progress(state, energy=energy, control=tuple(self.control.pack()))
         if eigenvalue is not None:
             progress.eigenvalue = eigenvalue
-        self._judge_rubber(state, inlet)
+        self._judge_rubber(resting, inlet)
         row = self._reader.first(progress, inlet)
         self.history.append(row)
         self._row = row
@@ -339,10 +358,11 @@ class Runner:
             self.motion.outside.renewed = progress.renewed
         return self._go()
 
-    def _first(self, inlet: float):
+    def _first(self, inlet: float) -> tuple[MotionState, np.ndarray, complex | None]:
         if self.case.transient.start == "state":
             self._say_what_is_lost()
-            return stored_state(self.motion, self.case, inlet), None
+            state = stored_state(self.motion, self.case, inlet)
+            return state, state.q, None
         return first_state(self.motion, self.case, inlet, self.record)
 
     def _say_what_is_lost(self) -> None:
@@ -357,15 +377,15 @@ class Runner:
             said = f"A state of a run does not hold {lost}, so this run begins without"
             self.record.warn(f"{said}; `dbvfiv resume` goes on with all of it.")
 
-    def _judge_rubber(self, state: MotionState, inlet: float) -> None:
-        """Say what is worth knowing of the rubbers in the first state, and note where constants of those with loss
-        factors do not hold.
+    def _judge_rubber(self, q: np.ndarray, inlet: float) -> None:
+        """Say what is worth knowing of the rubbers in the first state (n,), before a push, and note where constants of
+        those with loss factors do not hold.
         """
-        for sentence in state_warnings(self.model, [SimpleNamespace(q=state.q, pressure=inlet)]):
+        for sentence in state_warnings(self.model, [SimpleNamespace(q=q, pressure=inlet)]):
             self.record.note(RUBBER, text=sentence)
             self.record.warn(sentence)
         loss = self.motion.mu.loss_factor
-        if loss and not (found := material_stability(self.model, state.q, inlet, loss)).holds:
+        if loss and not (found := material_stability(self.model, q, inlet, loss)).holds:
             self.record.note(REFUSAL, text=found.sentence)
 
     # -- the loop
@@ -403,7 +423,8 @@ class Runner:
         if not self.interrupted and not self.failures:
             self._checkpoint(needed=True)
         self.verdict = self._judge() if self.history.rows > 1 else None
-        if sentence := beyond_model(self.history, self.case.vacuum_pressure):
+        around = rise_around(self.history, self.model) if self.history.rows > 1 else 0.0
+        if sentence := beyond_model(self.history, self.case.vacuum_pressure, around):
             self.record.warn(sentence)
         return self
 

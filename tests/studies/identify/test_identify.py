@@ -1,6 +1,7 @@
 """Hidden valves found from records of their small motions; what cannot be told apart is said; files and refusals."""
 
 import json
+from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
@@ -8,6 +9,7 @@ import pytest
 
 import dbvfiv
 from dbvfiv.errors import CaseError
+from dbvfiv.studies import identify
 from dbvfiv.studies.identify.study import IdentifyResult
 from dbvfiv.studies.identify.valves import Places, least_damping, measured_of, onsets
 from dbvfiv.studies.inputs import Plan, inputs_of
@@ -389,3 +391,11 @@ def test_a_record_without_a_mode_is_refused(tmp_path):
     np.savetxt(path, np.column_stack([time, np.cos(70 * time)]), delimiter=",", header="time [s],lip", comments="")
     with pytest.raises(CaseError, match="No record holds a mode.*limit cycle"):
         load().identify([{"file": str(path)}])
+
+
+def test_records_of_a_case_that_is_written_elsewhere_are_found(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    record = tmp_path / "tap.csv"
+    record.write_text("time [s],lip\n" + "".join(f"{k / 100},{np.cos(k / 2):.4f}\n" for k in range(200)))
+    asked = identify.command(None, records=[Path("tap.csv")]).changes["identify.records"]
+    assert asked[0]["file"] == str(record)

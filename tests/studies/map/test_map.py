@@ -171,6 +171,9 @@ def test_both_laws_and_pairs_without_the_load(coarse_case):
         )
     )
     assert both.grid("growth_rate").shape == (2, 10, 2) and both.grid("certified").all()
+    document, laws = both.summary(), both.summary()["laws"]
+    own = both.plan.laws.index(both.plan.base.storage)
+    assert document["growth_rate"] == laws[own]["growth_rate"] != laws[1 - own]["growth_rate"]
     pair = coarse_case.replace(AXES | {"map.x": "beta=0.001:0.004:3", "map.y": "storage=0:1:5", "map.refine": 0})
     result = run_map(pair)
     assert result.grid("certified").all()

@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 
 from dbvfiv.case.parameters import Mu
-from dbvfiv.errors import CaseError
+from dbvfiv.errors import CaseError, SolveError
 from dbvfiv.model import ValveModel, linearise
 from dbvfiv.model.equilibria import find_equilibrium
 from dbvfiv.model.newton import EquilibriumSolver, NewtonOptions
-from dbvfiv.studies.case import thesis_case
+from dbvfiv.studies.case import load_case, thesis_case
 from dbvfiv.studies.stability.derivatives import (
     Neighbourhood,
     Sensitivity,
@@ -224,3 +224,18 @@ def test_a_small_constant_is_stepped_by_a_share_of_the_modulus():
         for name in ("flow", "loss_coefficient"):
             assert one.performance[name] == pytest.approx(flows[2].performance[name], rel=2e-3)
         assert one.eigenvalues == pytest.approx(flows[2].eigenvalues, rel=2e-3)
+
+
+@pytest.mark.slow
+def test_a_wall_that_ends_on_a_joint_has_no_derivative_by_its_end():
+    """Central differences of one step were a jump over the step: five times as large with a fifth of it."""
+    valve = beside(SMALL, RAYLEIGH, NEAR_RAYLEIGH)
+    with pytest.raises(SolveError, match="next to it is another valve"):
+        valve.slope("valve.wall_map.0.to")
+    assert np.isfinite(valve.slope("valve.wall_map.1.to").growth_rate)
+
+
+def test_a_rule_between_keys_ends_a_range_as_a_limit_does():
+    case = load_case("cases/dbv4-moulded.toml")
+    assert _inward(case, "valve.moulded_length", case.valve.duckbill_length, 1e-5) == -1
+    assert _inward(case, "valve.moulded_length", 0.9 * case.valve.duckbill_length, 1e-5) == 0

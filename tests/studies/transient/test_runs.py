@@ -7,12 +7,15 @@ import dbvfiv
 from dbvfiv.case import CaseError
 from dbvfiv.errors import SolveError
 from dbvfiv.motion.control import Drive
-from dbvfiv.motion.start import steady_positions
+from dbvfiv.motion.equations import ValveMotion
+from dbvfiv.motion.start import first_state, steady_positions
+from dbvfiv.observer import Observer
 from dbvfiv.studies.case import thesis_case
 from dbvfiv.studies.session import load_result
 from dbvfiv.studies.stability.verdict import DIVERGES, FLUTTERS, UNDECIDED
-from dbvfiv.studies.transient.run import Runner, assess, beyond_model, lip_gap, parting
+from dbvfiv.studies.transient.run import Runner, RunVerdict, assess, beyond_model, lip_gap, parting
 from dbvfiv.studies.transient.study import stability_of
+from dbvfiv.verdict import Verdict
 from tests.small_valves import SMALL
 
 from .runs import SHORT, transient
@@ -361,3 +364,33 @@ def test_pressures_below_vacuum_are_told():
     pressure[50:60, 2] = -2.5e6
     sentence = beyond_model(history, -101325.0)
     assert "from 0.5051 s" in sentence and "10 %" in sentence and "-2500 kPa" in sentence
+
+
+def verdict(name, decided=True, ends=(0.0, 1.0)):
+    return Verdict(name, decided, f"It is {name}.", smallest=ends[0], largest=ends[1])
+
+
+def test_a_flow_that_never_was_tells_nothing_of_a_run():
+    """Of a sealed bill and of a uniform load: no run without a flow could be certain."""
+    lip, none = verdict("decaying"), verdict("steady", ends=(0.0, 0.0))
+    run = RunVerdict(none, lip, lip, 1e-6, 600, 1.2)
+    assert run.name == "decaying" and run.decided and run.governing is lip
+    flowing = RunVerdict(verdict("steady"), lip, lip, 1e-6, 600, 1.2)
+    assert flowing.name == "decaying" and not flowing.decided
+
+
+@pytest.mark.slow
+def test_a_push_of_a_sealed_bill_is_measured_where_the_wall_moves():
+    """The faces hold its lips: 0.1 mm there was 123 mm of the wall, and the pipe around it was blamed."""
+    keys = SMALL | {"drive.pressure": "0.03 m", "transient.start": "kick"}
+    valve = dbvfiv.load("cases/dbv12-moulded.toml", keys)
+    motion = ValveMotion(valve.model)
+    inlet = valve.case.drive.pressure
+    state, steady, eigenvalue = first_state(motion, valve.case, inlet, Observer())
+    moved = np.abs(valve.model.nodal(state.q - steady)[:, :3]).max()
+    assert moved == pytest.approx(1e-4, rel=0.05) and eigenvalue.real < 0
+
+
+def test_a_missing_drive_table_is_named():
+    with pytest.raises(CaseError, match=r'transient.drive_table is given as ".*no.csv", which does not exist'):
+        dbvfiv.load(thesis_case(), SMALL).transient("10 ms", drive_table="no.csv")

@@ -19,9 +19,9 @@ from dbvfiv.report.answers import _chance
 from dbvfiv.report.gather import Gathered
 from dbvfiv.report.parts import chance_part
 from dbvfiv.studies import workers
-from dbvfiv.studies.case import load_case
+from dbvfiv.studies.case import load_case, thesis_case
 from dbvfiv.studies.inputs import Plan, inputs_of, quasi_random
-from dbvfiv.studies.session import load_result
+from dbvfiv.studies.session import Session, load_result
 from dbvfiv.studies.stability.place import number_of, plain_number, redesigned
 from dbvfiv.studies.stability.verdict import OUTCOMES
 from dbvfiv.studies.uncertainty.figures import tornado
@@ -542,3 +542,15 @@ def test_lengths_and_sizes_of_a_sampled_valve_move_as_those_of_a_design():
     assert (sampled.valve.lip_half_width, sampled.materials.named["CR"].stiffness_factor) == (0.126, 1.2)
     for name in ("lip_radius", "duckbill_wall_deduction", "flange_wall_deduction"):
         assert getattr(sampled.valve, name) == getattr(valve, name)
+
+
+def test_what_is_given_beside_an_input_is_refused():
+    """The command asked at 1 m, whatever -p said; an input that counts from the case follows it."""
+    session = Session(thesis_case(SMALL | {"uncertainty.inputs": {"pressure": "normal(1 m, 0.05 m)"}}))
+    with pytest.raises(CaseError, match="uncertainty.inputs holds pressure"):
+        session.prepared("uncertainty", {"drive.pressure": "2 m"})
+    session = session.replace({"uncertainty.inputs": {"drive.pressure": "normal(5 %)"}})
+    assert session.prepared("uncertainty", {"drive.pressure": "2 m"}).case.drive.pressure == pytest.approx(19613.3)
+    both = {"uncertainty.inputs": {"storage": "uniform(0, 1)"}, "uncertainty.continuity": "both"}
+    with pytest.raises(CaseError, match="uncertainty.inputs moves the flow model itself"):
+        session.replace(both).perform("uncertainty")
