@@ -295,7 +295,7 @@ class Valve:
         """
         given = None if records is None else [dict(record) for record in records]
         for record in given or ():
-            if record.get("file") is not None:  # a case that is written elsewhere finds it too
+            if isinstance(record.get("file"), str | Path):  # a case that is written elsewhere finds it too
                 record["file"] = str(Path(record["file"]).resolve())
         asked = {"identify.records": given, "identify.over": write_axis(over)}
         shared = None if workers is None else read_workers(workers)

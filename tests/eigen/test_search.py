@@ -4,6 +4,8 @@ import numpy as np
 import pytest
 
 from eigen import CoupledPencil, SearchOptions, Workspace, leading_modes
+from eigen.search import band_sought, holding_shift
+from eigen.spectrum import END
 from tests.systems.plate_over_channel import plate_over_channel
 from tests.systems.random_pencils import dense_eigenvalues, leading_of, random_pencil
 
@@ -208,3 +210,12 @@ def test_wrong_options_are_refused(wrong):
 def test_zero_modes_are_refused(plate):
     with pytest.raises(ValueError, match="at least 1"):
         leading_modes(plate, 0)
+
+
+def test_a_disc_through_the_limit_point_holds_the_band():
+    """From its centre on the real axis the corner of the band and of the growth rate is as far as the limit point."""
+    options, growth = SearchOptions(max_frequency=40.0, limit_point=-300.0), -20.0
+    centre = holding_shift(options, growth)
+    corner = complex(growth, band_sought(options))
+    assert abs(corner - centre) == pytest.approx(centre + END * 300.0) and centre > 0
+    assert holding_shift(SearchOptions(limit_point=-300.0), growth) == 0.0

@@ -94,7 +94,7 @@ def test_branches_are_told_apart_without_colour(sweep):
 def test_the_ground_of_a_sweep_is_red_where_modes_take_turns_and_hatched_where_none_is_known():
     """B is unstable up to 0.6 and A from 0.4 on; at the last value nothing is known."""
     rates = {"A": [-4.0, 6.0, 6.0, np.nan], "B": [6.0, -4.0, -4.0, np.nan]}
-    branches = [SimpleNamespace(growth_rate=np.array(rate)) for rate in rates.values()]
+    branches = [SimpleNamespace(growth_beyond_rounding=np.array(rate)) for rate in rates.values()]
     result = SimpleNamespace(
         parameter="alpha", axis=SimpleNamespace(log=False), branches=branches, unstable_count=np.array([2, 2, 2, -1])
     )

@@ -43,7 +43,7 @@ def test_no_door_calls_a_valve_stable_whose_line_is_too_coarse_for_its_modes():
     "case, keys",
     [
         (thesis_case(), {"modes.symmetry": "SA", "drive.pressure": "6 kPa"}),
-        (load_case("cases/dbv12-moulded.toml"), {"drive.pressure": "300 Pa"}),
+        pytest.param(load_case("cases/dbv12-moulded.toml"), {"drive.pressure": "300 Pa"}, marks=pytest.mark.slow),
     ],
 )
 def test_motions_that_meet_no_waves_are_searched_beyond_those_that_are_resolved(case, keys):

@@ -141,6 +141,7 @@ def test_workers_that_are_none_are_refused(given):
         read_workers(given)
 
 
+@pytest.mark.slow
 def test_processes_of_mpiexec_give_what_one_gives():
     done = run_under_mpi(3, "tests.studies.work")
     assert done.returncode == 0, done.stderr

@@ -123,6 +123,7 @@ def _members(group: int) -> list[str]:
     return [row[-1] for row in rows if int(row[0]) == group and not row[1].startswith("Z")]
 
 
+@pytest.mark.slow
 def test_ctrl_c_is_left_to_whoever_ignores_it(tmp_path):
     """A background job of a shell ignores it, and goes on."""
     run = subprocess.Popen(

@@ -147,6 +147,7 @@ def test_waves_resolved_far_above_the_modes():
     assert np.allclose(listed, every[np.argsort(-every.real)][: len(listed)], rtol=1e-7)
 
 
+@pytest.mark.slow
 def test_a_short_line_resolves_waves_far_above_the_modes():
     """Up to 16 kHz: at light damping a first shift of that size meets acoustic modes alone; at more the wall is stable
     and the count above what is resolved says nothing.

@@ -76,7 +76,7 @@ class Search:
         self.problem, self.aim, self.constraints, self._tried = problem, aim, list(constraints), tried
         self._seen: dict[tuple, tuple] = {}
         self._sizes: dict[str, float] = {}  # what constraints are counted in, by their texts
-        self.reserves: dict[float, float] = {}  # of margins at pressures, see `AtHead.reserve`
+        self.reserves: dict[float, float] = {}  # of margins of constraints at pressures, see `AtHead.reserve`
         self._latest: tuple | None = None  # valve of the last step that was one
 
     def from_start(self, share: np.ndarray, evaluations: int) -> Design | None:
@@ -220,7 +220,9 @@ class Search:
         any_head = next(iter(found.values()))
         widths = np.array([one.high - one.low for one in self.problem.variables])
         asked = [found[p] for p in self.aim.pressures] or [any_head]
-        aim, slope = together(self.aim, asked, [self.reserves[p] for p in self.aim.pressures])
+        if self.aim.quantity == "margin" and self.problem.inputs:
+            asked = [self.problem.without_reserve(values, p) for p in self.aim.pressures]
+        aim, slope = together(self.aim, asked)
         values_, missed, slopes, worst = [], [], [], []
         for one in self.constraints:
             here = [found[p] for p in one.pressures] or [any_head]
@@ -254,13 +256,12 @@ class Search:
         return added
 
     def _renew_reserves(self, design: Design) -> bool:
-        """Take the reserves of a design; True where one of them moved."""
+        """Take the reserves of a design in constraints; True where one of them moved."""
         moved = False
-        for p, margin in self._heads().items():
-            if margin:
-                at = self.problem.at(design.values, p, True)
-                moved |= abs(at.reserve - self.reserves[p]) > SETTLED * max(abs(at.values["margin"]), at.reserve)
-                self.reserves[p] = at.reserve
+        for p in {p for one in self.constraints if one.quantity == "margin" for p in one.pressures}:
+            at = self.problem.at(design.values, p, True)
+            moved |= abs(at.reserve - self.reserves[p]) > SETTLED * max(abs(at.values["margin"]), at.reserve)
+            self.reserves[p] = at.reserve
         return moved
 
     def _plain(self, values: tuple[float, ...], pressure: float, statement: Statement) -> float:

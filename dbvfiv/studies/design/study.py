@@ -204,15 +204,15 @@ def _verify(problem: DesignProblem, case: Case, number: int, design: Design | No
             state = walk.state(place)
             spectrum = margin_spectrum(walk, place)
             verdict = walk.verdict(place, spectrum)
+            reserve = 0.0
+            if verdict.stable and problem.inputs:  # of the search: 95 % of valves have the margin that is told
+                values = tuple(one.start for one in problem.variables) if design is None else design.values
+                reserve = problem.at(values, pressure, True).reserve
         except SolveError as error:
             record.fail(f"Design {number + 1} could not be verified: {error}" if number >= 0 else str(error))
             continue
         loss = state.hydraulics.loss_coefficient if state.hydraulics else np.nan
         row = {"design": number, "pressure": pressure, "outcome": OUTCOMES.index(verdict.outcome)}
-        reserve = 0.0
-        if verdict.holds and problem.inputs:  # of the search: 95 % of valves have the margin that is told
-            values = tuple(one.start for one in problem.variables) if design is None else design.values
-            reserve = problem.at(values, pressure, True).reserve
         row |= {
             "margin": least_ratio(spectrum) - reserve if verdict.holds else np.nan,
             "flow": state.volume_flow,

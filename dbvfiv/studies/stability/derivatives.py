@@ -402,6 +402,7 @@ def _inward(case: Case, name: str, value: float, h: float) -> int:
     ):  # constants of a softening layer, none negative
         return 1
     if is_key(name) and all(row.low_included for row in PARAMETERS.values() if row.key == name):
+        h *= 2.0  # as far as the wider of both differences
         low, high = limits_of(number_of(case, name, "sensitivity.of")[0], name)
         if low <= value - h and value + h <= high:  # rules between keys end it too
             below, above = (_is_allowed(case, name, end) for end in (value - h, value + h))
