@@ -214,7 +214,7 @@ def test_zero_modes_are_refused(plate):
 
 def test_a_disc_through_the_limit_point_holds_the_band():
     """From its centre on the real axis the corner of the band and of the growth rate is as far as the limit point."""
-    options, growth = SearchOptions(max_frequency=40.0, limit_point=-300.0), -20.0
+    options, growth = SearchOptions(max_frequency=400.0, limit_point=-300.0), -20.0
     centre = holding_shift(options, growth)
     corner = complex(growth, band_sought(options))
     assert abs(corner - centre) == pytest.approx(centre + END * 300.0) and centre > 0
