@@ -71,6 +71,15 @@ def attempt(work: Callable[[], Result]) -> Result:
         raise CaseError(str(error)) from error
 
 
+def is_accepted(check: Callable[[], Any]) -> bool:
+    """True where a check refuses nothing by a CaseError."""
+    try:
+        check()
+    except CaseError:
+        return False
+    return True
+
+
 def as_path(given: Any, what: str) -> Path:
     """Path of a file or folder. Raises CaseError for anything that is no name; `what` begins the sentence."""
     try:

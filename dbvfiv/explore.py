@@ -23,7 +23,7 @@ from eigen.spectrum import number_right_of
 
 from .case.parameters import PARAMETERS, Mu
 from .case.quantity import number_or_text
-from .errors import CaseError, SolveError
+from .errors import CaseError, SolveError, is_accepted
 from .model.build import build_flow
 from .model.equilibria import redescribe
 from .model.state import SteadyState
@@ -121,18 +121,10 @@ class Explorer:
                 yield name, (above + low * (own - above), highest)
 
     def _bears(self, pressure: float) -> bool:
-        try:
-            self._session.require_borne(self.model, pressure=pressure)
-        except CaseError:
-            return False
-        return True
+        return is_accepted(lambda: self._session.require_borne(self.model, pressure=pressure))
 
     def _can_ask(self, name: str) -> bool:
-        try:
-            require_parameter(self.case, name)
-        except CaseError:
-            return False
-        return True
+        return is_accepted(lambda: require_parameter(self.case, name))
 
     def moves(self, name: str) -> bool:
         """True where a parameter changes the steady state."""

@@ -68,6 +68,11 @@ class ValveMesh:
         return float(self.rest_area[0] - self.wall_deduction[0])
 
     @property
+    def inlet_passage(self) -> float:
+        """Area, m2, of the passage at the flange at rest."""
+        return float(self.rest_area[-1] - self.wall_deduction[-1])
+
+    @property
     def mirrored(self) -> np.ndarray | None:
         """(ne,) elements on the far side of the centre, where plies lie as in the mirror image of the quarter; None
         where there are none.

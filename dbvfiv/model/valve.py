@@ -426,5 +426,5 @@ class ValveModel(PressedShell):
             return 0.0
         velocity = self.flow.inlet_velocity(area, pressure, self.case.fluid.density)
         density = self.flow.inlet_density(area, pressure, self.case.fluid.density)
-        inlet = float(self.mesh.rest_area[-1] - self.mesh.wall_deduction[-1])
+        inlet = self.mesh.inlet_passage
         return self.mesh.part.copies * density * velocity * inlet

@@ -17,7 +17,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
-from functools import cached_property
+from functools import cached_property, partial
 
 import numpy as np
 
@@ -28,7 +28,7 @@ from eigen.spectrum import Mode
 from ...case.load import key_path
 from ...case.parameters import DESIGN, PARAMETERS, SURROUNDINGS, Mu
 from ...case.quantity import GRAVITY
-from ...errors import CaseError, SolveError
+from ...errors import CaseError, SolveError, is_accepted
 from ...flow.outside.shape import ShapeDerivative
 from ...materials.energy import MOONEY_RIVLIN
 from ...model.dynamics import LinearisedState, linearise
@@ -364,11 +364,7 @@ def _has(model: ValveModel, name: str) -> bool:
         return model.flow.has_fluid and model.flow.unsteady and not model.case.is_compressed
     if name in ("angle", "strain", "sealing"):
         return design_value(model.case, name) is not None
-    try:
-        require_parameter(model.case, name)
-    except CaseError:
-        return False
-    return True
+    return is_accepted(lambda: require_parameter(model.case, name))
 
 
 def unit_of(case: Case, name: str) -> str:
@@ -405,21 +401,13 @@ def _inward(case: Case, name: str, value: float, h: float) -> int:
         h *= 2.0  # as far as the wider of both differences
         low, high = limits_of(number_of(case, name, "sensitivity.of")[0], name)
         if low <= value - h and value + h <= high:  # rules between keys end it too
-            below, above = (_is_allowed(case, name, end) for end in (value - h, value + h))
+            below, above = (is_accepted(partial(redesigned, case, {name: end})) for end in (value - h, value + h))
             return above - below
     elif name != "thickness" and name in (*DESIGN, "loss_factor"):
         low, high = PARAMETERS[name].low, PARAMETERS[name].high
     else:
         return 0
     return 1 if value - h < low else -1 if value + h > high else 0
-
-
-def _is_allowed(case: Case, name: str, value: float) -> bool:
-    try:
-        redesigned(case, {name: value})
-    except CaseError:
-        return False
-    return True
 
 
 def _layer(name: str) -> tuple[int, str]:

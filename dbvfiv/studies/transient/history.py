@@ -75,7 +75,7 @@ class Instant:
         if self.motion.fluid.compressed:
             return self._facing.readings(self.load.area, self.state.fluid.inner)
         out = density * speed[0] * float(self.model.flow.open_area(self.load.area[0]))
-        return out, density * speed[-1] * self.reader.inlet_area, 0.0
+        return out, density * speed[-1] * self.model.mesh.inlet_passage, 0.0
 
     @cached_property
     def fluid(self) -> dict[str, float]:
@@ -92,7 +92,7 @@ class Instant:
 def pumped_flow(model: ValveModel, state: MotionState) -> float:
     """Flow rate at the pump, m3/s."""
     velocity, mesh = model.flow.far_velocity(state.fluid.inner), model.mesh
-    return mesh.part.copies * float(mesh.rest_area[-1] - mesh.wall_deduction[-1]) * velocity
+    return mesh.part.copies * mesh.inlet_passage * velocity
 
 
 def supplied_pressure(motion: ValveMotion, state: MotionState, drive: float) -> float:
@@ -383,7 +383,6 @@ class Reader:
         model = motion.model
         self.lip = LipCentre(model.mesh, model.shell)
         self._centre = model.shell.dofs.index[model.mesh.centre_line, 1]
-        self.inlet_area = float(model.mesh.rest_area[-1] - model.mesh.wall_deduction[-1])
 
     def centre_line(self, q: np.ndarray) -> np.ndarray:
         """(m,) displacement in y of the middle of the lips and the line behind it, m."""

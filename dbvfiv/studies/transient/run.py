@@ -191,8 +191,7 @@ def rise_around(history: Columns, model: ValveModel) -> np.ndarray | float:
     tail = model.tail
     if tail is None or model.case.is_compressed:
         return 0.0
-    inlet = float(model.mesh.rest_area[-1] - model.mesh.wall_deduction[-1])
-    speed = tail.speed(inlet, history["inlet_velocity"])
+    speed = tail.speed(model.mesh.inlet_passage, history["inlet_velocity"])
     jet_area = model.flow.open_area(history["outlet_area"] / model.mesh.part.copies)
     gained = np.asarray(tail.gained(jet_area, history["outlet_velocity"], speed))
     faster = tail.length * np.gradient(speed, history["time"])

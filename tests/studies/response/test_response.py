@@ -259,7 +259,7 @@ def test_the_command_tells_peaks_precursors_and_states_that_flutter(tmp_path, co
 
 @pytest.mark.slow
 def test_peaks_are_eigenvalues_of_the_full_operator():
-    """Of strongly damped ones the reduced operator was 3.7 % off."""
+    """Strongly damped ones of the reduced operator were 3.7 % off."""
     keys = {"fluid.continuity": "storage", "damping.beta": 1.5e-3, "drive.pressure": 18e3, "fluid.density": 1000.0}
     transfer = transfer_of(load_small(keys).case, np.linspace(1.0, 150.0, 24))
     every = all_eigenvalues(transfer.pencil)

@@ -371,7 +371,7 @@ def verdict(name, decided=True, ends=(0.0, 1.0)):
 
 
 def test_a_flow_that_never_was_tells_nothing_of_a_run():
-    """Of a sealed bill and of a uniform load: no run without a flow could be certain."""
+    """Runs without a flow, of a sealed bill or under a uniform load, could never be certain."""
     lip, none = verdict("decaying"), verdict("steady", ends=(0.0, 0.0))
     run = RunVerdict(none, lip, lip, 1e-6, 600, 1.2)
     assert run.name == "decaying" and run.decided and run.governing is lip
