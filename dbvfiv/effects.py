@@ -27,6 +27,7 @@ EFFECTS = {
     "Gravity has no part": ("unknown", "gravity.direction"),
     "lie beyond it": ("no answer beyond that back pressure", "closure.rated_pressure"),
     "half the diameter is its radius": ("unknown", "valve.flange_radius"),
+    "cracking pressure was not found": ("none on the states that were found", "-"),
     "more than any that is sold": ("unknown", "valve.scale"),
     "it is half the width of the bill": ("unknown", "valve.lip_half_width"),
     "before a valve of": ("unknown", "upstream.diameter"),

@@ -16,12 +16,12 @@ from ..studies.stability.verdict import STABLE
 
 #: Steps of a slider; time for which it rests before more than the prediction is computed, s.
 STEPS, REST = 400, 0.25
-#: Numbers that an answer shows: title, entry of the state, factor and unit.
+#: Numbers that an answer shows: title, entry of the state and quantity.
 NUMBERS = (
-    ("Opening", "lip_opening", 1e3, "mm"),
-    ("Flow", "volume_flow", 1e3, "L/s"),
-    ("Jet", "outlet_velocity", 1.0, "m/s"),
-    ("Passage", "outlet_area", 1e4, "cm²"),
+    ("Opening", "lip_opening", "size"),
+    ("Flow", "volume_flow", "flow"),
+    ("Jet", "outlet_velocity", "velocity"),
+    ("Passage", "outlet_area", "area"),
 )
 
 
@@ -44,6 +44,7 @@ class AskPanel:
         self._wanted: dict[str, float] = {}
         self._drawn = False
         self._rows: dict[str, dict] = {}
+        self._units: dict[str, tuple[str, float]] = {}
         self._boxes: dict[str, tuple[ui.slider, ui.number]] = {}
         self._moved = asyncio.Event()
         self._since = 0.0
@@ -141,7 +142,7 @@ class AskPanel:
         except CaseError as error:
             self._status.text = str(error)
             return
-        self._rows = found["parameters"]
+        self._rows, self._units = found["parameters"], found["units"] | {"area": ("cm²", 1e-4)}
         self._draw_sliders()
         self._drawn = True
         self._go_there()
@@ -225,10 +226,10 @@ class AskPanel:
     def _show(self, found: dict[str, Any], whole: bool = False) -> None:
         """Show an answer; where it is whole, what it lacks is not to be had."""
         verdict, state = found["verdict"], found["state"]
-        for _, name, factor, unit in NUMBERS:
-            self._numbers[
-                name
-            ].content = f"<b data-name='{name}' data-si='{state[name]!r}'>{_short(state[name] * factor)} {unit}</b>"
+        for _, name, quantity in NUMBERS:
+            unit, scale = self._units[quantity]
+            shown = f"{_short(state[name] / scale)} {unit}"
+            self._numbers[name].content = f"<b data-name='{name}' data-si='{state[name]!r}'>{shown}</b>"
         ratio, margin = verdict["damping_ratio"], verdict["critical_damping_factor"]
         begins, none = ("begins", "none down") if verdict["outcome"] == STABLE else ("ends", "no end up")
         missing = "not known" if whole else "–"

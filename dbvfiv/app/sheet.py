@@ -12,7 +12,6 @@ from typing import Any
 from ..case.describe import quantity_of, show_value, toml_name
 from ..case.distribution import samples_file
 from ..case.load import held, make_case, parse_toml, put, toml_value
-from ..case.parameters import PARAMETERS
 from ..case.physics import LIQUID
 from ..case.quantity import GRAVITY
 from ..case.section import Section
@@ -111,7 +110,7 @@ def shown_as(case: Case, name: str, beside: Collection[str] = ()) -> dict[str, A
     """Title, unit and its SI value of a parameter as a page shows it: pressures of liquids as heads, beside other
     densities as those of the fluid of the case.
     """
-    row, units = PARAMETERS[name], case.units
+    row, units = case.units.parameter(name), case.units
     if name != "pressure" or case.fluid.density < LIQUID or (units.text and not units.heads):
         return {"title": row.title, "unit": row.shown_unit, "scale": row.scale}
     scale = units.factor("pressure") if units.heads else GRAVITY * case.fluid.density

@@ -24,6 +24,7 @@ import numpy as np
 
 from ..api import Valve, load
 from ..case.section import Section
+from ..case.units import UNITS
 from ..case.write import case_toml
 from ..drawing.style import put_in_units, style
 from ..drawing.views import ValveSkin, valve_figure
@@ -79,7 +80,9 @@ class Desk:
         return {"kind": found.kind, "case": text_for_page(found.header.case)}
 
     def open(self, case: str) -> dict[str, Any]:
-        """Open a case file; the parameters that can be moved, SI, with their rows of the table."""
+        """Open a case file; the parameters that can be moved, SI, with their rows of the table, and units with their
+        SI values by quantity.
+        """
         self.valve = self.explorer = self._last = None  # one valve at a time
         self.valve = load(case)
         self.explorer = found = self.valve.explore()
@@ -88,7 +91,8 @@ class Desk:
         for name, (low, high) in found.ranges.items():
             rows[name] = shown_as(found.case, name, found.ranges)
             rows[name] |= {"low": low, "high": high, "own": found.base[name], "moves": found.moves(name)}
-        return {"parameters": rows}
+        units = found.case.units
+        return {"parameters": rows, "units": {one: (units.name(one), units.factor(one)) for one in UNITS}}
 
     def predict(self, values: dict[str, float]) -> dict[str, Any]:
         """Prediction of the reduced operator."""

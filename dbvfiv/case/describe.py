@@ -175,8 +175,8 @@ def allowed_words(field: FieldInfo) -> str:
     if kind.startswith("list of"):
         noun = DIMENSION[quantity.si]
         each = _bounds(_item_limits(field.annotation), quantity)
-        return f"a list of {some} {noun}, each {each}" if some else f"a list of {noun}s"
-    bounds = _bounds(_limits(field.metadata), quantity)
+        return (f"a list of {some} {noun}" if some else f"a list of {noun}s") + (f", each {each}" if each else "")
+    bounds = _bounds(_limits(field.metadata) | _item_limits(field.annotation), quantity)
     if quantity:
         noun = A_DIMENSION[quantity.si] if quantity.si else "a number"
         return f"{noun} {bounds}".strip()

@@ -4,7 +4,7 @@
 ``normal(MEAN, SD)``          mean and standard deviation
 ``lognormal(MEDIAN, FACTOR)`` median, and the factor between it and one standard deviation of its logarithm
 ``uniform(LOW, HIGH)``        even between two bounds
-``samples(V, V, ...)``        each of some values, or the lines of a text file, with the same probability
+``samples(V, V, ...)``        each of some values, or of those on the lines of a text file, with the same probability
 ============================  =========================================================================
 
 Arguments carry units as everywhere in a case. A per cent is of the value that the case has: ``normal(5 %)`` and
@@ -58,10 +58,9 @@ class Distribution:
         def value(part: str) -> float:
             return quantity.parse(number_or_text(part), density)
 
-        form, inside = match[1], match[2].strip()
-        if (file := samples_file(text)) is not None:
-            inside = ",".join(line for _, line in numbered_lines(file))
-        parts = [part.strip() for part in inside.split(",") if part.strip()]
+        form, file = match[1], samples_file(text)
+        lines = match[2].split(",") if file is None else (line for _, line in numbered_lines(file))
+        parts = [part.strip() for part in lines if part.strip()]
         if form == "samples":
             if len(parts) < 2:
                 raise ValueError("which names no file and fewer than two values")
@@ -162,11 +161,10 @@ class Distribution:
         if self.form == "samples":
             return f"samples of {len(self.numbers)} values"
         first, second = map(quantity.amount, self.numbers)
-        return (
-            f"{self.form}({first}, {self.numbers[1]:.4g})"
-            if self.form == "lognormal"
-            else f"{self.form}({first}, {second})"
-        )
+        # a factor has no unit, and a spread in per cent would be one of the value
+        if self.form == "lognormal" or (self.form == "normal" and quantity.shown == "%"):
+            second = f"{self.numbers[1]:.4g}"
+        return f"{self.form}({first}, {second})"
 
 
 def samples_file(text: str) -> Path | None:

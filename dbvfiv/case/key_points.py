@@ -121,7 +121,12 @@ def _table(numbered: list[tuple[int, str]]) -> list[KeyProfile]:
         row = dict(zip(names, words))
         points.append(_numbers([row[name] for name in "xyz"], number, [units[name] for name in "xyz"]))
         labels.append(row.get("profile", points[-1][2]))
-        joints.append(row.get("joint", "") not in ("", "0"))
+        joint = row.get("joint", "") or "0"
+        try:
+            marked = (0.0, 1.0).index(float(joint))
+        except ValueError:
+            raise ValueError(f"whose line {number} holds the joint {joint!r}, which is neither 0 nor 1") from None
+        joints.append(bool(marked))
     if not points:
         raise ValueError("which holds no points below its first line")
     groups, marks = _by(points, labels), _by(joints, labels)

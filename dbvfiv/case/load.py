@@ -364,9 +364,12 @@ def plain(value: Any) -> Any:
 
 
 def held(data: Any, dotted: str) -> Any:
-    """Value of plain data under a key; None where that is no key of tables in tables."""
+    """Value of plain data under a key; None where that is no key of tables and lists in tables."""
     for part in key_path(dotted):
-        data = data.get(part) if isinstance(data, Mapping) else None
+        if isinstance(data, list):
+            data = dict(enumerate(data)).get(int(part) if part.isdecimal() else None)
+        else:
+            data = data.get(part) if isinstance(data, Mapping) else None
     return data
 
 

@@ -318,16 +318,8 @@ class Materials(Section):
         if named is None:
             return data
         for name, value in data.items():
-            if name in cls.model_fields:
-                continue
-            if isinstance(value, dict):
-                before = named.get(name)
-                change = isinstance(before, dict) and "kind" not in value  # of single keys of a table that is there
-                if change and "hardness" in value:  # which stands for the modulus
-                    before = {key: one for key, one in before.items() if key != "shear_modulus"}
-                named[name] = before | value if change else value
-            else:
-                known[name] = value  # not a table: refused as an unknown key
+            if name not in cls.model_fields:  # what is not a table is refused as an unknown key
+                (named if isinstance(value, dict) else known)[name] = value
         for name, value in named.items():
             if isinstance(value, dict) and "hardness" in value and "shear_modulus" not in value:
                 given = value["hardness"]

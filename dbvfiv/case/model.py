@@ -17,11 +17,11 @@ from .mesh import Mesh
 from .parameters import PARAMETERS
 from .part import Part, part_of
 from .physics import Gravity, Outside
-from .pipes import Downstream, Upstream
+from .pipes import Downstream, Pipe, Upstream
 from .project import Life, Project, Report
 from .section import BrokenRule, Section, key
 from .units import Units, read_units, unit_of, with_pressure_in
-from .valve import PRESETS, Valve
+from .valve import PRESETS, SHAPE, Valve
 from .wall import edges_of
 
 #: Pressure over depth with which faces resist, Pa/m: nearly rigid; where contact spreads, some modulus over thickness
@@ -29,9 +29,21 @@ from .wall import edges_of
 FACE_STIFFNESS, SPREADING_STIFFNESS = 1e10, 1e9
 #: Share of the gap between rough faces in contact below which no passage of a bill that is moulded shut narrows.
 PRESET_FILM = 0.75
-#: Keys of a section, and of a table of a material, that say one thing in different ways.
-_ALTERNATIVES = {"drive": ("pressure", "head"), "upstream": ("friction", "roughness"), "valve": PRESETS}
-_OF_MATERIALS, _OF_PATCHES = (("hardness", "shear_modulus"), WAYS), ("thickness", "extra")
+
+
+def _each_of(keys: Iterable[str]) -> dict[str, set[str]]:
+    """Keys of which each stands in the place of the others."""
+    return {key: set(keys) - {key} for key in keys}
+
+
+#: Keys of a section, of a table of a material, of a pipe and of a patch that stand in the place of others.
+_OF_PIPES, _OF_PATCHES = _each_of(("friction", "roughness")), _each_of(("thickness", "extra"))
+_OF_MATERIALS = _each_of(("hardness", "shear_modulus")) | _each_of(WAYS)
+_INSTEAD = {
+    "drive": _each_of(("pressure", "head")),
+    "upstream": _OF_PIPES | {"pieces": set(Pipe.model_fields), "length": {"pieces"}},
+    "valve": _each_of(PRESETS) | {"key_points": set(SHAPE)},
+}
 
 
 class Case(Section):
@@ -146,6 +158,12 @@ class Case(Section):
             raise BrokenRule(
                 "drive.side", "'outside' with drive.kind = 'flow'", "it must be 'inside' unless drive.kind is 'uniform'"
             )
+        if self.drive.kind == "uniform" and self.downstream.pressure > 0:
+            raise BrokenRule(
+                "downstream.pressure",
+                f"{self.downstream.pressure:g} Pa with drive.kind = 'uniform'",
+                "drive.pressure is all that the wall sees then, so leave it out",
+            )
         if self.contact_spreads and self.supports.contact == "stops":
             shape = "a bill that is moulded shut" if self.valve.is_preset else "lips that are bowed apart"
             raise BrokenRule(
@@ -170,7 +188,7 @@ class Case(Section):
         self._check_compression()
         inlet = 2 * (self.valve.inlet_radius - self.valve.flange_wall_deduction)
         self.upstream.check_pipes(inlet)
-        self.downstream.check_pipe(inlet, self.valve.bill_width)
+        self.downstream.check_pipe(inlet, self.valve.bill_reach)
         self.outside.check_pipe(self.valve.outer_diameter)
         return self
 
@@ -359,19 +377,21 @@ class Case(Section):
     @classmethod
     def make_way(cls, data: dict[str, Any], changed: Collection[tuple[str, ...]]) -> None:
         """A key that is asked for stands in the place of one that was there before and says the same otherwise."""
-        own, valve = (data.get(name) if isinstance(data.get(name), dict) else {} for name in ("materials", "valve"))
-        tables = [((name,), data.get(name), keys) for name, keys in _ALTERNATIVES.items()]
-        tables += [(("materials", name), card, keys) for name, card in own.items() for keys in _OF_MATERIALS]
-        patches = valve.get("patches")
-        for i, patch in enumerate(patches if isinstance(patches, list) else ()):
-            tables.append((("valve", "patches", str(i)), patch, _OF_PATCHES))
-        for path, before, keys in tables:
-            asked = {key for key in keys if (*path, key) in changed}
-            if asked and isinstance(before, dict):
-                for other in set(keys) - asked:
-                    before.pop(other, None)
-                if not before.keys() & {"loss_data", "relaxation_data"}:
-                    before.pop("loss_temperature", None)
+        tables = [((name,), data.get(name), instead) for name, instead in _INSTEAD.items()]
+        own = data.get("materials")
+        tables += [(("materials", name), own[name], _OF_MATERIALS) for name in (own if isinstance(own, dict) else ())]
+        for path, instead in ((("valve", "patches"), _OF_PATCHES), (("upstream", "pieces"), _OF_PIPES)):
+            listed = held(data, ".".join(path))
+            tables += [
+                ((*path, str(i)), one, instead) for i, one in enumerate(listed if isinstance(listed, list) else ())
+            ]
+        for place, table, instead in tables:
+            given = {path[-1] for path in changed if path[:-1] == place} if isinstance(table, dict) else set()
+            asked = [name for name in instead if name in given and table.get(name) != []]
+            for other in {other for name in asked for other in instead[name]} - given:
+                table.pop(other, None)
+            if asked and not table.keys() & {"loss_data", "relaxation_data"}:
+                table.pop("loss_temperature", None)
         super().make_way(data, changed)
         damping = data.get("damping")
         if ("damping", "model") in changed and isinstance(damping, dict):
@@ -391,6 +411,12 @@ class Case(Section):
     def to_dict(self) -> dict[str, Any]:
         """Return plain SI data (numbers, strings, lists, dicts) that JSON and HDF5 can hold."""
         return self.model_dump(mode="json")
+
+    def _tables(self) -> dict[str, Any]:
+        """The same as a case file has it: materials by their names."""
+        data = self.to_dict()
+        data["materials"] |= data["materials"].pop("named")
+        return data
 
     @property
     def given(self) -> dict[str, list[str]]:
@@ -420,7 +446,7 @@ class Case(Section):
         """Return a validated copy with some keys changed, ``{"drive.pressure": 36e3, ...}``. Raises CaseError: as
         `dbvfiv.case.load.make_case` does.
         """
-        data = self.to_dict()
+        data = self._tables()
         changed = {put(type(self), data, dotted, plain(value)) for dotted, value in changes.items()}
         self.make_way(data, changed)
         if ("drive", "head") in changed:
@@ -450,16 +476,18 @@ def change_case(case: Case, changes: Changes) -> Case:
     """
     names = _as_mapping(changes)
     made = made_with(case.replace, names)
-    data = made.to_dict()
+    data, asked = made._tables(), made._tables()
     for name, value in names.items():
-        if held(data, name) == [str(value)]:  # of the files of a key one was named
-            put(type(case), data, name, str(value))
+        if held(asked, name) == [str(value)]:  # of the files of a key one was named
+            put(type(case), asked, name, str(value))
     try:
-        make_case(type(case), data)
+        found = make_case(type(case), asked)._tables()
     except CaseError as error:  # files of the case itself may have gone since it was read
         if any(f"{error.key}.".startswith(f"{name}.") for name in names):
             raise
-    return made
+        return made
+    files = {name: held(found, name) for name in names if held(found, name) != held(data, name)}  # with full names
+    return made.replace(files) if files else made
 
 
 def made_with(make: Callable[[Mapping[str, Any]], Case], changes: Changes) -> Case:

@@ -175,8 +175,8 @@ class Downstream(Section):
     pipe_diameter: Length | None = key(
         None,
         "Inner diameter of a full pipe in which the valve stands and its jet widens, which recovers pressure; at least "
-        "that of the valve's flow section at the flange and the width of its bill. Where not given the "
-        "discharge is free or submerged and the energy of the jet is lost.",
+        "that of the valve's flow section at the flange and twice what its bill goes from the axis. Where not given "
+        "the discharge is free or submerged and the energy of the jet is lost.",
         gt=0,
         le=100,
     )
@@ -202,13 +202,13 @@ class Downstream(Section):
         le=1,
     )
 
-    def check_pipe(self, inlet: float, bill: float) -> None:
+    def check_pipe(self, inlet: float, reach: float) -> None:
         """Refuse a pipe that the valve does not stand in; `inlet` is the diameter of its flow section at the flange and
-        `bill` the width of the bill over its outer faces, m. Raises BrokenRule.
+        `reach` the distance from the axis to which the bill goes, m. Raises BrokenRule.
         """
         for least, around, why in (
             (inlet, f"a valve with a flow section of {1e3 * inlet:.4g} mm", "for the valve stands in it"),
-            (bill, f"a bill that is {1e3 * bill:.4g} mm wide", "or the bill does not go into the pipe"),
+            (2 * reach, f"a bill that goes {1e3 * reach:.4g} mm from its axis", "or the bill does not go into it"),
         ):
             if self.pipe_diameter is not None and self.pipe_diameter < least:
                 raise BrokenRule(

@@ -112,9 +112,9 @@ class Units:
         return self.text_of("pressure", value, digits)
 
     def parameter(self, name: str) -> Parameter:
-        """Row of the table of parameters, with the pressure in its unit."""
+        """Row of the table of parameters, pressures in their unit."""
         row = PARAMETERS[name]
-        if name != "pressure":
+        if row.quantity.si != "Pa":
             return row
         return replace(row, shown_unit=self.name("pressure"), scale=self.factor("pressure"))
 

@@ -514,11 +514,11 @@ class Valve(FollowingSection):
         return factor * profiles[-1].radius if profiles else self.flange_radius
 
     @property
-    def bill_width(self) -> float:
-        """Twice the distance in m from the axis that the outer face of the lip reaches at rest."""
+    def bill_reach(self) -> float:
+        """Distance in m from the axis that the outer face of the lip reaches at rest."""
         profiles, factor = readable_key_points(self.key_points), 1.0 if self._given is None else self.scale
         aside = factor * profiles[0].reach if profiles else self.lip.widest + abs(self.bill_shift)
-        return 2 * aside + self.thickness_at(0.0, 1.0)
+        return aside + 0.5 * self.thickness_at(0.0, 1.0)
 
     @property
     def outer_diameter(self) -> float:
@@ -526,7 +526,7 @@ class Valve(FollowingSection):
         flange = 2 * self.inlet_radius + self.thickness_at(self.length)
         has_cuff = self.key_points is None and self.cuff_length + self.flare_length > 0
         cuff = 2 * self.cuff_radius + self.thickness_at(self.length) if has_cuff else 0
-        return max(flange, cuff, self.bill_width)
+        return max(flange, cuff, 2 * self.bill_reach)
 
     def _follow_wall_and_shape(self) -> None:
         """Numbers for the keys that were not given."""

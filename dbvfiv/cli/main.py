@@ -111,15 +111,19 @@ class Ending:
         self.terminated, self._leaving = False, leaving
         self._since = -math.inf
         self._before: Any = None
+        self._told = sys.unraisablehook
 
     def __enter__(self) -> Ending:
         if threading.current_thread() is threading.main_thread():
             before = signal.getsignal(signal.SIGTERM)
             if before is signal.SIG_DFL:  # a handler that is set already, or none wanted, stays
                 self._before = signal.signal(signal.SIGTERM, self._interrupt)
+            sys.unraisablehook = self._send_again
         return self
 
     def __exit__(self, *error: object) -> None:
+        if sys.unraisablehook == self._send_again:
+            sys.unraisablehook = self._told
         if self._before is not None:
             signal.signal(signal.SIGTERM, signal.SIG_IGN if self.terminated and self._leaving else self._before)
 
@@ -128,6 +132,17 @@ class Ending:
         last, self._since = self._since, time.monotonic()
         if self._since - last > self.SAME:
             raise KeyboardInterrupt
+
+    def _send_again(self, ignored: sys.UnraisableHookArgs) -> None:
+        """Send a signal again whose interruption came in a callback, as of the garbage collector: Python ignores what
+        these raise.
+        """
+        if not isinstance(ignored.exc_value, KeyboardInterrupt):
+            self._told(ignored)
+            return
+        self._since = -math.inf
+        again = threading.main_thread().ident, signal.SIGTERM if self.terminated else signal.SIGINT
+        threading.Timer(0.01, signal.pthread_kill, again).start()
 
 
 def _outcome(arguments: Sequence[str], ending: Ending) -> int:

@@ -103,10 +103,11 @@ def perform(kind: str, case, request, name: str, output: Path | None, plots: Pat
     session = Session(case, name).prepared(kind, changes)
     if request.sheet is not None:  # a result is checked by its session
         refuse_read(session.case, output, "The sheet")
-    with in_units(case.units):
+    units = session.case.units  # heads are those of the fluid that is asked for
+    with in_units(units):
         session.mesh  # a case that gives no model fails before a table begins
         live = None if as_json else find_study(kind).live
-        progress = Progress(quiet=as_json, row=live and live(session.case), say=case.units.say)
+        progress = Progress(quiet=as_json, row=live and live(session.case), say=units.say)
         result = session.perform(kind, output if request.sheet is None else None, progress, **choices)
         found = [result]
         if request.sheet is not None:

@@ -98,10 +98,11 @@ def read_curves(path: str | Path, mode: str | None = None) -> list[TensionTest]:
         In SI units; tests in the order of `MODES`, cycles ascending.
     """
     header, rows = _table(Path(path), _COLUMNS)
-    words = {t.strip().lower(): i for i, t in enumerate(header) if t.strip().lower() in ("test", "cycle", "cycle [-]")}
+    titles = [re.sub(r"[\[(].*", "", title).strip().lower() for title in header]
+    words = {name: titles.index(name) for name in ("test", "cycle") if name in titles}
     if mode is not None and "test" in words:
         raise MaterialError(f"Tension test {path}: it has a column test, so it cannot be given as {mode} as a whole.")
-    number = next((i for word, i in words.items() if word != "test"), None)
+    number = words.get("cycle")
     kept: dict[tuple[int, int], list[tuple[float, float]]] = {}
     for place, row, values in rows:
         which = _mode(place, _cell(row, words["test"])) if "test" in words else mode or "uniaxial"

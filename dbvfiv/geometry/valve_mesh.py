@@ -232,11 +232,18 @@ def _key_point_deductions(valve: Valve, surface: Surface) -> tuple[float, float,
     lip, flange = surface.breaks[[0, -1]]
     cuff = flange if valve.flare_length == 0 else valve.duckbill_length + valve.saddle_length
     halves = {"duckbill": valve.duckbill_wall_deduction, "flange": valve.flange_wall_deduction}
+    height = float(surface.section(lip, np.zeros(1))[0, 1])
+    if valve.initial_gap > height:
+        raise ValueError(
+            f"The key points have the middle of a lip's wall {height:.4g} m above the slit, and valve.initial_gap is "
+            f"{valve.initial_gap:g} m; it is the gap between faces at rest."
+        )
     for place, name, z in (("lip", "duckbill", lip), ("cuff", "flange", cuff), ("flange", "flange", flange)):
         half = halves[name]
         gap = valve.initial_gap * _slit_width(valve, surface) if place == "lip" else 0.0
         found.append(half * surface.length(z) - 0.5 * surface.part.turn * half**2 - gap)
-        if found[-1] >= surface.area(z):
+        # beyond its centre a face would turn inside out
+        if surface.part.turn * half >= surface.length(z) or found[-1] >= surface.area(z):
             raise ValueError(
                 f"The key points of the {place} leave no flow area inside a half wall of {half:g} m; it must be less, "
                 f"see valve.{name}_wall_deduction."

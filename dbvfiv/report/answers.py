@@ -19,6 +19,7 @@ from ..model.symmetry import only_class_of
 from ..studies.closure.safety import BUCKLING, CROSSING, END, OWN, SEAL, buckles_first, rated_leak, rated_verdict
 from ..studies.onset.search import NO_ONSET
 from ..studies.stability.verdict import DIVERGES, FLUTTERS, Verdict
+from ..studies.steady.study import NOT_FOUND
 from ..texts import digits, listed
 from .gather import Gathered, second_mesh
 
@@ -67,7 +68,8 @@ def opens(found: Gathered) -> Answer:
         return Answer(question, UNKNOWN, why if steady is None or not steady.failures else steady.failures[0])
     crack = steady.cracking
     if crack is None:
-        return Answer(question, UNKNOWN, "No cracking head was found below the heads examined.")
+        lost = (sentence for sentence in steady.warnings if sentence.startswith(NOT_FOUND))
+        return Answer(question, UNKNOWN, next(lost, "No cracking head was found below the heads examined."))
     cracks = "" if crack.pressure is None else units.pressure(found.case.rest_pressure + crack.pressure, 3)
     if crack.pressure is None or state.hydraulics is None:
         beyond = f"; they do at {cracks}" if cracks else ""

@@ -20,7 +20,7 @@ from ..case.describe import page
 from ..case.load import Overrides, key_path, read_case_file
 from ..case.model import Case as PhysicsCase
 from ..case.physics import LIQUID
-from ..case.quantity import head_of
+from ..case.quantity import WATER, head_of
 from ..case.section import BrokenRule, Section, key
 from ..case.statement import parse_statement
 from ..case.write import case_toml
@@ -335,8 +335,9 @@ def _gas(case: Case) -> Iterator[str]:
         return
     if case.units.heads:
         yield (
-            f"Heads are those of the fluid of {density:g} kg/m3, a gas, of which {case.units.pressure(over)} carry "
-            f'{digits(over, 4)} Pa; give "1 mH2O" for heads of water, or fluid.density = 1000 for water.'
+            f"Heads are those of the fluid of {density:g} kg/m3, a gas, of which {case.units.pressure(over)} press as "
+            f'{digits(head_of(over, WATER), 3)} m of water do; give "1 mH2O" for heads of water, or fluid.density = '
+            "1000 for water."
         )
     jet = math.sqrt(2.0 * max(over, 0.0) / density)
     if case.fluid.sound_speed is None and jet > _FAST * _SOUND_OF_AIR:
@@ -354,11 +355,11 @@ def _sizes_seldom_meant(case: Case) -> Iterator[str]:
             "all; it is half the width of the bill."
         )
     bore, pipe = 2.0 * case.valve.inlet_radius, case.upstream.diameter
-    if case.valve.bill_width < _NARROW * bore:
+    if 2 * case.valve.bill_reach < _NARROW * bore:
         key = "key_points make a pipe" if case.valve.key_points else "valve.flange_radius makes a pipe"
         yield (
-            f"{key} of {1e3 * bore:.4g} mm before a bill that is {1e3 * case.valve.bill_width:.4g} mm wide; half the "
-            "diameter is its radius."
+            f"{key} of {1e3 * bore:.4g} mm before a bill that goes {1e3 * case.valve.bill_reach:.4g} mm from its axis; "
+            "half the diameter is its radius."
         )
     if bore > _LARGEST_BORE:
         yield (

@@ -11,7 +11,7 @@ from typing import Any
 
 from ..case.distribution import Distribution
 from ..case.materials import HIGHEST_LEVEL
-from ..case.parameters import PARAMETERS
+from ..case.parameters import PARAMETERS, Parameter
 from ..errors import CaseError, attempt
 from ..model.equilibria import (
     find_equilibrium,
@@ -30,7 +30,7 @@ from ..observer import Observer
 from ..record.files import Header, check_folder, check_writable, kind_of, refuse_read
 from ..record.mesh import MeshData
 from ..record.record import GrowingRecord, Record, StoredRecord
-from ..record.table import Column, TableSpec, printed_head, printed_row
+from ..record.table import Column, Shown, TableSpec, printed_head, printed_row
 from ..runtime import free_memory
 from . import KINDS
 from .case import Case, oddities, require_consistent
@@ -62,6 +62,12 @@ class Study:
     #: Choices that are names of what a run writes besides its result: of a file, with an empty text, or of a folder,
     #: with a pattern of the files in it.
     files: Mapping[str, str] = field(default_factory=dict)
+
+
+def show_parameter(row: Parameter) -> Shown:
+    """Print format of values of a parameter, `value` of a row."""
+    value = Column("value", "", row.title)
+    return Shown(row.name, row.shown_unit, 12, lambda one: f"{value.of(one) / row.scale:.6g}")
 
 
 def print_rows(columns: Iterable[Column]) -> Callable[[Any], str]:

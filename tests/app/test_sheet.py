@@ -14,7 +14,18 @@ from hypothesis import strategies as st
 
 from dbvfiv.app.ask import AskPanel
 from dbvfiv.app.see import PICTURES, RECORD, RunsPanel, arguments_of, map_figure
-from dbvfiv.app.sheet import bring, change, check, data_files, given, read_sheet, stay_inside, usual_value, write_sheet
+from dbvfiv.app.sheet import (
+    bring,
+    change,
+    check,
+    data_files,
+    given,
+    read_sheet,
+    shown_as,
+    stay_inside,
+    usual_value,
+    write_sheet,
+)
 from dbvfiv.app.worker import text_for_page
 from dbvfiv.case.axis import parse_stability_axis
 from dbvfiv.case.quantity import GRAVITY
@@ -164,6 +175,12 @@ def test_pictures_keep_the_units_of_the_project(units, span):
     assert arguments_of(case, "Head-loss curve") == ["-p", f"{span}:10"]
 
 
+def test_sliders_have_the_unit_of_the_project():
+    for units, unit, scale in (("bar", "bar", 1e5), ("m", "m", 9806.65), ("", "m", 9806.65)):
+        found = shown_as(load_case(None, [f"project.units={units}"]), "pressure")
+        assert (found["unit"], found["scale"]) == (unit, pytest.approx(scale))
+
+
 def test_heads_beside_other_densities_are_of_a_fluid_that_is_named():
     figure, _ = map_figure(Case(), found_map("density"))
     assert figure["layout"]["xaxis"]["title"]["text"] == "Head of fluid of 1000 kg/m³, m"
@@ -237,7 +254,7 @@ def test_a_valve_that_is_being_built_is_asked_where_a_map_was_clicked(monkeypatc
 
         async def about(_file, _do):
             await built.wait()
-            return {"parameters": ROWS}
+            return {"parameters": ROWS, "units": {}}
 
         workers = SimpleNamespace(of=lambda *_: (SimpleNamespace(about=about), None))
         panel = AskPanel(SimpleNamespace(file=file, tell=said.append, site=SimpleNamespace(workers=workers)))
@@ -270,7 +287,7 @@ def test_where_flutter_ends_is_not_where_it_begins(outcome, factor, sought, told
     panel, label = AskPanel(None), lambda: SimpleNamespace(classes=lambda **_: None)
     for name in ("margin", "factor", "verdict", "mark", "reason", "card", "modes"):
         setattr(panel, f"_{name}", label())
-    panel._numbers = defaultdict(label)
+    panel._numbers, panel._units = defaultdict(label), defaultdict(lambda: ("m", 1.0))
     numbers = {"damping_ratio": 0.01, "critical_damping_factor": factor, "damping_sought": sought}
     answer = {"verdict": {"outcome": outcome, "reason": ""} | numbers, "bound": 0.0, "confirmed": True}
     panel._show(answer | {"state": defaultdict(float), "eigenvalues": []}, whole=True)

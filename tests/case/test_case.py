@@ -543,6 +543,46 @@ def test_changes_in_python_are_those_of_set(tmp_path, change):
         assert made == set_ and made.units == set_.units
 
 
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"materials.CR.loss_factor": 0.2},
+        {"materials.rub.prony.0.0": 0.3},
+        {"materials.rub.mu.0": 1e6},
+        {"materials.rub.alpha.0": 2.5},
+        {"materials.SBR.stiffness_factor": 1.1},
+        {"upstream.pieces.0.roughness": "1 mm"},
+        {"upstream.pieces": [{"length": 5.0}, {"length": 2.0}]},
+        {"upstream.length": "3 m"},
+    ],
+)
+def test_a_change_of_a_case_is_that_of_its_file(tmp_path, changes):
+    """Also of single numbers of materials, and of pipes in pieces; what says the same otherwise makes way."""
+    (tmp_path / "own.toml").write_text(
+        "[materials.CR]\nprony = [[0.1, 0.01]]\n[[upstream.pieces]]\nlength = 4\nfriction = 0.02\n"
+        '[materials.rub]\nkind = "ogden"\nmu = [5e5, 1e5]\nalpha = [2, 4]\ndensity = 1200\nprony = [[0.2, 0.05]]\n'
+    )
+    found = dbvfiv.load(tmp_path / "own.toml", changes).case
+    assert dbvfiv.load(tmp_path / "own.toml").replace(changes).case == found
+    assert found != dbvfiv.load(tmp_path / "own.toml").case
+
+
+def test_pieces_stand_in_the_place_of_one_pipe():
+    pieces = load_case(ROOT / "cases/dbv12-in-line.toml", ["upstream.pieces=[{length=5}]"])
+    assert pieces.upstream.whole_length == 5.0
+
+
+@pytest.mark.parametrize("key", ["materials.SBR.loss_data", "transient.drive_table", "steady.measured"])
+def test_a_file_that_python_names_keeps_its_full_name(tmp_path, monkeypatch, key):
+    """In another folder it is the same."""
+    monkeypatch.chdir(tmp_path)
+    tables = {"measured": "pressure [kPa], flow [L/s]\n1, 2\n", "drive_table": "0, 1000\n1, 2000\n"}
+    loss = "frequency [Hz], loss_factor\n1, 0.1\n10, 0.2\n100, 0.3\n"
+    (tmp_path / "t.csv").write_text(tables.get(key.rpartition(".")[2], loss))
+    changes = {key: "t.csv"}
+    assert dbvfiv.load().replace(changes).case == dbvfiv.load(changes=changes).case
+
+
 @pytest.mark.parametrize("key", ["transient.drive_table", "steady.measured", "valve.key_points", "cycle.start_file"])
 def test_a_missing_file_is_refused_by_every_door(tmp_path, key):
     (tmp_path / "own.toml").write_text("")
@@ -564,6 +604,19 @@ def test_a_key_that_is_set_takes_the_place_of_what_says_the_same(change, name):
     """Damping data and the thickness of patches too."""
     case = load_case(ROOT / "cases/dbv4-wide.toml", [change])
     assert case.materials.named[name].loss_factor is None if name else case.valve.patches[0].extra is None
+
+
+@pytest.mark.parametrize(
+    "key, words",
+    [
+        ("identify.records[].frequency", "a frequency greater than 0 Hz"),
+        ("identify.records[].damping_ratio", "a number greater than -1 and less than 1"),
+        ("report.heads", "a list of pressures, each greater than 0 kPa"),
+    ],
+)
+def test_what_is_allowed_holds_the_limits(key, words):
+    """Of numbers that may be left out, and of those in lists."""
+    assert next(info.allowed for info in walk(Case) if info.key == key).startswith(words)
 
 
 def test_how_far_a_bill_is_moulded_shut_goes_with_its_preset():

@@ -78,6 +78,22 @@ def test_samples_come_from_a_list_or_a_file(tmp_path):
     assert listed.share_outside(1.5, 3.0) == 0.25
 
 
+@pytest.mark.parametrize("text", ["300,5\n310,25\n", "1, 300.5\n2, 310.25\n"])
+def test_a_line_that_is_no_number_is_no_sample(tmp_path, text):
+    """Neither are its decimals, nor the numbers of a second column."""
+    (tmp_path / "speeds.txt").write_text(text)
+    with pytest.raises(ValueError, match="is not a number|which is no"):
+        Distribution.parse(f"samples({tmp_path / 'speeds.txt'})", PLAIN)
+
+
+@pytest.mark.parametrize("quantity", [PLAIN, LENGTH, PERCENT])
+@pytest.mark.parametrize("found", [("normal", 0.2, 0.02), ("lognormal", 0.2, 1.1), ("uniform", 0.2, 0.3)])
+def test_words_are_read_as_what_they_tell(quantity, found):
+    form, *numbers = found
+    words = Distribution(form, tuple(numbers)).words(quantity)
+    assert Distribution.parse(words, quantity, 0.4).numbers == pytest.approx(numbers, rel=1e-12)
+
+
 @pytest.mark.parametrize(
     ("text", "own", "clause"),
     [

@@ -64,6 +64,23 @@ def test_a_table_speaks_in_heads_and_json_in_si(command_line):
     assert float(row[2]) == pytest.approx(point["volume_flow"] * 60 / 3.785411784e-3, rel=1e-3)
 
 
+def test_warnings_are_told_in_heads_of_the_fluid_that_is_asked_for(command_line, tmp_path):
+    """Not of that of the case file."""
+    outcome = command_line("modes", *COARSE, "-p", "40 m", "--density", "10", "-o", tmp_path / "m.h5")
+    assert outcome.status == 0, outcome.err
+    told = command_line("info", tmp_path / "m.h5").out
+    warnings = [
+        line.removeprefix("Warning: ") for line in outcome.err.splitlines() if line.startswith("Warning: Heads")
+    ]
+    assert warnings and "40 m press as 0.4 m of water do" in warnings[0] and warnings[0].partition(" Effect")[0] in told
+
+
+@pytest.mark.parametrize("name", ["pressure", "sealing"])
+def test_pressures_among_the_parameters_have_the_unit_of_pressures(name):
+    row = load_case(None, ["project.units=bar"]).units.parameter(name)
+    assert (row.shown_unit, row.scale) == ("bar", pytest.approx(1e5))
+
+
 @pytest.mark.parametrize("kind", [CaseError, SolveError])
 def test_a_failure_speaks_in_heads(kind):
     units = load_case(None, ["drive.pressure=2 m"]).units

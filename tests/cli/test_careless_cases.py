@@ -76,8 +76,8 @@ SELDOM_MEANT = [
     (["layers.0.thickness=60 mm"], "scaled until they fill the wall"),
     (["upstream.length=30 m", "upstream.diameter=45 mm"], "45 mm before a valve of 278"),
     (["fluid.density=1"], "a gas, and its jet of 190 m/s"),
-    (["fluid.density=1", "drive.head=2"], "2 m carry 19.61 Pa"),
-    (["valve.flange_radius=12 in"], "a pipe of 609.6 mm before a bill that is 274 mm wide"),
+    (["fluid.density=1", "drive.head=2"], "2 m press as 0.002 m of water do"),
+    (["valve.flange_radius=12 in"], "a pipe of 609.6 mm before a bill that goes 137 mm from its axis"),
     (["valve.scale=12"], "a bore of 3.34 m"),
     (["downstream.pipe_diameter=330 mm", "outside.fluid=same"], "the fluid outside the wall is unbounded"),
 ]

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from dbvfiv.fit import TensionTest, fit_rubber, form_of, uniaxial_stress
-from dbvfiv.fit.curves import read_tests
+from dbvfiv.fit.curves import read_curves, read_tests
 from dbvfiv.materials import MaterialError, MooneyRivlin, published_rubber, stable_range
 
 
@@ -143,6 +143,12 @@ def test_unreadable_files_are_refused(tmp_path):
     (tmp_path / "binary.csv").write_bytes(b"\xff\xfe\x00\x81")
     with pytest.raises(MaterialError, match="UTF-8"):
         read_tests(tmp_path / "binary.csv")
+
+
+@pytest.mark.parametrize("title", ["cycle", "cycle [-]", "Cycle (-)", "cycle [1]", "CYCLE []"])
+def test_cycles_are_told_by_a_column_with_any_unit(tmp_path, title):
+    (tmp_path / "t.csv").write_text(f"{title}, stretch [-], nominal_stress [MPa]\n1, 1.1, 2\n2, 1.1, 1\n2, 1.2, 1.5\n")
+    assert [(test.cycle, len(test.strain)) for test in read_curves(tmp_path / "t.csv")] == [(1, 1), (2, 2)]
 
 
 def test_bad_questions_are_refused():

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -14,9 +15,11 @@ from dbvfiv.geometry import key_point_table, surface_of, valve_mesh
 from dbvfiv.geometry.sections import key_point_sections
 from dbvfiv.model import strain_level
 from dbvfiv.report.gather import second_mesh
-from dbvfiv.studies.case import Case, thesis_case
+from dbvfiv.studies.case import Case, load_case, thesis_case
 from dbvfiv.studies.onset.search import coarse_case
 from dbvfiv.studies.stability.place import rebuilder
+
+ROOT = Path(__file__).resolve().parents[2]
 
 WIDE = {
     "valve.lip_half_width": 0.18,
@@ -139,7 +142,7 @@ def test_a_smooth_skin_goes_through_its_profiles_and_needs_no_row_on_them(tmp_pa
     a, b = 0.15 - 0.05 * np.sin(np.pi * mesh.z / 1.12), 0.01 + 0.09 * np.sin(np.pi * mesh.z / 1.12) ** 2
     assert mesh.rest_area == pytest.approx(np.pi / 4 * a * b, rel=3e-3)
     assert case.valve.inlet_radius == pytest.approx(0.1, rel=1e-6)
-    assert case.valve.bill_width == pytest.approx(0.3 + case.valve.thickness_at(0.0), rel=1e-9)
+    assert 2 * case.valve.bill_reach == pytest.approx(0.3 + case.valve.thickness_at(0.0), rel=1e-9)
     with pytest.raises(ValueError, match="the surface has 20 pieces and each needs an element"):
         ruled = Case().replace(given)
         valve_mesh(ruled.valve, ruled.mesh)
@@ -213,6 +216,10 @@ BAD = {
     "number missing": (changed(2, "50, 15"), "line 3 has 2 entries and not 3"),
     "number too many": (changed(2, "50, 15, 0, 7"), "line 3 has 4 entries and not 3"),
     "not finite": (changed(2, "50, inf, 0"), "line 3 is not three numbers"),
+    "a joint in words": (
+        "\n".join(f"{row}, {'no' if i else 'joint'}" for i, row in enumerate(GOOD)),
+        "line 2 holds the joint 'no', which is neither 0 nor 1",
+    ),
     "one profile": ("\n".join(GOOD[:4]), "holds one profile"),
     "two points in a profile": (changed(5, None), "profile 2 at z = 0.56 m has 2 points"),
     "does not begin at the centre": (changed(1, "5, 20, 0"), "profile 1 at z = 0 m does not run from the centre"),
@@ -281,6 +288,37 @@ IMPOSSIBLE = {
         "leave .* cm2 between the lips at rest; the passage there must be smaller than that of the flange",
     ),
 }
+
+
+@pytest.mark.parametrize(
+    "key, words",
+    [
+        ("valve.flange_wall_deduction=250 mm", "cuff leave no flow area inside a half wall of 0.25 m"),
+        ("valve.duckbill_wall_deduction=168 mm", "lip leave no flow area inside a half wall of 0.168 m"),
+        ("valve.initial_gap=20 mm", "0.00619 m above the slit, and valve.initial_gap is 0.02 m"),
+    ],
+)
+def test_walls_and_gaps_that_no_valve_has_are_refused(tmp_path, key, words):
+    """As those of the parametric shape are."""
+    with pytest.raises(CaseError, match=words):
+        dbvfiv.load(by_points(Case(), tmp_path), key).session.mesh
+    with pytest.raises(CaseError, match=key.partition("=")[0]):
+        dbvfiv.load(None, key)
+
+
+def test_key_points_stand_in_the_place_of_the_parameters(tmp_path):
+    own = load_case(ROOT / "cases/dbv6.toml")
+    (tmp_path / "points.csv").write_text(key_point_table(own.valve, 17, 0))
+    found = load_case(ROOT / "cases/dbv6.toml", [f"valve.key_points={tmp_path / 'points.csv'}"])
+    assert found.valve.inlet_radius == pytest.approx(own.valve.inlet_radius, rel=1e-6)
+
+
+def test_joints_may_be_told_by_floats(tmp_path):
+    """As pandas writes them where a cell is empty."""
+    (tmp_path / "own.csv").write_text(table := key_point_table(Case().valve, 9, 0))
+    (tmp_path / "floats.csv").write_text(re.sub(r"([01])$", r"\1.0", table, flags=re.MULTILINE))
+    found, own = (read_key_points(tmp_path / name) for name in ("floats.csv", "own.csv"))
+    assert [profile.joints for profile in found] == [profile.joints for profile in own]
 
 
 @pytest.mark.parametrize("name", IMPOSSIBLE)

@@ -48,7 +48,7 @@ def test_key_points_from_edge_to_edge_give_the_shape_back(tmp_path, saddle):
     skin = "ruled" if saddle == "ruled" else "smooth"
     points = Valve(key_points=tmp_path / "points.csv", key_point_skin=skin)
     assert not points.is_double_symmetric
-    assert points.bill_width == pytest.approx(valve.bill_width, rel=1e-9)
+    assert points.bill_reach == pytest.approx(valve.bill_reach, rel=1e-9)
     found, expected = (valve_mesh(one, Mesh(around=6, along=10, rows="uniform")) for one in (points, valve))
     assert found.part is HALF
     if saddle == "ruled":

@@ -98,7 +98,7 @@ def test_size_of_a_bill_with_a_thicker_edge_or_middle(part):
     for patch in ({"extra": 0.0}, {"around_from": 0.82, "extra": 0.003}, {"around_to": 0.4, "extra": 0.003}):
         case = case_of(patch | {"end": 0.05}, **{"mesh.around": 8, "mesh.along": 16, "mesh.part": part})
         found = ValveSizes.of(ValveModel(case))
-        assert found.bill_width == pytest.approx(case.valve.bill_width, rel=1e-9)
+        assert found.bill_width == pytest.approx(2 * case.valve.bill_reach, rel=1e-9)
         assert found.lip_area == pytest.approx(4 * 0.125 * 1e-4, rel=1e-3)  # edges beside a place of the sum, too
         sizes.append((found.bill_width, found.bill_height))
     even, edge, middle = sizes

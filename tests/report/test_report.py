@@ -11,6 +11,7 @@ import re
 import signal
 import sys
 import time
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -37,7 +38,7 @@ from dbvfiv.studies.cycle.study import CycleResult
 from dbvfiv.studies.onset.search import NO_ONSET
 from dbvfiv.studies.session import Session
 from dbvfiv.studies.stability.verdict import Verdict
-from dbvfiv.studies.steady.study import Cracking
+from dbvfiv.studies.steady.study import NOT_FOUND, Cracking
 from dbvfiv.studies.workers import Lost, Workers
 from tests.child import start
 from tests.small_valves import THESIS_SET
@@ -534,6 +535,9 @@ def test_the_lips_crack_above_the_pressure_downstream(top, text):
     assert text in opens(found).text
     assert ("cracking head", "3 kPa over that at rest") in trade(found)
     found.results["steady"].failures = ("The state at 11 kPa was not found.",)
+    lost = f"{NOT_FOUND} Rising pressures lead to another equilibrium than the one that was found."
+    unknown = SimpleNamespace(states=(state,), cracking=None, failures=(), warnings=(lost,))
+    assert opens(replace(found, results={"steady": unknown})).text == lost
     assert opens(found).text.endswith(" No state was found at 11 kPa: The state at 11 kPa was not found.")
 
 

@@ -16,6 +16,7 @@ from dbvfiv.model.sizes import hoop_strain
 from dbvfiv.studies.case import load_case, require_consistent, thesis_case
 from dbvfiv.studies.inputs import inputs_of
 from dbvfiv.studies.session import Session
+from dbvfiv.studies.stability.place import require_parameter
 from dbvfiv.studies.stability.walk import StabilityWalk
 from dbvfiv.studies.transient.run import rise_around
 from eigen import SearchOptions, TransferBasis, certified_spectrum
@@ -230,3 +231,22 @@ def test_the_pressure_around_the_jet_in_time_is_that_of_steady_flow():
     speed = float(valve.model.tail.speed(state.station_area[-1], columns["inlet_velocity"]))
     assert rises[1] - rises[0] == pytest.approx(10.0 * 5.0 * speed, rel=1e-6)
     assert rise_around(history, load_small(LIGHT).model) == 0.0
+    steadily = load_small(LIGHT, PIPE, {"fluid.unsteady": False}).model
+    assert rise_around(faster, steadily)[0] == pytest.approx(rises[0], rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    "name, keys",
+    [("tail_length", PIPE), ("storage", {}), ("pipe_length", {"upstream.length": 3.0, "upstream.loss": 1.0})],
+)
+def test_ranges_over_the_inertia_of_a_fluid_without_one_are_refused(name, keys):
+    still = load_small(LIGHT, keys, {"fluid.unsteady": False}).case
+    with pytest.raises(CaseError, match=f"Nothing depends on {name}: fluid.unsteady is false"):
+        require_parameter(still, name)
+    require_parameter(load_small(LIGHT, keys).case, name)
+
+
+def test_the_length_of_a_line_with_friction_moves_a_fluid_without_inertia():
+    require_parameter(
+        load_small({"upstream.length": 3.0, "upstream.friction": 0.02, "fluid.unsteady": False}).case, "pipe_length"
+    )

@@ -111,6 +111,13 @@ def test_a_run_stays_at_the_operating_point_and_comes_back_to_it(operating):
     assert away[-1] / away[50] == pytest.approx(np.exp(0.2 * slowest.growth_rate), rel=0.02)
 
 
+def test_a_kick_from_a_state_that_the_pump_does_not_hold_tells_nothing_of_it(operating):
+    kick = {"transient.start": "kick", "transient.step": 4e-3, "transient.duration": 0.04}
+    off = load(PUMP, kick, {"drive.pressure": 1.3 * operating.pressure}).transient().stability
+    assert off.outcome == "undecided" and off.reason.startswith("The pump gives another pressure")
+    assert not load(PUMP, kick).transient().stability.reason.startswith("The pump")
+
+
 def test_cycles_begin_at_the_state_that_spectra_are_of(operating):
     """A static lift makes up the difference to a pressure off the pump's curve."""
     pressure = 1.2 * operating.pressure

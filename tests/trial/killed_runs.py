@@ -62,13 +62,13 @@ COUNTED = ("way/path", "way/buckling", "seconds")
 
 
 def told(wire: int):
-    """Let every record say on a wire what it has promised to keep."""
+    """Let every record say on a wire what it has promised to keep: from when its file has the name on."""
     for name in ("extend", "note"):
         inner = getattr(GrowingRecord, name)
 
         def outer(self, *given, _inner=inner, **named):
             _inner(self, *given, **named)
-            if self._journal is not None:
+            if self._journal is not None and self._journal._new is None:
                 counts = {table: self.rows(table) for table in self.tables} | {"log": len(self.log)}
                 os.write(wire, json.dumps(counts).encode() + b"\n")
 

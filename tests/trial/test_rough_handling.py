@@ -145,6 +145,27 @@ def _program(*arguments: object) -> list[str]:
     return [sys.executable, "-m", "dbvfiv", *map(str, arguments)]
 
 
+@pytest.mark.parametrize("number, status", [(signal.SIGTERM, 143), (signal.SIGINT, 130)])
+def test_a_signal_in_a_callback_of_the_garbage_collector_is_not_lost(number, status):
+    """Python ignores what such callbacks raise; JAX has one."""
+    code = (
+        "import gc, os, signal, sys, time\n"
+        "signal.signal(signal.SIGINT, signal.default_int_handler), signal.signal(signal.SIGTERM, signal.SIG_DFL)\n"
+        "from dbvfiv.cli import main\n"
+        "def wait():\n"
+        "    def send(*_):\n"
+        f"        gc.callbacks.remove(send), os.kill(os.getpid(), {int(number)}), time.sleep(0.1)\n"
+        "    gc.callbacks.append(send)\n"
+        "    gc.collect()\n"
+        "    for _ in range(600):\n"
+        "        time.sleep(0.1)\n"
+        "main.build = lambda: type('Command', (), {'main': lambda *_, **__: wait()})()\n"
+        "sys.exit(main.run([]))\n"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=50)
+    assert done.returncode == status and "Traceback" not in done.stderr, done.stderr
+
+
 def test_handlers_are_put_back(command_line):
     before = signal.getsignal(signal.SIGTERM)
     assert command_line("--version").status == 0

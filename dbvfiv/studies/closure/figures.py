@@ -221,10 +221,10 @@ def _over_pressure(result: StudyResult, axes, name: str, factor: float, **look) 
     p = np.array([point.pressure for point in result.walk])
     values = factor * np.array([getattr(point, name) for point in result.walk], float)
     axes.plot(p / 1e3, values, marker="." if len(p) == 1 else None, **look)
-    asked = np.array([state.pressure for state in result.states])
-    asked = asked[(asked >= p.min()) & (asked <= p.max())]
-    order = np.argsort(p)
-    axes.plot(asked / 1e3, np.interp(asked, p[order], values[order]), "o", color=look["color"], ms=4.5)
+    asked = [state.pressure / 1e3 for state in result.states]
+    own = {"lowest_eigenvalue": "lowest_stiffness_eigenvalue"}.get(name, name)
+    reached = [factor * getattr(state, own) for state in result.states]
+    axes.plot(asked, reached, "o", color=look["color"], ms=4.5)
 
 
 def passage(result: StudyResult) -> Figure:

@@ -57,10 +57,6 @@ def _by_node(mesh: MeshData) -> tuple[int, ...]:
     return (len(mesh.nodes),)
 
 
-def _show_opening(s: Any) -> str:
-    return f"{s.least_opening * 1e6:.2f} at {s.least_opening_position * 1e3:.0f}"
-
-
 def _show_seal(s: Any) -> str:
     return f"{s.lip_seal * 1e3:.1f}+{s.joint_seal * 1e3:.1f}"
 
@@ -80,7 +76,7 @@ _MEASURES = {
         Column("pressure", "Pa", "Back pressure, outside", shown=Shown("pressure", "kPa", 9, ".6g")),
         replace(LARGEST, shown=show_place("displacement", 14, 2)),
         Column("contact_force", "N", _BETWEEN, shown=Shown("contact", "N", 8, ".1f")),
-        Column("least_opening", "m^2", _LEFT, shown=Shown("opening left", "mm2 at z", 14, _show_opening)),
+        Column("least_opening", "m^2", _LEFT, shown=Shown("opening left", "mm2", 12, ".2f")),
         Column("sealed_length", "m", "Length along the axis on which sections are shut"),
         Column(
             "lip_seal", "m", "The part that begins at the lip", shown=Shown("sealed", "lip+joint mm", 12, _show_seal)
@@ -105,7 +101,7 @@ SUMMARY = (
     Column("penetration", "m", "Deepest penetration of contact points beyond the plane"),
     _MEASURES["overlap"],
     _MEASURES["least_opening"],
-    Column("least_opening_position", "m", "Where it is, from the lip"),
+    Column("least_opening_position", "m", "Where it is, from the lip", shown=Shown("at z", "mm", 5, ".0f")),
     OPENING,
     LIP,
     _MEASURES["max_displacement"],

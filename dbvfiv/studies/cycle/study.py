@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from types import SimpleNamespace
 from typing import Any
@@ -30,7 +30,7 @@ from ...shell.recovery import face_strains, layer_fields, point_stresses
 from ..case import Case
 from ..orbits import MODES, Follower, Orbit
 from ..result import StudyResult
-from ..session import Session, Study, print_rows
+from ..session import Session, Study, print_rows, show_parameter
 from ..stability.place import check_scan, describe_fixed, fixed_conditions, models_of, require_kept_head
 from ..stability.verdict import Verdict
 from ..stability.walk import StabilityWalk
@@ -45,7 +45,7 @@ KEPT = 20
 _PERTURBED = "Dimension in which perturbations grow; -1 where it was not asked for"
 _LEG = "1 on the way up from a start within the range, after the way down from there; 0 elsewhere"
 COLUMNS = (
-    Column("value", "SI", "Value of the parameter", shown=Shown("value", "SI", 12, ".6g")),
+    Column("value", "SI", "Value of the parameter"),
     Column("amplitude", "m", "Half the swing in y of one lip at x = z = 0", shown=Shown("amplitude", "mm", 10, ".4f")),
     Column("frequency", "Hz", "Frequency", shown=Shown("frequency", "Hz", 10, ".4f")),
     Column("lip_least", "m", "Least displacement", shown=Shown("lip from", "mm", 9, ".3f")),
@@ -513,8 +513,9 @@ class CycleResult(StudyResult):
         return "The branch could not be followed to the end of the range"
 
     def lines(self) -> list[str]:
-        rows = [printed_row(COLUMNS, point) for point in self.points]
-        return [f"At {describe_fixed(self.case, self.parameter)}:", *printed_head(COLUMNS), *rows, *self.remarks()]
+        columns = _shown_columns(self.case)
+        rows = [printed_row(columns, point) for point in self.points]
+        return [f"At {describe_fixed(self.case, self.parameter)}:", *printed_head(columns), *rows, *self.remarks()]
 
     def remarks(self) -> list[str]:
         row = self.case.units.parameter(self.parameter)
@@ -551,4 +552,14 @@ def check(case: Case) -> None:
     require_kept_head(case, case.cycle.axis.parameter)
 
 
-STUDY = Study("cycle", tables_of, run, CycleResult, check, rows_to_keep, live=lambda case: print_rows(COLUMNS))
+def _shown_columns(case: Case) -> tuple[Column, ...]:
+    """`COLUMNS` as they are printed, in the units of a case."""
+    value = replace(COLUMNS[0], shown=show_parameter(case.units.parameter(case.cycle.axis.parameter)))
+    return (value, *case.units.columns(COLUMNS[1:]))
+
+
+def _live(case: Case) -> Callable[[Any], str]:
+    return print_rows(_shown_columns(case))
+
+
+STUDY = Study("cycle", tables_of, run, CycleResult, check, rows_to_keep, live=_live)

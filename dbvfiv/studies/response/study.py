@@ -492,13 +492,14 @@ class ResponseResult(StudyResult):
         return f"There is no response at {lost} of the states"
 
     def lines(self) -> list[str]:
-        row = self.case.units.parameter(self.parameter)
+        units = self.case.units
+        row, unit, flow = units.parameter(self.parameter), units.name("flow"), units.factor("flow")
         said = [f"At {describe_fixed(self.case, self.parameter)}; {self.noise}:"]
-        head = f"{self.parameter:>14}{'damping, %':>12}{'at, Hz':>10}{'lip rms, um':>13}{'flow rms, L/s':>15}"
+        head = f"{self.parameter:>14}{'damping, %':>12}{'at, Hz':>10}{'lip rms, um':>13}{'flow rms, ' + unit:>15}"
         said.append(f"{head}{'correlation, s':>16}")
         said += [
             f"{row.text(p['value']):>14}{100 * p['damping_ratio']:>12.4g}{p['frequency']:>10.4g}"
-            f"{1e6 * p['lip_displacement_rms']:>13.4g}{1e3 * p['flow_rms']:>15.4g}{p['correlation_time']:>16.4g}"
+            f"{1e6 * p['lip_displacement_rms']:>13.4g}{p['flow_rms'] / flow:>15.4g}{p['correlation_time']:>16.4g}"
             for p in self.points
         ]
         if not self.points:
@@ -506,10 +507,10 @@ class ResponseResult(StudyResult):
         said.append(f"They are stable in {only_class_of(self.case.part)}.")
         last = self.points[-1]
         said += ["", f"Peaks at {row.text(last['value'])}, per kPa at the inlet:"]
-        said.append(f"{'frequency, Hz':>14}{'damping, %':>12}{'lip, um':>12}{'flow, L/s':>12}{'flange, Pa':>12}")
+        said.append(f"{'frequency, Hz':>14}{'damping, %':>12}{'lip, um':>12}{'flow, ' + unit:>12}{'flange, Pa':>12}")
         said += [
             f"{p['frequency']:>14.5g}{100 * p['damping_ratio']:>12.4g}{1e9 * p['lip_displacement']:>12.4g}"
-            f"{1e6 * p['flow']:>12.4g}{1e3 * p['flange_pressure']:>12.4g}"
+            f"{1e3 * p['flow'] / flow:>12.4g}{1e3 * p['flange_pressure']:>12.4g}"
             for p in self.peaks(last["value"])
         ]
         worst = max(point["error"] for point in self.points)

@@ -43,6 +43,8 @@ from . import figures
 #: Table of the states, and kinds of the notes that hold the cracking pressure, limit points, further equilibria at the
 #: pressure of a state, and how much of the lip has parted.
 STATES, CRACKING, LIMIT, FURTHER, PARTED = "states", "cracking", "limit point", "further equilibrium", "parted"
+#: Beginning of the warning where no cracking pressure is given.
+NOT_FOUND = "The cracking pressure was not found:"
 #: Measurements that belong beside steady states.
 MEASURED = {DISCHARGE: FLOW, AREA: LIP_AREA, SHAPE: None, TAPS: None}
 #: Relative accuracy of the cracking pressure, and difference of two displacements below which they are of one state.
@@ -72,8 +74,10 @@ def run(session: Session, record: GrowingRecord) -> None:
             record.warn(sentence)
     if model.flow.has_fluid and states and not record.notes(CRACKING):
         record.progress("cracking pressure")
-        with suppress(SolveError):  # none is given then
+        try:
             record.note(CRACKING, **find_cracking(model, states, steady.cracking_area)._asdict())
+        except SolveError as error:  # none is given then
+            record.warn(f"{NOT_FOUND} {error}")
     if states and LoadPath(model, SteadyOptions.of(case)).follows_curve:
         _note_curve(model, states, max(steady.pressures), record)
 

@@ -29,7 +29,7 @@ from ...record.states import SUMMARY
 from ...record.table import Column, Shown, TableSpec, printed_head, printed_row
 from ..case import Case
 from ..result import StudyResult
-from ..session import Session, Study, describe_surroundings, print_rows
+from ..session import Session, Study, describe_surroundings, print_rows, show_parameter
 from ..stability.dimensions import variants
 from ..stability.line import ParameterLine
 from ..stability.place import is_surrounding, require_kept_head, require_parameter
@@ -502,8 +502,7 @@ class SweepResult(StudyResult):
 
 def _columns(case: Case) -> tuple[Column, ...]:
     """Columns of the printed table: a value of the parameter, the leading mode, unstable eigenvalues."""
-    shown = case.units.parameter(case.sweep.axis.parameter)
-    value = Shown(shown.name, shown.shown_unit, 12, lambda row: f"{row['value'] / shown.scale:.6g}")
+    value = show_parameter(case.units.parameter(case.sweep.axis.parameter))
     others = Shown("growth rate", "1/s", 12, ".4f"), Shown("frequency", "Hz", 11, ".4f"), Shown("unstable", "", 9, "d")
     names = ("value", "growth_rate", "frequency", "unstable")
     return tuple(Column(name, "", "", shown=shown) for name, shown in zip(names, (value, *others)))

@@ -24,7 +24,7 @@ from ...record.files import Header, kind_of
 from ...record.mesh import MeshData
 from ...record.record import GrowingRecord, Record, StoredRecord
 from ...record.states import state_table
-from ...texts import listed
+from ...texts import digits, listed
 from ...verdict import Shuttings, Verdict, judge
 from ..case import Case
 from .history import HISTORY, STATES, Keeper, Progress, Reader, pumped_flow, supplied_pressure, tables_of
@@ -171,7 +171,7 @@ def openness(history: Columns, model: ValveModel) -> np.ndarray:
     if model.contact is None:
         row = max(len(model.stops.unknowns) / np.count_nonzero(model.mesh.z <= model.case.valve.duckbill_length), 1.0)
         valve = model.case.valve
-        load = BORNE * model.load_unit * valve.bill_width * valve.duckbill_length
+        load = BORNE * model.load_unit * 2 * valve.bill_reach * valve.duckbill_length
         borne = history["stop_energy"] >= 0.5 * load**2 / np.max(model.stops.stiffness)
         held = borne & (history["stops"] >= row) & (drive <= 0) & (history["smallest_area"] <= gap)
         area = np.where(held, 1.0, area)
@@ -194,7 +194,7 @@ def rise_around(history: Columns, model: ValveModel) -> np.ndarray | float:
     speed = tail.speed(model.mesh.inlet_passage, history["inlet_velocity"])
     jet_area = model.flow.open_area(history["outlet_area"] / model.mesh.part.copies)
     gained = np.asarray(tail.gained(jet_area, history["outlet_velocity"], speed))
-    faster = tail.length * np.gradient(speed, history["time"])
+    faster = tail.length * np.gradient(speed, history["time"]) if model.flow.unsteady else 0.0
     return model.case.fluid.density * (faster + np.asarray(tail.lost_head(speed)) - gained)
 
 
@@ -217,8 +217,8 @@ def beyond_model(history: Columns, vacuum: float, around: np.ndarray | float = 0
         where = int(np.argmax(fastest > 1.0))
         return (
             f"The fluid is faster than sound in the valve from {history['time'][where]:.4g} s on, in "
-            f"{100 * np.mean(fastest > 1.0):.2g} % of the steps and up to Mach {fastest.max():.3g}: what shocks take "
-            "is a loss of head here, and the air that lips draw in then is a rough estimate."
+            f"{digits(100 * np.mean(fastest > 1.0), 2)} % of the steps and up to Mach {fastest.max():.3g}: what shocks "
+            "take is a loss of head here, and the air that lips draw in then is a rough estimate."
         )
     lowest = np.min(history["station_pressure"], axis=1) + around
     beyond = np.flatnonzero(lowest < vacuum)
@@ -226,7 +226,7 @@ def beyond_model(history: Columns, vacuum: float, around: np.ndarray | float = 0
         return None
     time, share = history["time"][beyond[0]], len(beyond) / len(lowest)
     return (
-        f"Pressures fall below vacuum from {time:.4g} s on, in {100 * share:.2g} % of the steps and down to "
+        f"Pressures fall below vacuum from {time:.4g} s on, in {digits(100 * share, 2)} % of the steps and down to "
         f"{1e-3 * lowest.min():.4g} kPa, where the valve slams "
         "shut: the fluid's equations are beyond their range there, and the motion afterwards is no prediction."
     )
@@ -423,8 +423,9 @@ class Runner:
             self._checkpoint(needed=True)
         self.verdict = self._judge() if self.history.rows > 1 else None
         around = rise_around(self.history, self.model) if self.history.rows > 1 else 0.0
-        if sentence := beyond_model(self.history, self.case.vacuum_pressure, around):
-            self.record.warn(sentence)
+        said = beyond_model(self.history, self.case.vacuum_pressure, around) if self.model.flow.has_fluid else None
+        if said:
+            self.record.warn(said)
         return self
 
     def _fail(self, sentence: str) -> None:

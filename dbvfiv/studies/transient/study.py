@@ -48,6 +48,8 @@ def run(session: Session, record: GrowingRecord) -> None:
         raise KeyboardInterrupt
 
 
+#: Difference of the pump's pressure from drive.pressure, over that, up to which a run is at its operating point.
+_OPERATING = 1e-3
 _STABILITY = {"steady": STABLE, "decaying": STABLE} | dict.fromkeys(("limit cycle", "growing", "chatters"), FLUTTERS)
 
 
@@ -182,6 +184,12 @@ class TransientResult(StudyResult):
             return Verdict.not_valid(refusals[-1]["text"])
         if (since := Drive.of(self.case).settled_at) > 0:
             return Verdict.undecided(f"The drive changes until {since:.4g} s, and the steady state with it.")
+        own = self.case.drive.pressure
+        if self.case.has_pump and abs(self.history["inlet_pressure"][0] - own) > _OPERATING * own:
+            return Verdict.undecided(
+                "The pump gives another pressure than drive.pressure at the flow of the steady state, which the run "
+                "leaves therefore; leave one of the two out."
+            )
         return stability_of(self.verdict)
 
     @property

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from types import SimpleNamespace
 
 import h5py
 import numpy as np
@@ -11,6 +12,8 @@ import pytest
 import dbvfiv
 from dbvfiv.api import load
 from dbvfiv.studies.case import thesis_case
+from dbvfiv.studies.closure.figures import closure_curve
+from dbvfiv.studies.closure.study import SUMMARY
 from dbvfiv.studies.session import Session, load_result
 from tests.small_valves import SMALL
 
@@ -112,6 +115,27 @@ def test_the_closure_curve_has_no_lines_but_its_own(run, figures):
         assert len(upright) == buckled
         dots = [line for line in axes.lines if line.get_marker() == "o"]
         assert dots and np.allclose(dots[0].get_xdata(), [s.pressure / 1e3 for s in run[0].states])
+
+
+def test_dots_of_the_closure_curve_are_the_states(run):
+    """Also where the path comes back to pressures that it went through on another branch."""
+    result, needed = run[0], ("case", "supports", "states", "buckling")
+    folded = SimpleNamespace(**{name: getattr(result, name) for name in needed})
+    back = {"pressure": 5.5e3, "max_displacement": 1.0}
+    folded.walk = [*result.walk, SimpleNamespace(**vars(result.walk[-1]) | back)]
+    figure = closure_curve(folded)
+    (dots,) = (line for line in figure.axes[2].lines if line.get_marker() == "o")
+    assert dots.get_ydata() == pytest.approx([1e3 * state.max_displacement for state in result.states], rel=1e-12)
+
+
+def test_places_of_the_table_are_in_one_unit(run):
+    """Of the largest displacement and of the passage that is left."""
+    column = {c.shown.title: c for c in run[0].case.replace({"project.units": "in"}).units.columns(SUMMARY) if c.shown}
+    state = run[0].states[0]
+    assert column["at z"].shown.unit == "in"
+    assert float(column["at z"].text(state)) == pytest.approx(state.least_opening_position / 0.0254, rel=0.02)
+    at = float(column["displacement"].text(state).split()[-1])
+    assert at == pytest.approx(state.max_displacement_position[2] / 0.0254, rel=0.02)
 
 
 def test_side_views_show_the_faces(figures):
