@@ -413,7 +413,7 @@ class Case(Section):
         return self.model_dump(mode="json")
 
     def _tables(self) -> dict[str, Any]:
-        """The same as a case file has it: materials by their names."""
+        """Data as a case file has them: materials by their names."""
         data = self.to_dict()
         data["materials"] |= data["materials"].pop("named")
         return data

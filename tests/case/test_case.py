@@ -557,7 +557,7 @@ def test_changes_in_python_are_those_of_set(tmp_path, change):
     ],
 )
 def test_a_change_of_a_case_is_that_of_its_file(tmp_path, changes):
-    """Also of single numbers of materials, and of pipes in pieces; what says the same otherwise makes way."""
+    """Single numbers of materials and of pieces change, and what says the same otherwise makes way."""
     (tmp_path / "own.toml").write_text(
         "[materials.CR]\nprony = [[0.1, 0.01]]\n[[upstream.pieces]]\nlength = 4\nfriction = 0.02\n"
         '[materials.rub]\nkind = "ogden"\nmu = [5e5, 1e5]\nalpha = [2, 4]\ndensity = 1200\nprony = [[0.2, 0.05]]\n'
@@ -574,7 +574,7 @@ def test_pieces_stand_in_the_place_of_one_pipe():
 
 @pytest.mark.parametrize("key", ["materials.SBR.loss_data", "transient.drive_table", "steady.measured"])
 def test_a_file_that_python_names_keeps_its_full_name(tmp_path, monkeypatch, key):
-    """In another folder it is the same."""
+    """A change of the folder does not lose it."""
     monkeypatch.chdir(tmp_path)
     tables = {"measured": "pressure [kPa], flow [L/s]\n1, 2\n", "drive_table": "0, 1000\n1, 2000\n"}
     loss = "frequency [Hz], loss_factor\n1, 0.1\n10, 0.2\n100, 0.3\n"
@@ -615,7 +615,7 @@ def test_a_key_that_is_set_takes_the_place_of_what_says_the_same(change, name):
     ],
 )
 def test_what_is_allowed_holds_the_limits(key, words):
-    """Of numbers that may be left out, and of those in lists."""
+    """Numbers that may be left out, and those in lists, have theirs."""
     assert next(info.allowed for info in walk(Case) if info.key == key).startswith(words)
 
 

@@ -80,7 +80,7 @@ def test_samples_come_from_a_list_or_a_file(tmp_path):
 
 @pytest.mark.parametrize("text", ["300,5\n310,25\n", "1, 300.5\n2, 310.25\n"])
 def test_a_line_that_is_no_number_is_no_sample(tmp_path, text):
-    """Neither are its decimals, nor the numbers of a second column."""
+    """Decimals behind a comma and a second column are none either."""
     (tmp_path / "speeds.txt").write_text(text)
     with pytest.raises(ValueError, match="is not a number|which is no"):
         Distribution.parse(f"samples({tmp_path / 'speeds.txt'})", PLAIN)

@@ -65,7 +65,7 @@ def test_a_table_speaks_in_heads_and_json_in_si(command_line):
 
 
 def test_warnings_are_told_in_heads_of_the_fluid_that_is_asked_for(command_line, tmp_path):
-    """Not of that of the case file."""
+    """Heads of the case file's own fluid would be a hundred times as low."""
     outcome = command_line("modes", *COARSE, "-p", "40 m", "--density", "10", "-o", tmp_path / "m.h5")
     assert outcome.status == 0, outcome.err
     told = command_line("info", tmp_path / "m.h5").out

@@ -299,7 +299,7 @@ IMPOSSIBLE = {
     ],
 )
 def test_walls_and_gaps_that_no_valve_has_are_refused(tmp_path, key, words):
-    """As those of the parametric shape are."""
+    """Both doors refuse them: key points and parameters."""
     with pytest.raises(CaseError, match=words):
         dbvfiv.load(by_points(Case(), tmp_path), key).session.mesh
     with pytest.raises(CaseError, match=key.partition("=")[0]):
@@ -314,7 +314,7 @@ def test_key_points_stand_in_the_place_of_the_parameters(tmp_path):
 
 
 def test_joints_may_be_told_by_floats(tmp_path):
-    """As pandas writes them where a cell is empty."""
+    """Spreadsheets and pandas write 0.0 and 1.0 where a cell is empty."""
     (tmp_path / "own.csv").write_text(table := key_point_table(Case().valve, 9, 0))
     (tmp_path / "floats.csv").write_text(re.sub(r"([01])$", r"\1.0", table, flags=re.MULTILINE))
     found, own = (read_key_points(tmp_path / name) for name in ("floats.csv", "own.csv"))

@@ -118,7 +118,7 @@ def test_the_closure_curve_has_no_lines_but_its_own(run, figures):
 
 
 def test_dots_of_the_closure_curve_are_the_states(run):
-    """Also where the path comes back to pressures that it went through on another branch."""
+    """A path that comes back to pressures of another branch leaves them where they are."""
     result, needed = run[0], ("case", "supports", "states", "buckling")
     folded = SimpleNamespace(**{name: getattr(result, name) for name in needed})
     back = {"pressure": 5.5e3, "max_displacement": 1.0}
@@ -129,7 +129,7 @@ def test_dots_of_the_closure_curve_are_the_states(run):
 
 
 def test_places_of_the_table_are_in_one_unit(run):
-    """Of the largest displacement and of the passage that is left."""
+    """The largest displacement and the passage that is left have one each."""
     column = {c.shown.title: c for c in run[0].case.replace({"project.units": "in"}).units.columns(SUMMARY) if c.shown}
     state = run[0].states[0]
     assert column["at z"].shown.unit == "in"
