@@ -123,16 +123,11 @@ def change(data: dict[str, Any], key: str, text: str) -> None:
     if text.strip():
         Case.make_way(data, {put(Case, data, key, toml_value(text.strip()))})
         return
-    *path, last = key.split(".")
-    table: Any = data
-    for part in path:
-        if isinstance(table, list):
-            table = table[int(part)] if part.isdigit() and int(part) < len(table) else None
-        else:
-            table = table.get(part) if isinstance(table, dict) else None
+    place, _, last = key.rpartition(".")
+    table = held(data, place)
     if isinstance(table, dict):
         table.pop(last, None)
-        Case.take_along(data, {(*path, last)})
+        Case.take_along(data, {(*place.split("."), last)})
 
 
 def bring(path: Path, home: Path, anew: bool = True) -> str:

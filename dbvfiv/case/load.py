@@ -367,7 +367,7 @@ def held(data: Any, dotted: str) -> Any:
     """Value of plain data under a key; None where that is no key of tables and lists in tables."""
     for part in key_path(dotted):
         if isinstance(data, list):
-            data = dict(enumerate(data)).get(int(part) if part.isdecimal() else None)
+            data = data[int(part)] if part.isdecimal() and int(part) < len(data) else None
         else:
             data = data.get(part) if isinstance(data, Mapping) else None
     return data

@@ -476,12 +476,12 @@ def change_case(case: Case, changes: Changes) -> Case:
     """
     names = _as_mapping(changes)
     made = made_with(case.replace, names)
-    data, asked = made._tables(), made._tables()
+    data = made._tables()
     for name, value in names.items():
-        if held(asked, name) == [str(value)]:  # of the files of a key one was named
-            put(type(case), asked, name, str(value))
+        if held(data, name) == [str(value)]:  # of the files of a key one was named
+            put(type(case), data, name, str(value))
     try:
-        found = make_case(type(case), asked)._tables()
+        found = make_case(type(case), data)._tables()
     except CaseError as error:  # files of the case itself may have gone since it was read
         if any(f"{error.key}.".startswith(f"{name}.") for name in names):
             raise

@@ -426,5 +426,4 @@ class ValveModel(PressedShell):
             return 0.0
         velocity = self.flow.inlet_velocity(area, pressure, self.case.fluid.density)
         density = self.flow.inlet_density(area, pressure, self.case.fluid.density)
-        inlet = self.mesh.inlet_passage
-        return self.mesh.part.copies * density * velocity * inlet
+        return self.mesh.part.copies * density * velocity * self.mesh.inlet_passage

@@ -318,7 +318,8 @@ def test_joints_may_be_told_by_floats(tmp_path):
     (tmp_path / "own.csv").write_text(table := key_point_table(Case().valve, 9, 0))
     (tmp_path / "floats.csv").write_text(re.sub(r"([01])$", r"\1.0", table, flags=re.MULTILINE))
     found, own = (read_key_points(tmp_path / name) for name in ("floats.csv", "own.csv"))
-    assert [profile.joints for profile in found] == [profile.joints for profile in own]
+    assert [profile.joints for profile in found] == [profile.joints for profile in own] and own[0].joints
+    assert ", 1.0\n" in (tmp_path / "floats.csv").read_text()
 
 
 @pytest.mark.parametrize("name", IMPOSSIBLE)

@@ -558,8 +558,6 @@ def _shown_columns(case: Case) -> tuple[Column, ...]:
     return (value, *case.units.columns(COLUMNS[1:]))
 
 
-def _live(case: Case) -> Callable[[Any], str]:
-    return print_rows(_shown_columns(case))
-
-
-STUDY = Study("cycle", tables_of, run, CycleResult, check, rows_to_keep, live=_live)
+STUDY = Study(
+    "cycle", tables_of, run, CycleResult, check, rows_to_keep, live=lambda case: print_rows(_shown_columns(case))
+)

@@ -153,7 +153,7 @@ def require_parameter(case: Case, name: str) -> None:
     unknown = case.damping.lacks(name)
     if said := lacks.get(name) or (unknown and f"There is no {name} to change: {unknown}."):
         raise CaseError(said, key=PARAMETERS[name].key)
-    of_inertia = name in ("pipe_length", "tail_length", "wave_speed", "storage") and not why_it_moves(case, name)
+    of_inertia = name in ("pipe_length", "tail_length", "storage") and not why_it_moves(case, name)
     if of_inertia and not case.fluid.unsteady:
         raise CaseError(
             f"Nothing depends on {name}: fluid.unsteady is false, which leaves the inertia of the fluid out.",
