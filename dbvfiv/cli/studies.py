@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from importlib import import_module
 from pathlib import Path
 from types import ModuleType
@@ -14,7 +15,7 @@ import typer
 from ..errors import CaseError, SolveError
 from ..observer import Progress
 from ..studies import KINDS
-from ..studies.request import AnimationOption, is_sheet
+from ..studies.request import AnimationOption, Request, changed_keys, is_sheet
 from .terminal import (
     AsJson,
     CaseFile,
@@ -52,7 +53,8 @@ def _make_command(kind: str, module: ModuleType) -> Callable[..., None]:
 
         case = load_case(case_file, overrides or ())
         shared = {"case": case, "plots": plots, "output": output}
-        request = module.command(**{name: shared[name] for name in _SHARED if name in asked}, **given)
+        request = module.command(**{name: shared[name] for name in _SHARED if name in asked}, **given) or Request()
+        request = replace(request, changes=changed_keys(kind, module.Keys, given) | request.changes)
         ranges = [text for text in map(given.get, ("over", "x", "y")) if text and text.startswith("pressure=")]
         case = _in_units_asked(case, given.get("pressures") or [given.get("pressure")] + ranges)
         perform(kind, case, request, case_file.stem if case_file else "dbv12", output, plots, as_json)

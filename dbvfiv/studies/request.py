@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 
+from ..case.describe import quantity_of
 from ..case.quantity import number_or_text
-from ..case.section import BrokenRule
+from ..case.section import BrokenRule, Section
 from ..errors import CaseError
 from .workers import WORKERS_HELP
 
@@ -46,19 +47,36 @@ def with_unit(option: typer.CallbackParam, given: str | list[str] | None) -> str
 LAWS = ("quasi-steady", "storage", "both")
 
 
-def law_changes(law: str | None, study: str) -> dict[str, str | None]:
+#: Keys of other sections that an option of any study stands for.
+_ELSEWHERE = {"pressure": "drive.pressure", "density": "fluid.density", "law": "fluid.continuity"}
+
+
+def changed_keys(study: str, keys: type[Section], given: Mapping[str, Any]) -> dict[str, Any]:
+    """Keys of the case that options of a study change: an option stands for the key of the study's section that has its
+    name, or for one `_ELSEWHERE`; what was not given changes none. Raises CaseError for a law that is no choice.
+    """
+    found: dict[str, Any] = {}
+    for name, value in given.items():
+        if value is False or value == []:
+            value = None
+        if name == "law" and "continuity" in keys.model_fields:  # a study that may compare both
+            found |= _law_changes(value, study)
+        elif name in _ELSEWHERE:
+            found[_ELSEWHERE[name]] = value if name == "law" else number_or_text(value)
+        elif name in keys.model_fields:
+            is_quantity = isinstance(value, str) and quantity_of(keys.model_fields[name]) is not None
+            value = str(value) if isinstance(value, Path) else value
+            found[f"{study}.{name}"] = number_or_text(value) if is_quantity else value
+    return found
+
+
+def _law_changes(law: str | None, study: str) -> dict[str, str | None]:
     """Keys that a law asked for on the command line changes. Raises CaseError for a word that is no choice."""
     if law is not None and law not in LAWS:
         raise CaseError(f"--law is given as {law!r}; it must be {', '.join(LAWS[:-1])} or {LAWS[-1]}.")
     if law == "both":
         return {f"{study}.continuity": "both"}
     return {"fluid.continuity": law, f"{study}.continuity": "case" if law else None}
-
-
-def ranged_changes(study: str, over: str | None, pressure: str | None, density: str | None) -> dict[str, Any]:
-    """Keys of the case that options --over, --pressure and --density of a study over a range change."""
-    values = {"drive.pressure": number_or_text(pressure), "fluid.density": number_or_text(density)}
-    return values | {f"{study}.over": over}
 
 
 def require_start_file(start: str, word: str, path: Path | None) -> None:
@@ -116,7 +134,7 @@ WorkersOption = Annotated[str | None, typer.Option("--workers", "-w", "--on", me
 
 @dataclass(frozen=True)
 class Request:
-    """A study as the command line wants it."""
+    """A study as the command line wants it, besides the keys that its options stand for."""
 
     #: Keys of the case and what takes their place; those with None are left as they are.
     changes: dict[str, Any] = field(default_factory=dict)

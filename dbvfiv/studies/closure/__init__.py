@@ -99,6 +99,4 @@ def command(
 
     dbvfiv closure cases/closure.toml -o closure.h5 --plots figures
     """
-    changes = {"closure.pressures": [number_or_text(text) for text in pressures] if pressures else None}
-    changes["closure.symmetry"] = symmetry
-    return Request(changes)
+    return Request({"closure.pressures": [number_or_text(text) for text in pressures] if pressures else None})

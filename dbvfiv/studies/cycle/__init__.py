@@ -11,7 +11,7 @@ from ...case.parameters import listed
 from ...case.quantity import Length, Number
 from ...case.section import key
 from ...case.tables import ExistingFile
-from ..request import DensityOption, PressureOption, Request, over_option, ranged_changes, require_start_file
+from ..request import DensityOption, PressureOption, over_option, require_start_file
 
 ORDER = 42
 
@@ -68,7 +68,7 @@ def command(
     ] = None,
     pressure: PressureOption = None,
     density: DensityOption = None,
-) -> Request:
+) -> None:
     """Limit cycles followed from an onset along a parameter: amplitude, frequency, stability.
 
     The oscillation itself is solved for, as a Fourier series in time with all unknowns of the valve, so nothing has to
@@ -79,4 +79,3 @@ def command(
 
     dbvfiv cycle cases/light-fluid.toml --over density=25:60:8 -o cycle.h5 --plots figures
     """
-    return Request(ranged_changes("cycle", over, pressure, density))

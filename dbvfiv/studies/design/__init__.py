@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 from pydantic import AfterValidator, BeforeValidator, StrictInt, StrictStr, field_validator
 
-from ...case.quantity import Number, number_or_text
+from ...case.quantity import Number
 from ...case.section import Described, Section, flattened, key
 from ...case.statement import AIM, CONSTRAINT, parse_statement
 from ..request import DensityOption, Request
@@ -95,10 +95,7 @@ def command(
     """
     pairs = [text.partition("=") for text in vary or ()]
     changes = {
-        "design.aim": aim,
         "design.constraints": list(constraint) if constraint else None,
         "design.variables": {name.strip(): bounds.strip() for name, _, bounds in pairs} if pairs else None,
-        "design.starts": starts,
-        "fluid.density": number_or_text(density),
     }
     return Request(changes, {"cases": cases})

@@ -11,7 +11,7 @@ from pydantic import Field, StrictInt, StrictStr
 from ...case.axis import Point, RangeSection, StabilityRange
 from ...case.model import Case
 from ...case.parameters import listed
-from ...case.quantity import Frequency, Number, number_or_text
+from ...case.quantity import Frequency, Number
 from ...case.section import Section, key
 from ...case.tables import ExistingFile
 from ...errors import CaseError
@@ -97,15 +97,7 @@ def command(
         raise CaseError("--at and --column say where records were taken; no record is given.")
     places, columns = _each(at, records, "--at"), _each(column, records, "--column")
     given = [{"file": str(f.resolve()), "at": p, "column": c} for f, p, c in zip(records or (), places, columns)]
-    changes = {
-        "identify.records": given or None,
-        "identify.over": over,
-        "identify.samples": samples,
-        "identify.workers": workers,
-        "fluid.density": number_or_text(density),
-        "fluid.continuity": law,
-    }
-    return Request(changes, {"posterior": posterior})
+    return Request({"identify.records": given or None}, {"posterior": posterior})
 
 
 def _each(given: list[str] | None, records: list[Path] | None, name: str) -> list[str]:

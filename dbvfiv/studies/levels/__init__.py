@@ -7,7 +7,7 @@ from typing import Annotated
 from ...case.model import Case
 from ...case.physics import LoadPressure
 from ...case.section import Section, key
-from ..request import Request, pressure_option
+from ..request import pressure_option
 
 ORDER = 25
 
@@ -23,7 +23,7 @@ class Keys(Section):
 def command(
     case: Case,
     pressures: Annotated[list[str] | None, pressure_option("Static inlet pressure; may be repeated.")] = None,
-) -> Request:
+) -> None:
     """Strain level of each rubber that agrees with what its layer strains (Eq. 7.1), and the flow with it.
 
     Each rubber has the constants of a level, 10 to 60 %; with them 99 % of its layer strain by less than so much; that
@@ -32,4 +32,3 @@ def command(
 
     dbvfiv levels cases/dbv12.toml -p "18 kPa" -p "36 kPa"
     """
-    return Request({"levels.pressures": list(pressures) if pressures else None})

@@ -9,7 +9,6 @@ from pydantic import StrictBool, StrictInt, StrictStr, field_validator, model_va
 
 from ...case.axis import Axis, Level, StabilityRange, parse_stability_axis
 from ...case.parameters import listed
-from ...case.quantity import number_or_text
 from ...case.section import BrokenRule, Section, key
 from ..request import ClassesOption, Request, WorkersOption, pressure_option
 from ..workers import WORKERS_HELP, WorkersKey
@@ -147,17 +146,4 @@ def command(
     dbvfiv map cases/dbv12.toml --x "pressure=0.5 kPa:20 kPa:64" --y density=1:1000:64:log --workers 2 -o map.h5 --plots
     figures
     """
-    changes = {
-        "drive.pressure": number_or_text(pressure),
-        "fluid.density": number_or_text(density),
-        "map.x": x,
-        "map.y": y,
-        "map.continuity": "both" if both else None,
-        "map.workers": workers,
-        "map.symmetry": symmetry,
-        "map.contours": contours,
-        "map.samples": samples,
-        "map.cycles": cycles or None,
-        "map.amplitude": amplitude or None,
-    }
-    return Request(changes)
+    return Request({"map.continuity": "both" if both else None})

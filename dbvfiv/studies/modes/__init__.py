@@ -10,10 +10,10 @@ import typer
 from pydantic import StrictBool, StrictInt
 
 from ...case.model import Case
-from ...case.quantity import Frequency, Number, Rate, number_or_text
+from ...case.quantity import Frequency, Number, Rate
 from ...case.section import Section, key
 from ...errors import CaseError
-from ..request import DensityOption, LawsOption, Request, law_changes, pressure_option
+from ..request import DensityOption, LawsOption, Request, pressure_option
 
 ORDER = 25
 
@@ -93,11 +93,4 @@ def command(
     def further(result: Any) -> list[Path]:
         return [result.animate(plots / f"mode-{number}.gif", number) for number in animate or ()]
 
-    changes = {
-        "drive.pressure": number_or_text(pressure),
-        "fluid.density": number_or_text(density),
-        "modes.count": count,
-        "modes.in_vacuo": in_vacuo or None,
-        "modes.symmetry": symmetry,
-    } | law_changes(law, "modes")
-    return Request(changes, further=further)
+    return Request(further=further)

@@ -10,16 +10,7 @@ from ...case.axis import RangeSection, StabilityRange
 from ...case.parameters import listed
 from ...case.quantity import Number
 from ...case.section import key
-from ..request import (
-    ClassesOption,
-    DensityOption,
-    LawsOption,
-    PressureOption,
-    Request,
-    law_changes,
-    over_option,
-    ranged_changes,
-)
+from ..request import ClassesOption, DensityOption, LawsOption, PressureOption, over_option
 
 ORDER = 28
 
@@ -66,7 +57,7 @@ def command(
     density: DensityOption = None,
     law: LawsOption = None,
     symmetry: ClassesOption = None,
-) -> Request:
+) -> None:
     """Every onset along one parameter: value, frequency, super- or subcritical, uncertainty of the mesh.
 
     All crossings of the range are looked for, also tongues of instability that close again. Each is located with the
@@ -82,5 +73,3 @@ def command(
 
     dbvfiv onset cases/dbv12.toml --over density -p "6 kPa"
     """
-    changes = ranged_changes("onset", over, pressure, density) | {"onset.symmetry": symmetry}
-    return Request(changes | law_changes(law, "onset"))

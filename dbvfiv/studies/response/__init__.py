@@ -11,11 +11,11 @@ from pydantic import Field, StrictInt
 from ...case.axis import RangeSection, StabilityRange
 from ...case.model import Case
 from ...case.parameters import listed
-from ...case.quantity import Frequency, Pressure, Quantity, number_or_text
+from ...case.quantity import Frequency, Pressure, Quantity
 from ...case.section import key
 from ...case.tables import ExistingFile, read_pairs
 from ...errors import CaseError
-from ..request import DensityOption, LawOption, PressureOption, Request, over_option, ranged_changes, with_unit
+from ..request import DensityOption, LawOption, PressureOption, over_option, with_unit
 
 ORDER = 33
 
@@ -72,7 +72,7 @@ def command(
     max_frequency: Annotated[
         str | None, typer.Option("--max-frequency", metavar="F", help="Frequency up to which it is computed, '80 Hz'.")
     ] = None,
-) -> Request:
+) -> None:
     """Lip motion, flow and pressure per pressure at the inlet over frequency (pump pulsation, vane passing), with the
     damping of their peaks, and their root mean squares under pressure noise.
 
@@ -87,11 +87,3 @@ def command(
         raise CaseError(
             f"--noise is given as {noise!r}, but the spectrum {str(known)!r} is in its place; one of them has to go."
         )
-    changes = {
-        **ranged_changes("response", over, pressure, density),
-        "fluid.continuity": law,
-        "response.noise": number_or_text(noise),
-        "response.spectrum": None if spectrum is None else str(spectrum),
-        "response.max_frequency": number_or_text(max_frequency),
-    }
-    return Request(changes)

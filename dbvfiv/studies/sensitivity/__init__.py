@@ -8,9 +8,9 @@ import typer
 from pydantic import StrictInt, StrictStr
 
 from ...case.parameters import listed
-from ...case.quantity import Number, number_or_text
+from ...case.quantity import Number
 from ...case.section import Section, key
-from ..request import DensityOption, PressureOption, Request
+from ..request import DensityOption, PressureOption
 
 ORDER = 27
 
@@ -41,7 +41,7 @@ def command(
     mode: Annotated[
         int | None, typer.Option("--mode", metavar="N", help="Number of the mode, by falling growth rate.")
     ] = None,
-) -> Request:
+) -> None:
     """Change of growth rate and frequency of the leading mode with every parameter: load, fluid, damping, wall, and the
     thickness, angle and constants of each layer.
 
@@ -50,10 +50,3 @@ def command(
 
     dbvfiv sensitivity cases/dbv12.toml -p "6 kPa" --density 10 --of pressure --of thickness --of "layer 3 angle"
     """
-    changes = {
-        "sensitivity.of": list(of) if of else None,
-        "sensitivity.mode": mode,
-        "drive.pressure": number_or_text(pressure),
-        "fluid.density": number_or_text(density),
-    }
-    return Request(changes)

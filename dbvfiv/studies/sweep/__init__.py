@@ -11,7 +11,7 @@ from ...case.axis import Axis, Range, parse_axis
 from ...case.parameters import SWEPT, listed
 from ...case.quantity import Number
 from ...case.section import Section, key
-from ..request import DensityOption, PressureOption, Request, over_option, ranged_changes
+from ..request import DensityOption, PressureOption, over_option
 
 ORDER = 26
 
@@ -57,7 +57,7 @@ def command(
         str | None,
         typer.Option("--symmetry", metavar="CLASS", help="Symmetry class: SS, SA, AS or AA; see dbvfiv modes."),
     ] = None,
-) -> Request:
+) -> None:
     """Damping and frequency of the leading modes, followed along a parameter of load, fluid or damping.
 
     Each mode keeps its number through crossings; "confidence" says how sure each match is. Where the steady state
@@ -66,5 +66,3 @@ def command(
     dbvfiv sweep cases/dbv12.toml -p "6 kPa" --set damping.alpha=0 --over density=1:1000:40:log -o sweep.h5 --plots
     figures
     """
-    changes = ranged_changes("sweep", over, pressure, density)
-    return Request(changes | {"sweep.count": count, "sweep.symmetry": symmetry})

@@ -12,16 +12,7 @@ from ...case.distribution import with_full_names
 from ...case.parameters import listed
 from ...case.quantity import Number
 from ...case.section import Described, flattened, key
-from ..request import (
-    DensityOption,
-    LawsOption,
-    PressureOption,
-    Request,
-    WorkersOption,
-    law_changes,
-    over_option,
-    ranged_changes,
-)
+from ..request import DensityOption, LawsOption, PressureOption, Request, WorkersOption, over_option
 from ..workers import WORKERS_HELP, WorkersKey
 
 ORDER = 31
@@ -96,11 +87,4 @@ def command(
     dbvfiv uncertainty cases/dbv12-in-line.toml --over "pressure=0.5 m:4 m:3" --workers 2 -o probability.h5 --plots
     figures
     """
-    changes = {
-        **ranged_changes("uncertainty", over, pressure, density),
-        "uncertainty.samples": samples,
-        "uncertainty.method": "rare" if rare else None,
-        "uncertainty.workers": workers,
-        **law_changes(law, "uncertainty"),
-    }
-    return Request(changes)
+    return Request({"uncertainty.method": "rare" if rare else None})
