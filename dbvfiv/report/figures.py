@@ -14,6 +14,7 @@ from matplotlib.figure import Figure
 
 from ..drawing.style import COMPUTED, DANGER, PUBLISHED, STABLE, UNSTABLE, new_figure, parameter_label
 from ..drawing.views import ValveSkin
+from ..texts import json_value
 from .answers import loss_range
 from .gather import Gathered
 
@@ -164,4 +165,4 @@ def live_valve(state: State, units: Units) -> str:
 
 def _short(values: np.ndarray) -> list[float | None]:
     """Numbers (k,) with the five digits that a pointer shows, so that the page stays small."""
-    return [float(f"{value:.5g}") if np.isfinite(value) else None for value in values]
+    return json_value([float(f"{value:.5g}") for value in values])

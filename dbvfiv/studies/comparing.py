@@ -154,9 +154,9 @@ class Comparison:
         return self.picture(self.results)
 
 
-def cell(value: float, width: int, form: str) -> str:
-    """A number of a table for people; a dash where a run has nothing."""
-    return (f"{value:{form}}" if np.isfinite(value) else "-").rjust(width)
+def cell(value: float | None, width: int, form: str) -> str:
+    """A number of a table for people; a dash where there is none."""
+    return ("-" if value is None or not np.isfinite(value) else f"{value:{form}}").rjust(width)
 
 
 def tabulate_deviations(runs: Sequence[Iterable[Any]]) -> list[str]:

@@ -162,7 +162,7 @@ class Recognition:
                 | {
                     "says": self.sentence(line),
                     "matches": [
-                        {"name": one.name, "share": share, "distance": d if np.isfinite(d) else None}
+                        {"name": one.name, "share": share, "distance": json_value(d)}
                         for one, share, d in self.matches(line)
                     ],
                 }

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from ..texts import digits
+from ..texts import digits, json_value
 from .lines import PEAK
 from .series import (
     Cycles,
@@ -96,15 +96,14 @@ class Verdict:
 
     def summary(self) -> dict[str, Any]:
         """Plain SI numbers for JSON; what is not a number is None."""
-        numbers = {name: getattr(self, name) for name in _NUMBERS}
         return (
             {
                 "verdict": self.name,
                 "decided": bool(self.decided),
                 "reason": self.reason,
-                **{name: float(value) if np.isfinite(value) else None for name, value in numbers.items()},
+                **{name: json_value(getattr(self, name)) for name in _NUMBERS},
                 "cycles_observed": self.cycles,
-                "judged": [float(t) if np.isfinite(t) else None for t in self.judged],
+                "judged": json_value(self.judged),
                 "notes": list(self.notes),
                 "harmonics": [{"amplitude": float(a), "phase": float(p)} for a, p in self.harmonics],
             }

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from scipy.optimize import minimize
 
-from ..texts import digits
+from ..texts import digits, json_value
 from .judge import FILLED, JudgeOptions, Verdict, judge, longest_samples
 from .lines import (
     LEVEL,
@@ -293,7 +293,7 @@ def _verdict(found: Motion, series: Series, options: JudgeOptions) -> Verdict:
 
 def _summary(line: Line) -> dict[str, Any]:
     """Numbers of an oscillation; intervals are half those of 95 %."""
-    frequency, rate, amplitude = (float(error) if np.isfinite(error) else None for error in line.errors)
+    frequency, rate, amplitude = json_value(line.errors)
     moves = {"rate": line.rate, "rate_interval": rate, "damping_ratio": line.damping_ratio}
     moves |= {"damping_ratio_interval": line.ratio_error}
     return {

@@ -20,7 +20,7 @@ from ...drawing.style import ACCENT, COMPUTED, REST, headline, new_figure, param
 from ...errors import CaseError, SolveError
 from ...model.symmetry import equilibria_of, only_class_of
 from ...record.record import GrowingRecord, Record
-from ...texts import digits
+from ...texts import digits, json_value
 from ..case import Case
 from ..inputs import Plan, correlation_of, inputs_of
 from ..result import StudyResult
@@ -348,8 +348,7 @@ class IdentifyResult(StudyResult):
                 for mode in np.argsort(-share[:-1])
                 if share[mode] >= 0.01
             ]
-            ratio = line.damping_ratio if np.isfinite(line.damping_ratio) else None
-            own = {"record": line.record, "frequency": line.frequency, "damping_ratio": ratio}
+            own = {"record": line.record, "frequency": line.frequency, "damping_ratio": json_value(line.damping_ratio)}
             found.append(own | {"place": self.places.words(place), "modes": likely, "none": float(share[-1])})
         return found
 
@@ -476,7 +475,7 @@ def _interval(at: np.ndarray, among: np.ndarray, beyond: float) -> dict[str, Any
     """
     whole = np.where(np.isfinite(at), at, beyond)[among]
     found = np.quantile(whole, INTERVAL, method="nearest") if whole.size else np.full(3, beyond)
-    low, middle, high = (float(value) if np.isfinite(value) else None for value in found)
+    low, middle, high = json_value(found)
     return {"median": middle, "interval": [low, high], "probability": float((np.isfinite(at) & among).mean())}
 
 

@@ -6,14 +6,13 @@ from collections import Counter
 from dataclasses import fields
 from typing import Any
 
-import numpy as np
-
 from ...case.materials import RUBBERS
 from ...errors import CaseError, SolveError
 from ...model.material_stability import LayerLevel
 from ...model.strain_level import agree_levels, beyond_tests
 from ...record.record import GrowingRecord
 from ...record.table import TEXT, Column, Shown, TableSpec, printed_head, printed_row
+from ...texts import json_value
 from ..result import StudyResult
 from ..session import Session, Study
 from ..state import miss, missed_before
@@ -100,9 +99,7 @@ class LevelsResult(StudyResult):
         return self.record.table_rows(_TABLE)
 
     def summary(self) -> dict[str, Any]:
-        rows = [row.items() for row in self.rows]
-        points = [{k: None if isinstance(x, float) and np.isnan(x) else x for k, x in r} for r in rows]
-        return {"points": points} | self.ending()
+        return {"points": json_value(self.rows)} | self.ending()
 
     def lines(self) -> list[str]:
         columns = self.case.units.columns(_COLUMNS)

@@ -24,6 +24,8 @@ from ...record.mesh import MeshData
 from ...record.record import GrowingRecord
 from ...record.states import read_states, state_row, state_table
 from ...record.table import TEXT, Column, TableSpec
+from ...texts import json_value
+from ..comparing import cell
 from ..result import StudyResult
 from ..session import Session, Study, describe_surroundings
 from ..stability.derivatives import PERFORMANCE, Neighbourhood, Sensitivity, parameters_of, require_number, unit_of
@@ -172,7 +174,7 @@ class SensitivityResult(StudyResult):
         """
         own = self.performance
         per_cent = {name: slope * found.value / (own[name] or np.nan) for name, slope in found.performance.items()}
-        return {name: value if np.isfinite(value) else None for name, value in per_cent.items()}
+        return json_value(per_cent)
 
     def summary(self) -> dict[str, Any]:
         if not self.record.notes(MODE):
@@ -220,7 +222,7 @@ def _line(result: SensitivityResult, found: Sensitivity) -> str:
     percent = found.per_percent
     relative = f"{percent.real:12.4g}{percent.imag / (2 * np.pi):13.4g}" if found.value else f"{'-':>12}{'-':>13}"
     widths = zip(result.elasticity(found).values(), (9, 11, 9, 9))
-    further = "".join("-".rjust(width) if value is None else f"{value:{width}.3g}" for value, width in widths)
+    further = "".join(cell(value, width, ".3g") for value, width in widths)
     return (
         f"{found.parameter:<24}{value:>12.6g}  {unit:<7}{found.growth_rate * scale:>12.4g}"
         f"{found.frequency * scale:>13.4g}{relative}{further}"

@@ -27,6 +27,7 @@ from ...record.mesh import MeshData
 from ...record.record import GrowingRecord, Record
 from ...record.states import SUMMARY
 from ...record.table import Column, Shown, TableSpec, printed_head, printed_row
+from ...texts import json_value
 from ..case import Case
 from ..result import StudyResult
 from ..session import Session, Study, describe_surroundings, print_rows, show_parameter
@@ -325,9 +326,7 @@ class Branch:
     def summary(self) -> dict[str, Any]:
         """Plain numbers for JSON; None where the branch does not exist."""
         columns = {"growth_rate": self.growth_rate, "frequency": self.frequency, "confidence": self.confidence}
-        return {"id": self.id} | {
-            name: [float(v) if np.isfinite(v) else None for v in values] for name, values in columns.items()
-        }
+        return {"id": self.id} | json_value(columns)
 
 
 @dataclass(frozen=True)

@@ -24,7 +24,7 @@ from ...record.files import Header, kind_of
 from ...record.mesh import MeshData
 from ...record.record import GrowingRecord, Record, StoredRecord
 from ...record.states import state_table
-from ...texts import digits, listed
+from ...texts import digits, json_value, listed
 from ...verdict import Shuttings, Verdict, judge
 from ..case import Case
 from .history import HISTORY, STATES, Keeper, Progress, Reader, pumped_flow, supplied_pressure, tables_of
@@ -87,7 +87,7 @@ class RunVerdict:
             **{key: flow[key] for key in NUMBERS},
             "steps": self.steps,
             "time": self.time,
-            "residual": self.residual if np.isfinite(self.residual) else None,
+            "residual": json_value(self.residual),
             "mass_flow": flow,
             "lip_opening": self.lip_opening.summary(),
             "lip_displacement": self.lip_displacement.summary(),

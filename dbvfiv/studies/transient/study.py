@@ -18,7 +18,7 @@ from ...record.record import GrowingRecord, Record
 from ...record.vtkhdf import Step
 from ...texts import digits
 from ..case import Case
-from ..comparing import labels
+from ..comparing import cell, labels
 from ..result import StudyResult
 from ..session import Session, Study
 from ..stability.verdict import DIVERGES, FLUTTERS, STABLE, UNDECIDED, Verdict
@@ -262,8 +262,8 @@ class TransientResult(StudyResult):
             found = verdict[name]
             last = [h[name][-1], found["mean"], found["amplitude"]]
             numbers = [None if value is None else factor * value for value in last]
-            cells = "".join(_cell(value, 13, ".5g") for value in (*numbers, found["frequency"]))
-            error = _cell(found["periodicity_error"], 20, ".2g")
+            cells = "".join(cell(value, 13, ".5g") for value in (*numbers, found["frequency"]))
+            error = cell(found["periodicity_error"], 20, ".2g")
             lines.append(f"{name.replace('_', ' '):<16}{cells}{found['cycles_observed']:>9}{error}   {unit}, Hz")
         if chatter := verdict.get("chatter"):
             lines += [
@@ -296,10 +296,6 @@ class TransientResult(StudyResult):
         """Write a GIF of the deformed lip and centre line over the last cycle, or over the last `duration`, s."""
         self.require_steps()
         return figures.animate(self, Path(path), frames, duration)
-
-
-def _cell(value: float | None, width: int, form: str) -> str:
-    return ("-" if value is None else f"{value:{form}}").rjust(width)
 
 
 def _step(state: TransientState, mesh: MeshData, valve: WholeValve) -> Step:
