@@ -59,7 +59,10 @@ def case(
     elif key_points is not None:
         _write_key_points(load_case(target, overrides or ()).valve, key_points, points, profiles, as_json)
     elif uncertain:
-        _print_inputs(load_case(target, overrides or ()), as_json)
+        from ..studies.inputs import inputs_of
+
+        inputs = inputs_of(load_case(target, overrides or ()))
+        print_either({"inputs": [one.summary() for one in inputs]}, (one.words() for one in inputs), as_json)
     elif as_json or every:
         found = load_case(target, overrides or ())
         for sentence in contradictions(found):  # beside the keys, which are what was asked for
@@ -70,14 +73,6 @@ def case(
             print(case_toml(found, comments=False), end="")
     else:
         _check(load_case(target, overrides or ()), target or "The 12-inch valve")
-
-
-def _print_inputs(case, as_json: bool) -> None:
-    """Print the uncertain inputs of a case with their sources."""
-    from ..studies.inputs import inputs_of
-
-    inputs = inputs_of(case)
-    print_either({"inputs": [one.summary() for one in inputs]}, (one.words() for one in inputs), as_json)
 
 
 def _check(case, name: str) -> None:

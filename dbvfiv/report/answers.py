@@ -122,7 +122,8 @@ def chatters(found: Gathered) -> Answer:
         return Answer(question, UNKNOWN, "No fluid flows: drive.kind is 'uniform'.")
     reasons: dict[str, list[float]] = {}
     for p in unknown:
-        reasons.setdefault(verdicts[p].reason if p in verdicts else _missing_head(found, p), []).append(p)
+        missing = f"heads-{found.heads.index(p) + 1}"
+        reasons.setdefault(verdicts[p].reason if p in verdicts else found.why(missing), []).append(p)
     open_heads = [
         f"No certain verdict at {listed(units.pressure(p, 3) for p in at)}: {why}" for why, at in reasons.items()
     ]
@@ -148,10 +149,6 @@ def _unstable(found: Gathered, verdicts: dict[float, Verdict]) -> Iterable[str]:
         at += f", at {' to '.join(ends)} Hz" if ends else ""
         if heads:
             yield f"{words} at {at}."
-
-
-def _missing_head(found: Gathered, pressure: float) -> str:
-    return found.why(f"heads-{found.heads.index(pressure) + 1}")
 
 
 def _onsets(found: Gathered) -> str:

@@ -206,13 +206,9 @@ def contradictions(case: Case, kind: str | None = None) -> Iterator[str]:
         Study that is about to run; what does not concern it is left out.
     """
     yield from _forgotten_units(case, kind)
-    yield from map(case.units.say, _contradictions(case, kind))
-
-
-def _contradictions(case: Case, kind: str | None) -> Iterator[str]:
     if case.drive.kind == "flow" and not case.seeks_operating_point:
-        yield from _nothing_flows(case, kind)
-    yield from _slivers(case)
+        yield from map(case.units.say, _nothing_flows(case, kind))
+    yield from map(case.units.say, _slivers(case))
 
 
 def require_consistent(case: Case, kind: str | None = None) -> None:

@@ -17,7 +17,7 @@ from ..drawing.style import kilopascals
 from ..drawing.views import closed_section
 from ..errors import CaseError
 from ..record.mesh import MeshData
-from ..record.record import GrowingRecord, Record
+from ..record.record import GrowingRecord
 from ..record.vtkhdf import faces
 from ..texts import json_value
 
@@ -53,12 +53,6 @@ def keep_measured(
             raise CaseError(f"{key} is given as {str(path)!r}, {error}.", key) from None
     for table in tables:
         record.note(NOTE, name=table.name, columns={name: list(values) for name, values in table.columns.items()})
-
-
-def kept_tables(record: Record) -> tuple[MeasuredTable, ...]:
-    """The tables that a record holds."""
-    notes = record.notes(NOTE)
-    return tuple(MeasuredTable(n["name"], {key: tuple(column) for key, column in n["columns"].items()}) for n in notes)
 
 
 def _joined(tables: Iterable[MeasuredTable], kind: str, *names: str) -> list[tuple[Any, ...]] | None:
@@ -407,7 +401,10 @@ class Measured:
 
     def __init__(self, result: Any, kinds: Mapping[str, Quantity | None]):
         self.kinds = tuple(kinds)
-        self._tables = kept_tables(result.record)
+        self._tables = [
+            MeasuredTable(note["name"], {key: tuple(column) for key, column in note["columns"].items()})
+            for note in result.record.notes(NOTE)
+        ]
         self.parts: dict[str, Any] = {}
         for kind, quantity in kinds.items():
             names = {SHAPE: ("pressure", "z", "face", "x", "y"), TAPS: ("pressure", "z", "tap")}.get(kind)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from importlib import import_module
@@ -456,7 +457,9 @@ def kept_run(kind: str, session: Session, path: Path, observer: Observer | None 
         What the study takes that is no key of the case.
     """
     session = session.asked(kind, observer)
-    kept = _load_if_readable(path)
+    kept = None
+    with suppress(CaseError):  # of another version, or no result at all
+        kept = load_result(path) if path.exists() else None
     # these compute nothing, and say how it is told
     sheet = {name: getattr(session.case, name) for name in ("project", "report")}
     own = kept is not None and (kept.kind, kept.header.program) == (kind, Header.program)
@@ -468,13 +471,6 @@ def kept_run(kind: str, session: Session, path: Path, observer: Observer | None 
         raise KeyboardInterrupt
     result.record.header = replace(result.header, case=result.case.model_copy(update=sheet))
     return result
-
-
-def _load_if_readable(path: Path) -> Any:
-    try:
-        return load_result(path) if path.exists() else None
-    except CaseError:  # of another version, or no result at all
-        return None
 
 
 def _find(path: str | Path) -> Study:

@@ -57,10 +57,7 @@ def _by_node(mesh: MeshData) -> tuple[int, ...]:
     return (len(mesh.nodes),)
 
 
-def _show_seal(s: Any) -> str:
-    return f"{s.lip_seal * 1e3:.1f}+{s.joint_seal * 1e3:.1f}"
-
-
+_SEAL = Shown("sealed", "lip+joint mm", 12, lambda s: f"{s.lip_seal * 1e3:.1f}+{s.joint_seal * 1e3:.1f}")
 _BETWEEN = "Force between the two walls, whole valve"
 _LEFT = "Smallest passage left, whole valve"
 _SEALED = "Area over which the inner faces press on each other, whole valve"
@@ -78,9 +75,7 @@ _MEASURES = {
         Column("contact_force", "N", _BETWEEN, shown=Shown("contact", "N", 8, ".1f")),
         Column("least_opening", "m^2", _LEFT, shown=Shown("opening left", "mm2", 12, ".2f")),
         Column("sealed_length", "m", "Length along the axis on which sections are shut"),
-        Column(
-            "lip_seal", "m", "The part that begins at the lip", shown=Shown("sealed", "lip+joint mm", 12, _show_seal)
-        ),
+        Column("lip_seal", "m", "The part that begins at the lip", shown=_SEAL),
         Column("contact_front", "m", _FRONT, shown=Shown("front", "mm", 7, ".1f")),
         Column("overlap", "m", "Deepest overlap of the inner faces"),
     )

@@ -31,7 +31,7 @@ from ..case import Case
 from ..orbits import MODES, Follower, Orbit
 from ..result import StudyResult
 from ..session import Session, Study, print_rows, show_parameter
-from ..stability.place import check_scan, describe_fixed, fixed_conditions, models_of, require_kept_head
+from ..stability.place import check_range, describe_fixed, fixed_conditions, models_of
 from ..stability.verdict import Verdict
 from ..stability.walk import StabilityWalk
 from .start import find_onset, given_motion
@@ -548,8 +548,7 @@ class CycleResult(StudyResult):
 
 def check(case: Case) -> None:
     """Refuse a range of what the case does not have."""
-    check_scan(case, case.cycle.axis.parameter)
-    require_kept_head(case, case.cycle.axis.parameter)
+    check_range(case, case.cycle.axis.parameter)
 
 
 def _shown_columns(case: Case) -> tuple[Column, ...]:

@@ -17,6 +17,7 @@ from eigen.columns import ColumnSolver
 from ...case.parameters import PARAMETERS, Mu
 from ...errors import CaseError, SolveError
 from ...record.record import GrowingRecord, Record
+from ...texts import json_value
 from ..case import Case
 from ..inputs import Plan, counted, quasi_random
 from ..stability.neighbours import CHECKS, NEAR_SEED, TAKEN, Beside, find_neighbours
@@ -123,54 +124,41 @@ def find_chances(case: Case, record: GrowingRecord, workers: int | str) -> None:
         if "failure" in found:
             record.warn(f"No probability at {row.amount(value, 4)}: {found['failure']}")
 
-    def keep(value: float, found: dict[str, Any]) -> None:
-        record.note(_CHANCE, value=value, **found)
-        record.progress(f"probability at {row.amount(value, 4)}")
-        say(value, found)
-
     for value, note in known.items():
         say(value, note)
-
     with Workers(workers, _start, (case.to_dict(),), record.warn, chances) as team:
         told = lambda value: f"The probability at {row.amount(value, 4)}"  # noqa: E731
         for value, found in share_all(team, wanted, lambda value: Work(_column, (value,)), told):
-            keep(value, found)
+            record.note(_CHANCE, value=value, **found)
+            record.progress(f"probability at {row.amount(value, 4)}")
+            say(value, found)
 
 
 def chance_grid(record: Record, plan: MapPlan) -> np.ndarray:
-    """Probability of flutter with the ends of its 95 % interval (3, y, x); NaN where there is none."""
-    count, cells = plan.case.map.samples, np.full((3, len(plan.across.values), len(plan.along.values)), np.nan)
+    """Probability of flutter with the ends of its 95 % interval, and share of the samples that do not return to the
+    state without oscillating, (4, y, x); NaN where there is none.
+    """
+    count, cells = plan.case.map.samples, np.full((4, len(plan.across.values), len(plan.along.values)), np.nan)
     for note in record.notes(_CHANCE):
         if "failure" not in note:
             column = plan.across.values.index(note["value"])
             pairs = zip(note["flutters"], note["undecided"])
-            cells[:, column] = np.transpose([list(vars(counted(*pair, count)).values()) for pair in pairs])
+            cells[:3, column] = np.transpose([list(vars(counted(*pair, count)).values()) for pair in pairs])
+            cells[3, column] = np.array(note.get("diverges", np.nan)) / count
     return cells if plan.transposed else cells.transpose(0, 2, 1)
-
-
-def diverging_grid(record: Record, plan: MapPlan) -> np.ndarray:
-    """Share (y, x) of the samples that do not return to the state without oscillating; NaN where there is none."""
-    cells = np.full((len(plan.across.values), len(plan.along.values)), np.nan)
-    for note in record.notes(_CHANCE):
-        if "diverges" in note:
-            cells[plan.across.values.index(note["value"])] = np.array(note["diverges"]) / plan.case.map.samples
-    return cells if plan.transposed else cells.T
 
 
 def summary_of(record: Record, plan: MapPlan) -> dict[str, Any]:
     """Probability of flutter over the cells (y, x) for JSON, None where there is none, with what is uncertain."""
-    tables = *chance_grid(record, plan), diverging_grid(record, plan)
-    value, low, high, diverges = (np.where(np.isnan(table), None, table).tolist() for table in tables)
-    inputs = _inputs(plan).inputs
-    named = {"samples": plan.case.map.samples, "inputs": [one.summary() for one in inputs]}
-    return {"probability": {"value": value, "low": low, "high": high, "diverges": diverges} | named}
+    tables = dict(zip(("value", "low", "high", "diverges"), json_value(chance_grid(record, plan))))
+    inputs = [one.summary() for one in _inputs(plan).inputs]
+    return {"probability": tables | {"samples": plan.case.map.samples, "inputs": inputs}}
 
 
 def sentences(record: Record, plan: MapPlan) -> Iterator[str]:
     """Lines on the cells between the bands."""
-    value = chance_grid(record, plan)[0]
+    value, _, _, diverges = chance_grid(record, plan)
     known = value[np.isfinite(value)]
-    diverges = diverging_grid(record, plan)
     most = diverges[diverges > 0].max(initial=0.0)
     counts = [int((known <= BANDS[0]).sum()), int(((known > BANDS[0]) & (known < BANDS[-1])).sum())]
     yield (

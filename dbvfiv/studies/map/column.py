@@ -122,10 +122,6 @@ class MapPlan:
         asked = along.parameter, along.values, along.log
         return ParameterLine(walk.in_class(motion), base, *asked, edges=edges, counts="brackets", key=key)
 
-    def task(self, value: float) -> ColumnTask:
-        """A column of the grid, in all parts."""
-        return ColumnTask(value, 0, tuple(range(len(self.parts))))
-
     def coordinate(self, axis: Axis, value: float) -> float:
         """0..1 along an axis, in the logarithm if its values are spaced so."""
         a, b = axis.values[0], axis.values[-1]

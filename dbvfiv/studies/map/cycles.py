@@ -188,11 +188,6 @@ def read_cycles(record: Record, plan: MapPlan) -> dict[tuple[float, int], CycleC
     }
 
 
-def vouched_rows(record: Record, plan: MapPlan) -> int:
-    """Rows of finished columns."""
-    return len(record.notes(DONE)) * len(plan.along.values)
-
-
 def cycle_grid(record: Record, plan: MapPlan, name: str) -> np.ndarray:
     """A quantity of `CELLS` on the grid, (laws, y values, x values)."""
     known, blank = read_cycles(record, plan), getattr(CycleCells.blank(len(plan.along.values)), name)

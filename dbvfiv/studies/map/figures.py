@@ -237,17 +237,13 @@ def _curves(axes, result: StudyResult, law: int) -> None:
         dashes = "-" if curve.exact else (0, (3, 1.5))
         if curve.level:
             axes.plot(*points.T, color="0.15", lw=1.0, ls=dashes)
-            _write_level(axes, points[len(points) // 2], curve.level)
+            look = {"ha": "center", "va": "center", "fontsize": 7.5, "color": "0.15", "path_effects": HALO}
+            level = curve.level.replace("-", "\N{MINUS SIGN}")
+            axes.annotate(level, points[len(points) // 2], clip_on=True, **look)
             continue
         axes.plot(*points.T, color="white", lw=4.6, solid_capstyle="round")
         axes.plot(*points.T, color="black", lw=2.4, ls=dashes, solid_capstyle="round")
         _ticks_along(axes, points, curve.frequency)
-
-
-def _write_level(axes, point: np.ndarray, level: str) -> None:
-    text = level.replace("-", "\N{MINUS SIGN}")
-    style = {"ha": "center", "va": "center", "fontsize": 7.5, "color": "0.15", "path_effects": HALO}
-    axes.annotate(text, point, clip_on=True, **style)
 
 
 def _ticks_along(axes, points: np.ndarray, frequency: np.ndarray) -> None:

@@ -25,7 +25,7 @@ from ..case import Case
 from ..result import StudyResult
 from ..session import Session, Study
 from ..stability.dimensions import certified_in_all, flow_models, leading_class
-from ..stability.place import check_scan, describe_fixed, fixed_conditions, require_kept_head
+from ..stability.place import check_range, describe_fixed, fixed_conditions
 from ..stability.samples import SAMPLE_TABLE, SAMPLES, Sample, keep_samples, read_samples
 from ..stability.verdict import DIVERGES, FLUTTERS, NOT_VALID, OUTCOMES, STABLE, Verdict
 from ..stability.walk import StabilityWalk
@@ -137,11 +137,12 @@ class _Filling:
 
     def trace(self) -> None:
         """Columns that the onset curves need to be known everywhere."""
-        numbers, own = range(len(self.plan.curves)), [law for law, _ in self.plan.curves]
+        numbers, laws = range(len(self.plan.curves)), [law for law, _ in self.plan.curves]
         level = max(column.level for column in self.found.values())
         room = max(LEAST_ROOM, len(self.plan.across.values)) * len(numbers)
         for _ in range(ROUNDS):
-            wanted = sorted({(place, own[i]) for i in numbers for place in self._web(i).wanted()})[:room]
+            webs = [Web.of(self.plan, self.found.values(), number) for number in numbers]
+            wanted = sorted({(place, own) for web, own in zip(webs, laws) for place in web.wanted()})[:room]
             if not wanted:
                 return
             room -= len(wanted)
@@ -149,9 +150,6 @@ class _Filling:
             tasks = self._tasks(wanted, level)
             self.record.progress(f"onset curves, {len(tasks)} more columns")
             self.fill(tasks)
-
-    def _web(self, number: int) -> Web:
-        return Web.of(self.plan, self.found.values(), number)
 
 
 def _pattern(column: MapColumn, law: int) -> tuple[int, ...]:
@@ -279,14 +277,13 @@ def rows_to_keep(known: Record, case: Case) -> dict[str, int]:
     them are left out.
     """
     samples, onsets = (int(known.column(COLUMNS, name).sum()) for name in ("sample_count", "onset_count"))
-    return {SAMPLES: samples, ONSETS: onsets, cycles.ROWS: cycles.vouched_rows(known, MapPlan(case))}
+    cells = len(known.notes(cycles.DONE)) * len(MapPlan(case).along.values)
+    return {SAMPLES: samples, ONSETS: onsets, cycles.ROWS: cells}
 
 
 def check(case: Case) -> None:
     """Refuse axes of what the case does not have, and flow models that do not differ."""
-    names = [axis.parameter for axis in case.map.axes]
-    check_scan(case, *names)
-    require_kept_head(case, *names)
+    check_range(case, *(axis.parameter for axis in case.map.axes))
     flow_models(case, "map")
 
 
@@ -309,7 +306,8 @@ def run(session: Session, record: GrowingRecord, workers: int | None = None) -> 
     processes, known = case.map.workers if workers is None else workers, read_columns(record, plan)
     with ColumnPool(plan, processes, record.warn, walk, known) as pool:
         filling = _Filling(plan, record, pool)
-        filling.fill([plan.task(value) for value in plan.across.values])
+        parts = tuple(range(len(plan.parts)))
+        filling.fill([ColumnTask(value, 0, parts) for value in plan.across.values])
         for level in range(1, case.map.refine + 1):
             filling.fill(filling.between(level))
         if all(column.failure for column in filling.columns):
@@ -397,7 +395,7 @@ class MapResult(StudyResult):
     @property
     def probability(self) -> np.ndarray:
         """Probability of flutter with the ends of its 95 % interval on the grid (3, y, x); NaN where there is none."""
-        return chances.chance_grid(self.record, self.plan)
+        return chances.chance_grid(self.record, self.plan)[:3]
 
     @property
     def _own_law(self) -> int:

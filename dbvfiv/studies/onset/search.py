@@ -26,7 +26,7 @@ from ..stability.dimensions import Variant, own_variant
 from ..stability.line import ParameterLine
 from ..stability.place import is_surrounding, models_of
 from ..stability.samples import Sample, SampleKey
-from ..stability.scan import Crossing
+from ..stability.scan import Crossing, locate
 from ..stability.verdict import not_valid_at
 from ..stability.walk import StabilityWalk
 from .line import FoundOnsets, OnsetPoint, Side, joined_stretches
@@ -144,7 +144,7 @@ class OnsetSearch:
                 return twin
             self._keep(point)
         else:
-            self.line.bracket(crossing, self.case.onset.tolerance)  # repeats known samples, which belong to the scan
+            locate(self.scan, crossing, self.case.onset.tolerance)  # repeats known samples, which belong to the scan
             for value in (point.value, point.below.value, point.above.value):
                 self.walk.recall(self.place(value))
         asked = self.case.onset.normal_form and self.variant.motion.of_equilibria
@@ -305,7 +305,7 @@ def with_uncertainty(
     found, lost = [], set()
     for crossing in search.scan.run(search.axis.values):
         try:
-            value, expected = search.line.bracket(crossing, LOCATED)
+            value, expected = locate(search.scan, crossing, LOCATED)
             eigenvalue = search.critical(search.place(value), expected).eigenvalue
         except SolveError:
             lost.add(crossing.gains)

@@ -19,7 +19,7 @@ from ..case import Case
 from ..result import StudyResult
 from ..session import Session, Study
 from ..stability.dimensions import Variant, certified_in_all, compare_ranges, leading_class, own_variant, variants
-from ..stability.place import check_scan, describe_fixed, fixed_conditions, require_kept_head
+from ..stability.place import check_range, describe_fixed, fixed_conditions
 from ..stability.samples import SAMPLE_TABLE, Sample, keep_samples, read_samples
 from ..stability.verdict import NOT_VALID, Verdict, lowered
 from ..stability.walk import StabilityWalk
@@ -50,8 +50,7 @@ class _Keeper(Observer):
 
 def check(case: Case) -> None:
     """Refuse a range of what the case does not have, and flow models that do not differ."""
-    check_scan(case, case.onset.axis.parameter)
-    require_kept_head(case, case.onset.axis.parameter)
+    check_range(case, case.onset.axis.parameter)
     variants(case, "onset")
 
 

@@ -283,10 +283,6 @@ class ParameterLine:
         """
         return self._scanned(value, counted=not self.place(value).loss_factor)
 
-    def bracket(self, crossing: Crossing, tolerance: float) -> tuple[float, complex]:
-        """Value and eigenvalue of a crossing as samples have it, without a correction. Raises SolveError."""
-        return locate(self.scan, crossing, tolerance)
-
     def contour(self, level: Level) -> Scan:
         """Scan for the values at which modes cross a level."""
         return Scan(lambda value: level.shifted(self._known(value)), self.log)

@@ -90,6 +90,12 @@ def moving_surroundings(case: Case) -> tuple[str, ...]:
     return tuple(name for name in ("pipe_length", "density") if why_it_moves(case, name))
 
 
+def check_range(case: Case, *names: str) -> None:
+    """Refuse to ask over parameters as `check_scan` does, and as `require_kept_head` does."""
+    check_scan(case, *names)
+    require_kept_head(case, *names)
+
+
 def check_scan(case: Case, *names: str) -> None:
     """Refuse to ask over a parameter that this case does not have, or without flow. Raises CaseError for strain levels
     without a rubber that has them, and angles without a ply that has one. Raises SolveError without flow.

@@ -68,7 +68,7 @@ def test_samples_that_say_nothing_of_flutter(monkeypatch, verdict, undecided, di
     found = chances.Chances(case).column(3e3)
     assert found == {"flutters": [0] * 4, "undecided": [undecided] * 4, "diverges": [diverges] * 4}
     record = SimpleNamespace(notes=lambda _: [{"value": 3e3, **found}])
-    value, low, high = chances.chance_grid(record, MapPlan(case))[:, :, 0]
+    value, low, high, _ = chances.chance_grid(record, MapPlan(case))[:, :, 0]
     assert (low == 0).all() and (high == 1).all() == np.isnan(value).all() == (undecided > 0)
     told = " ".join(chances.sentences(record, MapPlan(case)))
     assert ("100 % of the samples of a cell diverge" in told) == (diverges > 0)
