@@ -46,8 +46,7 @@ def damping_figure(report: DampingReport) -> Figure:
     lower.set(xlabel="Frequency, Hz", ylabel="Storage over\nslow modulus")
     log_axis(lower.xaxis, frequency[0], frequency[-1])
     factor = "" if report.factor == 1.0 else f", times {report.factor:g}"
-    headline(figure, f"Loss factors{factor}: given (dashed, marks) and fitted over {low:g} to {high:g} Hz")
-    return figure
+    return headline(figure, f"Loss factors{factor}: given (dashed, marks) and fitted over {low:g} to {high:g} Hz")
 
 
 def _label(material: MaterialDamping) -> str:
@@ -76,8 +75,7 @@ def fit_figure(report: FitReport) -> Figure:
     upper[0].set_ylabel("Nominal stress, MPa")
     lower[0].set_ylabel("Measured less\nfitted, MPa")
     upper[0].legend(loc="upper left")
-    headline(figure, f"Tests of a rubber and their fits; residuals of {report.chosen.form.title}")
-    return figure
+    return headline(figure, f"Tests of a rubber and their fits; residuals of {report.chosen.form.title}")
 
 
 def _stresses(axes, report: FitReport, number: int, looks: list) -> None:
@@ -107,5 +105,4 @@ def ply_figure(fit: PlyFit) -> Figure:
         axes.set(xlabel="Engineering strain, %", title=_STRIPS[strip.direction])
         axes.legend(loc="upper left")
     figure.axes[0].set_ylabel("Nominal stress, MPa")
-    headline(figure, "Strips of a ply: measured (circles) and fitted")
-    return figure
+    return headline(figure, "Strips of a ply: measured (circles) and fitted")

@@ -145,9 +145,14 @@ _DIGITS = {0.35: np.arange(1.0, 10.0), 0.7: (1.0, 2.0, 3.0, 5.0, 7.0), 2.6: (1.0
 HALO = (withStroke(linewidth=3.0, foreground="white"),)
 
 
-def headline(figure: Figure, text: str) -> None:
-    """The title of a figure of several panels, at the left as those of single panels are."""
+def headline(figure: Figure, text: str, *below: str) -> Figure:
+    """A figure of several panels with its title, at the left as those of single panels are, and with words below it in
+    grey.
+    """
     figure.suptitle(text, x=0.01, ha="left")
+    if words := " · ".join(filter(None, below)):
+        figure.supxlabel(words, x=0.01, ha="left", fontsize=8.5, color="0.35")
+    return figure
 
 
 def log_axis(axis: Axis, low: float, high: float) -> None:

@@ -224,8 +224,7 @@ def layer_stress(state: Any) -> Figure:
         axes.set_title(axes.get_title(loc="right"), loc="right", fontsize=9, color=PUBLISHED)
         axes.set_xlim(arc.min() * 1e3, arc.max() * 1e3)
     at = state.results.case.units.pressure(state.pressure)
-    headline(figure, f"Von Mises stress in the layers at {at} (largest in each element)")
-    return figure
+    return headline(figure, f"Von Mises stress in the layers at {at} (largest in each element)")
 
 
 def layer_panels(mesh, values: np.ndarray, label: str, titles: Sequence[str] | None = None) -> tuple[Figure, list]:
@@ -277,8 +276,7 @@ def valve_figure(model: ValveModel) -> Figure:
     _plane(figure.add_subplot(grid[2, :2]), case, mesh, 0)
     _wall(figure, figure.add_subplot(grid[1, 2]), mesh, scale)
     _layers(figure.add_subplot(grid[2, 2]), model, mesh)
-    headline(figure, _title(model))
-    return figure
+    return headline(figure, _title(model))
 
 
 def _title(model: ValveModel) -> str:

@@ -74,8 +74,7 @@ def side_views(result: StudyResult) -> Figure:
     for axes in panels[len(states) :]:
         axes.set_visible(False)
     colour_bar(figure, ScalarMappable(scale, COLOURS), list(panels), "Displacement, mm", shrink=0.7, aspect=30)
-    headline(figure, f"Back pressure, {supports_of(result)}: cut at x = 0 (dashed: at rest)")
-    return figure
+    return headline(figure, f"Back pressure, {supports_of(result)}: cut at x = 0 (dashed: at rest)")
 
 
 def _cut(axes, skin: ValveSkin, state, scale: Normalize) -> None:
@@ -144,8 +143,7 @@ def contact_map(result: StudyResult) -> Figure:
         axes.tick_params(labelleft=True)
     panels[0].set_ylabel("Distance from the lip z, mm")
     colour_bar(figure, drawn, list(panels), "Contact pressure over back pressure")
-    headline(figure, f"Contact pressure, {supports_of(result)} (dots: touching nodes; cross: largest)")
-    return figure
+    return headline(figure, f"Contact pressure, {supports_of(result)} (dots: touching nodes; cross: largest)")
 
 
 def buckling_shape(result: StudyResult) -> Figure:
@@ -172,8 +170,7 @@ def buckling_shape(result: StudyResult) -> Figure:
     right.set(xlabel="x, mm", ylabel="y, mm")
     right.set_title(f"Section at z = {1e3 * mesh.nodes[row[0], 2]:.0f} mm, where the shape is largest", loc="left")
     right.legend(loc="upper center", bbox_to_anchor=(0.5, -0.18), ncols=3)
-    headline(figure, f"Buckling at {kilopascals(first.pressure)} ({first.kind}), {supports_of(result)}")
-    return figure
+    return headline(figure, f"Buckling at {kilopascals(first.pressure)} ({first.kind}), {supports_of(result)}")
 
 
 def supports_of(result: StudyResult) -> str:
@@ -211,8 +208,7 @@ def closure_curve(result: StudyResult) -> Figure:
         axes.set_xlabel("Back pressure, kPa")
         axes.tick_params(labelbottom=True)
         axes.set_xlim(*limits([0.0, *(point.pressure / 1e3 for point in result.walk)]))
-    headline(figure, f"Closure, {supports_of(result)} (dots: states asked for)")
-    return figure
+    return headline(figure, f"Closure, {supports_of(result)} (dots: states asked for)")
 
 
 def _over_pressure(result: StudyResult, axes, name: str, factor: float, **look) -> None:

@@ -191,8 +191,7 @@ def stress_range(result: StudyResult) -> Figure:
     """Largest range of a stress over a period of the last cycle, in each layer on the unrolled part."""
     point = result.nearest()
     figure, _ = layer_panels(result.mesh, point.ranges.stress.T / 1e6, "Range of stress, MPa")
-    headline(figure, f"Range of stress over a period, {_at(result, point)}")
-    return figure
+    return headline(figure, f"Range of stress over a period, {_at(result, point)}")
 
 
 def _at(result: StudyResult, point: Any) -> str:

@@ -504,8 +504,7 @@ def draw_heads(result: StudyResult) -> Figure:
         log_axis(place.xaxis, *limits(result.verified(CASE)["pressure"] / 1e3, log=True))
     axes[0].axhline(0.0, color="0.25", lw=1.0)
     axes[0].legend(frameon=False, fontsize=8)
-    headline(figure, f"{result.header.name}: {result.statements[0].text}")
-    return figure
+    return headline(figure, f"{result.header.name}: {result.statements[0].text}")
 
 
 def draw_front(result: StudyResult) -> Figure:
@@ -525,5 +524,4 @@ def draw_front(result: StudyResult) -> Figure:
     axes.set_ylabel(f"{aim.quantity.capitalize()}, {y_unit}".rstrip(", "))
     if not holds.all():
         axes.legend(frameon=False)
-    headline(figure, f"{result.header.name}: {aim.text}")
-    return figure
+    return headline(figure, f"{result.header.name}: {aim.text}")

@@ -542,8 +542,7 @@ def inputs(result: StudyResult) -> Figure:
     right.set_yticks(rows, [str(row + 1) for row in rows])
     right.grid(False)
     figure.colorbar(shown, ax=right, label="Correlation after")
-    headline(figure, f"What the records say of {result.header.name}")
-    return figure
+    return headline(figure, f"What the records say of {result.header.name}")
 
 
 def onset(result: StudyResult) -> Figure:
@@ -569,8 +568,7 @@ def onset(result: StudyResult) -> Figure:
             axes.plot(value, 100 * match["damping_ratio"], "s", color=ACCENT, label=label)
     axes.set(xlabel=parameter_label(result.case, name), ylabel="Least damping ratio, %")
     axes.legend()
-    headline(figure, f"Damping of {result.header.name} by its records")
-    return figure
+    return headline(figure, f"Damping of {result.header.name} by its records")
 
 
 STUDY = Study(

@@ -62,8 +62,7 @@ def stability_map(result: StudyResult) -> Figure:
     bar = colour_bar(figure, mesh, panels, _BAR, pad=0.015, ticks=levels, extend="both", spacing="uniform")
     bar.ax.set_yticklabels([f"{level:g}".replace("-", "\N{MINUS SIGN}") for level in levels])
     bar.ax.minorticks_off()
-    _headline(figure, result)
-    return figure
+    return _finish(figure, result)
 
 
 def _bands(axes, result: StudyResult) -> None:
@@ -89,8 +88,7 @@ def leading_frequency(result: StudyResult) -> Figure:
         _curves(axes, result, law)
         label_regions(axes, result, law)
     colour_bar(figure, mesh, panels, "Frequency of the leading mode, Hz", pad=0.015)
-    _headline(figure, result)
-    return figure
+    return _finish(figure, result)
 
 
 def cycle_amplitude(result: StudyResult) -> Figure:
@@ -118,8 +116,7 @@ def cycle_amplitude(result: StudyResult) -> Figure:
         _curves(axes, result, law)
         label_regions(axes, result, law)
     colour_bar(figure, mesh, panels, "Amplitude of the limit cycle, one lip, mm", pad=0.015)
-    _headline(figure, result)
-    return figure
+    return _finish(figure, result)
 
 
 def certified_cells(result: StudyResult) -> np.ndarray:
@@ -168,11 +165,10 @@ def _panels(result: StudyResult):
     return figure, list(panels)
 
 
-def _headline(figure: Figure, result: StudyResult) -> None:
+def _finish(figure: Figure, result: StudyResult) -> Figure:
     case, mesh = result.case, result.case.mesh
-    headline(figure, f"Stability of {result.header.name}")
-    words = [describe_fixed(case, *result.moved), f"{mesh.around} × {mesh.along} elements", _vouched(result)]
-    figure.supxlabel(" · ".join(w for w in words if w), x=0.01, ha="left", fontsize=8.5, color="0.35")
+    words = describe_fixed(case, *result.moved), f"{mesh.around} × {mesh.along} elements", _vouched(result)
+    return headline(figure, f"Stability of {result.header.name}", *words)
 
 
 def _vouched(result: StudyResult) -> str:

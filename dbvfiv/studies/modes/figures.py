@@ -193,8 +193,7 @@ def mode_shapes(result: StudyResult, modes) -> Figure:
     label = "Amplitude, relative to the largest"
     colour_bar(figure, ScalarMappable(scale, COLOURS), panels, label, shrink=shrink, pad=0.08)
     length = 1e3 * np.ptp(result.mesh.z)
-    headline(figure, f"Mode shapes {conditions(result)}, lips at the front; the valve is {length:.0f} mm long")
-    return figure
+    return headline(figure, f"Mode shapes {conditions(result)}, lips at the front; the valve is {length:.0f} mm long")
 
 
 class ModeSurface:

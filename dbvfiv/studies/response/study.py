@@ -536,9 +536,8 @@ def draw(result: StudyResult) -> Iterator[tuple[str, Callable[[], Figure]]]:
         yield "precursors", lambda: precursors(result)
 
 
-def _under(figure: Figure, result: StudyResult) -> None:
-    words = f"{describe_fixed(result.case, result.parameter)} · {result.noise}"
-    figure.supxlabel(words, x=0.01, ha="left", fontsize=8.5, color="0.35")
+def _finish(figure: Figure, result: StudyResult, title: str) -> Figure:
+    return headline(figure, title, describe_fixed(result.case, result.parameter), result.noise)
 
 
 def response(result: StudyResult) -> Figure:
@@ -556,9 +555,7 @@ def response(result: StudyResult) -> Figure:
         panel.set_ylabel(label)
     axes[2].set(xlabel="Frequency, Hz", ylabel="Phase of the lip, deg", xlim=(0, result.case.response.max_frequency))
     axes[0].legend(fontsize=8)
-    headline(figure, f"Response of {result.header.name} to the pressure at the inlet")
-    _under(figure, result)
-    return figure
+    return _finish(figure, result, f"Response of {result.header.name} to the pressure at the inlet")
 
 
 def precursors(result: StudyResult) -> Figure:
@@ -578,9 +575,7 @@ def precursors(result: StudyResult) -> Figure:
     if axis is not None and axis.log:
         axes[2].set_xscale("log")
     axes[2].set_xlabel(parameter_label(result.case, result.parameter))
-    headline(figure, f"Towards the onset, {result.header.name}")
-    _under(figure, result)
-    return figure
+    return _finish(figure, result, f"Towards the onset, {result.header.name}")
 
 
 STUDY = Study("response", lambda _mesh: _TABLES, run, ResponseResult, check, rows_to_keep=rows_to_keep)

@@ -257,14 +257,12 @@ def bars(result: StudyResult) -> Figure:
         axes.axvline(0.0, color="0.25", lw=1.0)
         axes.grid(axis="y", visible=False)
     mode = f"mode {result.number}, {result.growth_rate:.4g} 1/s at {result.frequency:.4g} Hz"
-    headline(figure, f"{result.header.name}, {mode}")
     words = [describe_fixed(result.case)]
     if len(shown) < len(known):
         words.append(f"the {len(shown)} largest of {len(known)}")
     if len(known) < len(result.sensitivities):
         words.append("parameters that are zero have no percent")
-    figure.supxlabel(" · ".join(words), x=0.01, ha="left", fontsize=8.5, color="0.35")
-    return figure
+    return headline(figure, f"{result.header.name}, {mode}", *words)
 
 
 STUDY = Study("sensitivity", tables_of, run, SensitivityResult)

@@ -233,8 +233,7 @@ def spectra(result: StudyResult) -> Figure:
     panels[-1].set_xlim(0, min(1.15 * highest, 0.5 / np.median(np.diff(h["time"]))) or None)
     panels[-1].set_xlabel("Frequency, Hz")
     panels[0].tick_params(labelbottom=True)
-    headline(figure, heading)
-    return figure
+    return headline(figure, heading)
 
 
 #: Multiples of the frequency of a motion up to which a spectrum is drawn at most: slams fill it to its end.

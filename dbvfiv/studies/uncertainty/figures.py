@@ -46,10 +46,9 @@ def _axis(axes, result: StudyResult) -> np.ndarray:
     return values
 
 
-def _under(figure: Figure, result: StudyResult) -> None:
-    names = [one.name for one in result.plan.inputs]
-    words = f"{describe_fixed(result.case, result.parameter, *names)} · {result.points[0]['samples']} samples"
-    figure.supxlabel(words, x=0.01, ha="left", fontsize=8.5, color="0.35")
+def _finish(figure: Figure, result: StudyResult, title: str) -> Figure:
+    fixed = describe_fixed(result.case, result.parameter, *(one.name for one in result.plan.inputs))
+    return headline(figure, title, fixed, f"{result.points[0]['samples']} samples")
 
 
 def probability(result: StudyResult) -> Figure:
@@ -68,9 +67,7 @@ def probability(result: StudyResult) -> Figure:
         axes.plot(x, 100 * value, "o-", color=looks[name], label=name)
     axes.set(ylabel="Probability, %", ylim=(-2, 102))
     axes.legend()
-    headline(figure, f"Probability of flutter of {result.header.name}")
-    _under(figure, result)
-    return figure
+    return _finish(figure, result, f"Probability of flutter of {result.header.name}")
 
 
 def margin(result: StudyResult) -> Figure:
@@ -99,9 +96,7 @@ def margin(result: StudyResult) -> Figure:
         axes.axvline(0.0, color="black", lw=0.8)
     if axes.get_legend_handles_labels()[0]:
         axes.legend()
-    headline(figure, f"Margin of {result.header.name}")
-    _under(figure, result)
-    return figure
+    return _finish(figure, result, f"Margin of {result.header.name}")
 
 
 def what_decides(result: StudyResult) -> Figure:
@@ -128,9 +123,7 @@ def what_decides(result: StudyResult) -> Figure:
     right.set(xlabel=f"{titles[first]}, {unit}".rstrip(", "), ylabel="Least damping ratio, %")
     right.legend()
     shown = PARAMETERS[result.parameter]
-    headline(figure, f"What decides at {shown.amount(point['value'], 4)}")
-    _under(figure, result)
-    return figure
+    return _finish(figure, result, f"What decides at {shown.amount(point['value'], 4)}")
 
 
 def tornado(result: StudyResult) -> Figure:
@@ -155,6 +148,4 @@ def tornado(result: StudyResult) -> Figure:
     axes.set_xlabel("Median of the least damping ratio, %")
     axes.legend()
     shown = PARAMETERS[result.parameter]
-    headline(figure, f"Each input low and high at {shown.amount(point['value'], 4)}")
-    _under(figure, result)
-    return figure
+    return _finish(figure, result, f"Each input low and high at {shown.amount(point['value'], 4)}")
