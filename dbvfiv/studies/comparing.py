@@ -13,7 +13,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from ..case.units import Units
-from ..drawing.style import COMPUTED, kilopascals, new_figure, pressure_colours, put_in_units, some_of, style
+from ..drawing.style import COMPUTED, kilopascals, new_figure, new_panel, pressure_colours, put_in_units, some_of, style
 from ..drawing.views import closed_section
 from ..errors import CaseError
 from ..texts import json_value
@@ -319,15 +319,12 @@ def _label(axes: Axes, title: str) -> None:
 def _centre_line(shapes: MeasuredShapes) -> Figure:
     """Measured points at x = 0 over the distance from the lip, and the computed faces there."""
     groups = _on_centre(shapes)
-    figure = new_figure(7.2, 4.2)
-    axes = figure.add_subplot()
+    figure, axes = new_panel(7.2, 4.2, "The wall at x = 0", "Distance from the lip z, mm", "y, mm")
     for ((pressure, face), points), colour in zip(groups.items(), pressure_colours([p for p, _ in groups])):
         line, name = shapes.walls.centre_line(pressure, face), f"{kilopascals(pressure)}, {face}"
         if line is not None:
             axes.plot(*line.T * 1e3, color=colour, label=f"{name}, computed")
         axes.plot(*points.T * 1e3, color=colour, label=f"{name}, measured", **MEASURED)
-    axes.set(xlabel="Distance from the lip z, mm", ylabel="y, mm")
-    axes.set_title("The wall at x = 0", loc="left", fontweight="bold")
     figure.legend(loc="outside lower center", ncols=2)
     return figure
 

@@ -23,6 +23,7 @@ from ...drawing.style import (
     limits,
     log_axis,
     new_figure,
+    new_panel,
     pressure_colours,
     some_of,
 )
@@ -225,8 +226,9 @@ def _over_pressure(result: StudyResult, axes, name: str, factor: float, **look) 
 
 def passage(result: StudyResult) -> Figure:
     """Passage left between the inner faces along the axis."""
-    figure = new_figure(7.2, 4.4)
-    axes = figure.add_subplot()
+    title = f"What stays open, whole valve, {supports_of(result)} ({_SHUT:g} mm² or less drawn there)"
+    places = "Distance from the lip z, mm", "Passage between the inner faces, mm²"
+    figure, axes = new_panel(7.2, 4.4, title, *places)
     states = some_of(sorted(result.states, key=lambda s: s.pressure))
     z, copies = result.mesh.z * 1e3, result.mesh.part.copies
     for state, colour in zip(states, pressure_colours([s.pressure for s in states])):
@@ -242,12 +244,6 @@ def passage(result: StudyResult) -> Figure:
     limit = result.case.closure.shut_fraction * result.reference_opening
     axes.axhline(limit * 1e6, color=ACCENT, lw=1.0, ls=":", label="counts as shut below")
     axes.axvline(result.case.valve.duckbill_length * 1e3, color=REST, lw=0.8, ls=":")
-    axes.set(xlabel="Distance from the lip z, mm", ylabel="Passage between the inner faces, mm²")
-    axes.set_title(
-        f"What stays open, whole valve, {supports_of(result)} ({_SHUT:g} mm² or less drawn there)",
-        loc="left",
-        fontweight="bold",
-    )
     log_axis(axes.yaxis, _SHUT, 1e6 * copies * max(float(state.opening.max()) for state in states))
     axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.14), ncols=4)
     return figure
@@ -255,13 +251,11 @@ def passage(result: StudyResult) -> Figure:
 
 def measured_passage(result: StudyResult) -> Figure:
     """Narrowest passage left over the back pressure, with what was measured."""
-    figure = new_figure(6.4, 4.2)
-    axes = figure.add_subplot()
+    places = "Back pressure, kPa", "Narrowest passage between the inner faces, mm²"
+    figure, axes = new_panel(6.4, 4.2, f"Passage left, {supports_of(result)}", *places)
     draw_curve(axes, [(p.pressure, p.least_opening) for p in result.walk], result.measured.area, 1e6, "computed")
-    axes.set(xlabel="Back pressure, kPa", ylabel="Narrowest passage between the inner faces, mm²")
     axes.set_xlim(left=0)
     axes.set_ylim(bottom=0)
-    axes.set_title(f"Passage left, {supports_of(result)}", loc="left", fontweight="bold")
     axes.legend()
     return figure
 

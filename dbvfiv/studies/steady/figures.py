@@ -17,6 +17,7 @@ from ...drawing.style import (
     REST,
     kilopascals,
     new_figure,
+    new_panel,
     parameter_label,
     pressure_colours,
     pressure_heading,
@@ -218,8 +219,7 @@ def lip_shapes(result: StudyResult) -> Figure:
     """Inner faces of the lips at several pressures, all around, and the outer face at the highest (compare Fig.
     7-10 of the thesis, which shows the mid-surface).
     """
-    figure = new_figure(7.2, 4.6)
-    axes = figure.add_subplot()
+    figure, axes = new_panel(7.2, 4.6, "Lips at the outlet, inner faces", "x, mm", "y, mm")
     lip, part = result.mesh.rows[0], result.mesh.part
     rest = closed_section(faces(result.mesh)[0][lip, :2], part)
     axes.plot(*rest.T * 1e3, color=REST, lw=1.2, ls="--", label="at rest")
@@ -229,8 +229,6 @@ def lip_shapes(result: StudyResult) -> Figure:
         axes.plot(*closed_section(inner[lip, :2], part).T * 1e3, color=colour, label=kilopascals(state.pressure))
     axes.plot(*closed_section(outer[lip, :2], part).T * 1e3, color=colour, lw=0.9, label="its outer face")
     axes.set_aspect("equal")
-    axes.set(xlabel="x, mm", ylabel="y, mm")
-    axes.set_title("Lips at the outlet, inner faces", loc="left", fontweight="bold")
     figure.legend(loc="outside lower center", ncols=5, title=pressure_name(result.case).lower())
     return figure
 
