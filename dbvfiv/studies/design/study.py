@@ -366,8 +366,11 @@ class DesignResult(StudyResult):
         aim, *constraints = self.statements
         best = self.best
 
+        def verdicts(number: int) -> dict[str, Any]:
+            rows = {name: column.tolist() for name, column in self.verified(number).items() if name != "design"}
+            return rows | {"outcome": [OUTCOMES[i] for i in rows["outcome"]]}
+
         def told(number: int, design: Design) -> dict[str, Any]:
-            rows = self.verified(number)
             return {
                 "bound": self.bounds[number] if self.bounds[number] == self.bounds[number] else None,
                 "values": dict(zip((one.name for one in self.variables), design.values)),
@@ -376,11 +379,9 @@ class DesignResult(StudyResult):
                 "holds": design.holds,
                 "violation": design.violation,
                 "active": self.active(number),
-                "verified": {name: column.tolist() for name, column in rows.items() if name != "design"}
-                | {"outcome": [OUTCOMES[i] for i in rows["outcome"]]},
+                "verified": verdicts(number),
             }
 
-        started = self.verified(CASE)
         return {
             "variables": [asdict(one) for one in self.variables],
             "aim": aim.text,
@@ -390,8 +391,7 @@ class DesignResult(StudyResult):
             "starts": [{k: v for k, v in note.items() if k != "what"} for note in self.found],
             "band": self.band,
             "symmetry": equilibria_of(self.case.part).name,
-            "case": {name: column.tolist() for name, column in started.items() if name not in ("design", "outcome")}
-            | {"outcome": [OUTCOMES[i] for i in started["outcome"]]},
+            "case": verdicts(CASE),
             "states": len(self.record.notes(_STATE)),
         } | self.ending()
 

@@ -394,21 +394,19 @@ class UncertaintyResult(StudyResult):
         samples share), ``outcomes`` by their names (with ``not sealed`` of a bill that is moulded shut),
         ``percentiles`` (2.5, 50, 97.5) and ``decides``.
         """
-        found, flutter = self.at(value), self.probability(value)
-        names = (FLUTTERS, DIVERGES, NOT_VALID, STABLE, *((NOT_SEALED,) if self.case.valve.is_preset else ()))
-        others = {name: self.probability(value, name) for name in names}
+        found, outcomes = self.at(value), {}
+        for name in (FLUTTERS, DIVERGES, NOT_VALID, STABLE, *((NOT_SEALED,) if self.case.valve.is_preset else ())):
+            one = self.probability(value, name)
+            outcomes[name] = {"probability": json_value(one.value), "interval": [one.low, one.high]}
         plain = found["stage"] == 0
         spreads = {name: _percentiles(found[name][plain]) for name in _SPREADS}
         return {
             "value": float(value),
-            "probability": json_value(flutter.value),
-            "interval": [flutter.low, flutter.high],
+            **outcomes[FLUTTERS],
             "samples": len(found["outcome"]),
             "undecided": int(_are(found, UNDECIDED).sum()),
             "shared": self._shared(value, found["sample"]),
-            "outcomes": {
-                name: {"probability": json_value(p.value), "interval": [p.low, p.high]} for name, p in others.items()
-            },
+            "outcomes": outcomes,
             "percentiles": spreads,
             "decides": self.decides(value),
         }
