@@ -381,8 +381,7 @@ class GrowingRecord(Record, Observer, AbstractContextManager):
         self._take_name()
         self.watcher.begin(study, total)
         told, self.first = self.first, ()
-        for sentence in told:
-            self.warn(sentence)
+        self.warn(*told)
 
     def progress(self, text: str) -> None:
         self.watcher.progress(text)
@@ -390,10 +389,11 @@ class GrowingRecord(Record, Observer, AbstractContextManager):
     def item(self, result: object) -> None:
         self.watcher.item(result)
 
-    def warn(self, sentence: str) -> None:
-        if sentence not in self.warnings:
-            self.note("warning", text=sentence)
-        self.watcher.warn(sentence)
+    def warn(self, *sentences: str) -> None:
+        for sentence in sentences:
+            if sentence not in self.warnings:
+                self.note("warning", text=sentence)
+            self.watcher.warn(sentence)
 
     def end(self, interrupted: bool) -> None:
         self.watcher.end(interrupted)

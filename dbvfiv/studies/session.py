@@ -343,13 +343,11 @@ class Session:
         mesh = self.mesh  # a case that gives no model is told before a file is touched
         with GrowingRecord(header, mesh, study.tables(mesh), output, observer, known) as record:
             complete = False
-            for sentence in oddities(self.case):
-                record.warn(sentence)
+            record.warn(*oddities(self.case))
             if self.settled is not None:
                 record.note("settled", text=str(self.settled), warnings=[*self.settled.warnings])
             for note in record.notes("settled")[-1:]:  # of the first attempt where it goes on
-                for sentence in note.get("warnings", ()):
-                    record.warn(sentence)
+                record.warn(*note.get("warnings", ()))
             record.first = model_warnings(self.described)
             try:
                 study.run(self, record, **_with_files(study, record, choices))

@@ -308,8 +308,7 @@ def gather_states(origin: StudyResult, states: Sequence[State]) -> Any:
     study = find_study("steady")
     (table,) = study.tables(origin.mesh)
     record = GrowingRecord(replace(origin.header, kind="steady"), origin.mesh, (table,))
-    for sentence in origin.warnings:
-        record.warn(sentence)
+    record.warn(*origin.warnings)
     for state in states:
         held = {c.name for c in origin.record.tables[state.table].columns}
         row = {

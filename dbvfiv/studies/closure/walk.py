@@ -4,7 +4,7 @@ past limit points; kept in a record while it goes on and taken up again from the
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from types import SimpleNamespace
 from typing import Any
@@ -277,7 +277,7 @@ class ClosureWalk:
         again. One that is not reached ends the list, for those after it lie beyond it.
         """
         record = self.record
-        self._warn(self.model.start_warnings())
+        self.record.warn(*self.model.start_warnings())
         if not record.notes(STATES):
             record.note(STATES, reference_opening=self.model.reference_opening)
         try:
@@ -477,10 +477,6 @@ class ClosureWalk:
 
     # -- what is worth knowing
 
-    def _warn(self, sentences: Iterable[str]) -> None:
-        for sentence in sentences:
-            self.record.warn(sentence)
-
     def _warn_of_states(self) -> None:
         """Warnings about the states that were found: material, buckling, faces that overlap."""
         restrict = self.model.shell.dofs.restrict
@@ -488,16 +484,18 @@ class ClosureWalk:
         for row in range(self.record.rows(STATES)):
             pressure, overlap = (float(self._value(name, row)) for name in ("pressure", "overlap"))
             found.append(SimpleNamespace(pressure=pressure, overlap=overlap, q=restrict(self._value("nodal", row))))
-        self._warn(state_warnings(self.model, found))
+        self.record.warn(*state_warnings(self.model, found))
         for row in range(min(self.record.rows(BUCKLING), 1)):
             pressure, kind = (self.record.value(BUCKLING, name, row) for name in ("pressure", "kind"))
-            self._warn([f"The wall buckles at {pressure:.6g} Pa ({kind}); states at higher pressures lie beyond it."])
+            self.record.warn(
+                f"The wall buckles at {pressure:.6g} Pa ({kind}); states at higher pressures lie beyond it."
+            )
         for note in self.record.notes(BUCKLED_CLASS):
             where = f"at {note['pressure']:.6g} Pa in class {note['symmetry']}"
-            self._warn([f"The wall buckles {where}: {symmetry_named(note['symmetry']).words}."])
+            self.record.warn(f"The wall buckles {where}: {symmetry_named(note['symmetry']).words}.")
         worst = max(found, key=lambda state: state.overlap, default=None)
         held = self.model.supports == HELD_LIPS
         if worst is not None and worst.overlap > (CROSSED * self.model.case.valve.initial_gap if held else np.inf):
             deepest = f"{worst.overlap * 1e3:.2g} mm at {worst.pressure:.6g} Pa"
             why = "because these supports stop the mid-surface and not the faces."
-            self._warn([f"The inner faces overlap by up to {deepest}, {why}"])
+            self.record.warn(f"The inner faces overlap by up to {deepest}, {why}")

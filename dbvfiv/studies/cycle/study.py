@@ -244,8 +244,7 @@ def run(session: Session, record: GrowingRecord) -> None:
     except SolveError as error:
         verdict = Verdict.undecided(str(error))
     record.note(VERDICT, **verdict.summary())
-    for sentence in walk.about_rubbers():
-        record.warn(sentence)
+    record.warn(*walk.about_rubbers())
 
 
 def _say_again(record: GrowingRecord) -> None:

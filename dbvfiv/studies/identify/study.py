@@ -140,8 +140,7 @@ def run(
     record.extend(POSTERIOR, table | {"score": z.ravel()})
     record.note(_FOUND, rounds=rounds, left_out=[*learning.left_out], emulation=learning.emulation(z), check=check)
     result = IdentifyResult(record, session)
-    for sentence in (*result.doubts, *walk.about_rubbers()):
-        record.warn(sentence)
+    record.warn(*result.doubts, *walk.about_rubbers())
     if posterior is not None:
         write_case(result.posterior_case(), posterior)
 

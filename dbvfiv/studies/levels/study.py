@@ -69,8 +69,7 @@ def _tell_beyond_tests(record: GrowingRecord, pressure: float) -> None:
     names = [field.name for field in fields(LayerLevel)]
     kept = zip(record.column(LEVELS, "pressure"), record.table_rows(_TABLE, ["layer", *names[1:]]))
     layers = [LayerLevel(row.pop("layer"), **row) for place, row in kept if place == pressure]
-    for sentence in beyond_tests(layers, pressure):
-        record.warn(sentence)
+    record.warn(*beyond_tests(layers, pressure))
 
 
 def last_levels(record: GrowingRecord) -> dict[str, float] | None:

@@ -319,8 +319,7 @@ def run(session: Session, record: GrowingRecord, workers: int | None = None) -> 
     record.note(_CHECKS, checks=checks)
     record.note(_CURVES, curves=[asdict(curve) for curve in curves])
     unsure = doubts(plan, curves) if case.map.curve else ()
-    for sentence in (*unsure, *_doubts(plan, columns, checks), *walk.about_rubbers()):
-        record.warn(sentence)
+    record.warn(*unsure, *_doubts(plan, columns, checks), *walk.about_rubbers())
     if case.map.samples:
         chances.find_chances(case, record, processes)
     cycles.follow_cycles(case, record, plan, list(columns), walk)

@@ -71,8 +71,7 @@ def run(session: Session, record: GrowingRecord) -> None:
             record.fail(f"{variant.prefix(asked[0])}{sentence}")
         for sentence in found.warnings:
             record.warn(f"{variant.prefix(asked[0])}{sentence}")
-    for sentence in walk.about_rubbers():
-        record.warn(sentence)
+    record.warn(*walk.about_rubbers())
 
 
 def _points(record: Record, variant: Variant) -> list[OnsetPoint]:

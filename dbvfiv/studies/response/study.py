@@ -371,8 +371,7 @@ def run(session: Session, record: GrowingRecord) -> None:
     walk = StabilityWalk(case, record, session.model)
     done = set(record.column(POINTS, "value"))
     record.begin("response", len(values))
-    for sentence in left_out(case):
-        record.warn(sentence)
+    record.warn(*left_out(case))
     for value in values:
         if value in done:
             continue
@@ -382,8 +381,7 @@ def run(session: Session, record: GrowingRecord) -> None:
             record.fail(f"At {PARAMETERS[asked.parameter].text(value)}: {error}")
         record.item(value)
     outside = outside_band(case, record.column(PEAKS, "frequency"))
-    for sentence in filter(None, (ended_early(record, case), outside, *walk.about_rubbers())):
-        record.warn(sentence)
+    record.warn(*filter(None, (ended_early(record, case), outside, *walk.about_rubbers())))
 
 
 def ended_early(record: Record, case: Case) -> str | None:

@@ -70,8 +70,7 @@ def run(session: Session, record: GrowingRecord) -> None:
     try:
         reach_states(model, case, record, STATES, steady.pressures, states, record.item)
     finally:
-        for sentence in state_warnings(model, states):
-            record.warn(sentence)
+        record.warn(*state_warnings(model, states))
     if model.flow.has_fluid and states and not record.notes(CRACKING):
         record.progress("cracking pressure")
         try:

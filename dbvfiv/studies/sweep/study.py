@@ -292,8 +292,7 @@ def run(session: Session, record: GrowingRecord) -> None:
     record.note("over", remarks=notes, checks=checks)
     leading = [sample.verdict.frequency for sample in tracking.samples if sample.verdict.holds]
     outside = outside_band(case, [frequency for frequency in leading if np.isfinite(frequency)])
-    for note in filter(None, (*notes, outside, *walk.about_rubbers())):
-        record.warn(note)
+    record.warn(*filter(None, (*notes, outside, *walk.about_rubbers())))
     if interrupted:
         raise KeyboardInterrupt
 

@@ -152,8 +152,7 @@ def _states_of_case(plan: Plan, walk: StabilityWalk, record: GrowingRecord) -> l
             states.append(None)
     if all(state is None for state in states):
         raise SolveError(f"The valve of the case has no steady state: {record.failures[0]}")
-    for sentence in walk.about_rubbers():
-        record.warn(sentence)
+    record.warn(*walk.about_rubbers())
     return states
 
 

@@ -69,7 +69,7 @@ def test_what_buckles_in_another_class_is_said_again(whole):
     """By a walk that has seen no state itself."""
     walk, said = object.__new__(ClosureWalk), []
     walk.model, notes = whole.model, {BUCKLED_CLASS: [{"pressure": 7e3, "symmetry": "SA"}]}
-    walk.record = SimpleNamespace(rows=lambda _: 0, notes=notes.get, warn=said.append)
+    walk.record = SimpleNamespace(rows=lambda _: 0, notes=notes.get, warn=lambda *sentences: said.extend(sentences))
     walk._warn_of_states()
     assert len(said) == 1 and said[0].startswith("The wall buckles at 7000 Pa in class SA: ")
 
