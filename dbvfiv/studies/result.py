@@ -36,6 +36,7 @@ class StudyResult:
     """
 
     kind: ClassVar[str]
+    missed: ClassVar[str] = "Not everything was reached"  #: Clause on what was not, {} being a number of failures.
 
     def __init__(self, record: Record, session: Session | None = None):
         self.record = record
@@ -156,7 +157,7 @@ class StudyResult:
 
     def _missed(self, lost: int) -> str:
         """Clause on what was not reached, of a number of failures."""
-        return "Not everything was reached"
+        return self.missed.format(lost)
 
     # -- files and pictures ----
 

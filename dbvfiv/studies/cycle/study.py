@@ -444,6 +444,7 @@ class CycleResult(StudyResult):
     """
 
     kind = "cycle"
+    missed = "The branch could not be followed to the end of the range"
 
     @property
     def parameter(self) -> str:
@@ -507,9 +508,6 @@ class CycleResult(StudyResult):
             "fixed": fixed_conditions(self.case, self.parameter),
             **self.ending(),
         }
-
-    def _missed(self, lost: int) -> str:
-        return "The branch could not be followed to the end of the range"
 
     def lines(self) -> list[str]:
         columns = _shown_columns(self.case)

@@ -175,6 +175,7 @@ class IdentifyResult(StudyResult):
     """
 
     kind = "identify"
+    missed = "{} places have no steady state"
 
     @cached_property
     def plan(self) -> Plan:
@@ -463,9 +464,6 @@ class IdentifyResult(StudyResult):
             for v in (part["interval"][0], part["median"], part["interval"][1])
         )
         return f"{name.capitalize()} the last record flutter {verb} at {middle} (95 %: {low} to {high})."
-
-    def _missed(self, lost: int) -> str:
-        return f"{lost} places have no steady state"
 
 
 def _interval(at: np.ndarray, among: np.ndarray, beyond: float) -> dict[str, Any]:

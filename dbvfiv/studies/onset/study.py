@@ -110,6 +110,7 @@ class OnsetResult(StudyResult):
     """
 
     kind = "onset"
+    missed = "Parts of the range were not reached: {} states failed"
 
     @property
     def parameter(self) -> str:
@@ -240,9 +241,6 @@ class OnsetResult(StudyResult):
             "fixed": fixed_conditions(self.case, self.parameter),
             **self.ending(),
         } | (compared if self.other_law else {})
-
-    def _missed(self, lost: int) -> str:
-        return f"Parts of the range were not reached: {lost} states failed"
 
     def lines(self) -> list[str]:
         fixed, alone = f"At {describe_fixed(self.case, self.parameter)}", f"; {self.own.variant.motion.alone}"

@@ -447,6 +447,7 @@ class ResponseResult(StudyResult):
     """
 
     kind = "response"
+    missed = "There is no response at {} of the states"
 
     @property
     def parameter(self) -> str:
@@ -484,9 +485,6 @@ class ResponseResult(StudyResult):
         fixed = fixed_conditions(self.case, self.parameter)
         known = {"parameter": self.parameter, "symmetry": equilibria_of(self.case.part).name}
         return known | {"points": points, "fixed": fixed} | self.ending()
-
-    def _missed(self, lost: int) -> str:
-        return f"There is no response at {lost} of the states"
 
     def lines(self) -> list[str]:
         units = self.case.units

@@ -130,6 +130,7 @@ class SensitivityResult(StudyResult):
     """
 
     kind = "sensitivity"
+    missed = "The eigenvalue was not differentiated by {} of the parameters"
 
     @cached_property
     def state(self) -> State:
@@ -198,9 +199,6 @@ class SensitivityResult(StudyResult):
             ],
             **self.ending(),
         }
-
-    def _missed(self, lost: int) -> str:
-        return f"The eigenvalue was not differentiated by {lost} of the parameters"
 
     def lines(self) -> list[str]:
         if not self.record.notes(MODE):
