@@ -11,6 +11,8 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any, ClassVar, Literal
 
+from ..case.axis import Axis
+from ..case.parameters import Parameter
 from ..drawing.style import draw_figures, write_figures
 from ..errors import CaseError
 from ..model.valve import ValveModel
@@ -223,3 +225,22 @@ class StudyResult:
     def export(self, path: str | Path, quarter: bool = False, deformed: bool = False, **choices: Any) -> Path:
         """Write a VTKHDF file for ParaView; see `dbvfiv.record.vtkhdf`."""
         return export_result(self, path, quarter, deformed, **choices)
+
+
+class RangeResult(StudyResult):
+    """A result along a range of one parameter, the key ``over`` of its section, or at the state of the case without."""
+
+    @property
+    def axis(self) -> Axis | None:
+        """The range."""
+        return getattr(self.case, self.kind).axis
+
+    @property
+    def parameter(self) -> str:
+        """Parameter of the range; the pressure where there is none."""
+        return "pressure" if self.axis is None else self.axis.parameter
+
+    @property
+    def row(self) -> Parameter:
+        """The parameter, with a pressure in the units of the case."""
+        return self.case.units.parameter(self.parameter)

@@ -24,7 +24,7 @@ from ...drawing.style import (
     pressure_colours,
 )
 from ...drawing.views import layer_panels
-from ..result import StudyResult
+from ..result import RangeResult
 from ..stability.place import describe_fixed
 
 #: Cycles shown in the phase plane and in spectra.
@@ -33,7 +33,7 @@ SHOWN = 7
 INSTANTS = 12
 
 
-def draw(result: StudyResult) -> Iterator[tuple[str, Callable[[], Figure]]]:
+def draw(result: RangeResult) -> Iterator[tuple[str, Callable[[], Figure]]]:
     """Figures of a branch, each with its name."""
     if not result.points:
         return
@@ -46,15 +46,15 @@ def draw(result: StudyResult) -> Iterator[tuple[str, Callable[[], Figure]]]:
     yield "stress-range", lambda: stress_range(result)
 
 
-def _title(result: StudyResult) -> str:
+def _title(result: RangeResult) -> str:
     return f"{result.header.name}, {describe_fixed(result.case, result.parameter)}"
 
 
-def _values(result: StudyResult) -> np.ndarray:
+def _values(result: RangeResult) -> np.ndarray:
     return np.array([point.value for point in result.points]) / PARAMETERS[result.parameter].scale
 
 
-def branch(result: StudyResult) -> Figure:
+def branch(result: RangeResult) -> Figure:
     """Amplitude and frequency over the parameter, unstable cycles dashed, special points marked."""
     figure = new_figure(7.2, 6.0)
     top, bottom = figure.subplots(2, 1, sharex=True, height_ratios=(3, 2))
@@ -82,7 +82,7 @@ def branch(result: StudyResult) -> Figure:
     return figure
 
 
-def _with_stability(axes, result: StudyResult, x: np.ndarray, y: np.ndarray, first: int = 0) -> None:
+def _with_stability(axes, result: RangeResult, x: np.ndarray, y: np.ndarray, first: int = 0) -> None:
     """Curves through cycles: full where both ends of a piece are stable or unknown."""
     states = [point.stable for point in result.points]
     states = [states[0]] * first + states
@@ -96,7 +96,7 @@ def _with_stability(axes, result: StudyResult, x: np.ndarray, y: np.ndarray, fir
     axes.plot(x[first:], y[first:], ".", color=COMPUTED, ms=6)
 
 
-def _mark_special(result: StudyResult, axes) -> None:
+def _mark_special(result: RangeResult, axes) -> None:
     row = PARAMETERS[result.parameter]
     for special in result.special_points:
         x, y = special["value"] / row.scale, 1e3 * special["amplitude"]
@@ -105,7 +105,7 @@ def _mark_special(result: StudyResult, axes) -> None:
         axes.annotate(f"{special['kind']}\n{row.amount(special['value'], 4)}", (x, y), xytext=(8, -7), va="top", **look)
 
 
-def envelope(result: StudyResult) -> Figure:
+def envelope(result: RangeResult) -> Figure:
     """Between which displacements the lip swings, and its mean."""
     label = parameter_label(result.case, result.parameter)
     figure, axes = new_panel(7.0, 4.4, _title(result), label, "Displacement of one lip, mm")
@@ -124,7 +124,7 @@ def envelope(result: StudyResult) -> Figure:
     return figure
 
 
-def _some(result: StudyResult) -> Iterator[tuple[Any, np.ndarray, str]]:
+def _some(result: RangeResult) -> Iterator[tuple[Any, np.ndarray, str]]:
     """Some cycles, each with its colour and its label."""
     points = [point for point in result.points if point.asked] or list(result.points)
     shown = [points[i] for i in np.unique(np.linspace(0, len(points) - 1, SHOWN).round().astype(int))]
@@ -132,7 +132,7 @@ def _some(result: StudyResult) -> Iterator[tuple[Any, np.ndarray, str]]:
     return zip(shown, pressure_colours([point.value for point in shown]), labels)
 
 
-def phase_plane(result: StudyResult) -> Figure:
+def phase_plane(result: RangeResult) -> Figure:
     """Orbits of some cycles in the plane of displacement and velocity of the lip."""
     figure, axes = new_panel(6.6, 5.2, _title(result), "Displacement of one lip, mm", "Its velocity, m/s")
     for point, colour, label in _some(result):
@@ -143,7 +143,7 @@ def phase_plane(result: StudyResult) -> Figure:
     return figure
 
 
-def centre_line(result: StudyResult) -> Figure:
+def centre_line(result: RangeResult) -> Figure:
     """The line x = 0 at instants of a period of the last cycle."""
     point = result.nearest()
     figure, axes = new_panel(7.4, 4.4, _at(result, point), "Distance from the lip z, mm", "Displacement in y, mm")
@@ -154,7 +154,7 @@ def centre_line(result: StudyResult) -> Figure:
     return figure
 
 
-def wave(result: StudyResult) -> Figure:
+def wave(result: RangeResult) -> Figure:
     """The motion of the line x = 0 about its mean over one period of the last cycle: a wave along the valve."""
     point = result.nearest()
     orbit = point.orbit
@@ -176,7 +176,7 @@ def wave(result: StudyResult) -> Figure:
     return figure
 
 
-def spectrum(result: StudyResult) -> Figure:
+def spectrum(result: RangeResult) -> Figure:
     """Harmonics of the displacement of the lip of some cycles."""
     figure, axes = new_panel(6.8, 4.4, _title(result), "Harmonic", "Amplitude of one lip, mm")
     for point, colour, label in _some(result):
@@ -187,13 +187,13 @@ def spectrum(result: StudyResult) -> Figure:
     return figure
 
 
-def stress_range(result: StudyResult) -> Figure:
+def stress_range(result: RangeResult) -> Figure:
     """Largest range of a stress over a period of the last cycle, in each layer on the unrolled part."""
     point = result.nearest()
     figure, _ = layer_panels(result.mesh, point.ranges.stress.T / 1e6, "Range of stress, MPa")
     return headline(figure, f"Range of stress over a period, {_at(result, point)}")
 
 
-def _at(result: StudyResult, point: Any) -> str:
+def _at(result: RangeResult, point: Any) -> str:
     row = PARAMETERS[result.parameter]
     return f"{result.header.name}: {row.text(point.value)}, {point.frequency:.4g} Hz"

@@ -29,7 +29,7 @@ from ...record.vtkhdf import Step, motion
 from ...shell.recovery import face_strains, layer_fields, point_stresses
 from ..case import Case
 from ..orbits import MODES, Follower, Orbit
-from ..result import StudyResult
+from ..result import RangeResult
 from ..session import Session, Study, print_rows, show_parameter
 from ..stability.place import check_range, describe_fixed, fixed_conditions, models_of
 from ..stability.verdict import Verdict
@@ -427,7 +427,7 @@ class Point:
         return plain | {"stable": self.stable, "unstable_dimension": int(self.unstable), "exponents": found}
 
 
-class CycleResult(StudyResult):
+class CycleResult(RangeResult):
     """A branch of limit cycles, in the order in which they lie on it.
 
     Attributes
@@ -445,10 +445,6 @@ class CycleResult(StudyResult):
 
     kind = "cycle"
     missed = "The branch could not be followed to the end of the range"
-
-    @property
-    def parameter(self) -> str:
-        return self.case.cycle.axis.parameter
 
     @cached_property
     def points(self) -> tuple[Point, ...]:
@@ -515,8 +511,7 @@ class CycleResult(StudyResult):
         return [f"At {describe_fixed(self.case, self.parameter)}:", *printed_head(columns), *rows, *self.remarks()]
 
     def remarks(self) -> list[str]:
-        row = self.case.units.parameter(self.parameter)
-        said = []
+        row, said = self.row, []
         if self.onset:
             at = row.text(self.onset["value"])
             said.append(f"The branch starts at the onset at {at}, {self.onset['frequency']:.4g} Hz.")

@@ -10,13 +10,13 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
-from ...case.parameters import PARAMETERS, Parameter
+from ...case.parameters import PARAMETERS
 from ...drawing.style import ACCENT, COMPUTED, HALO, PUBLISHED, REST, limits, log_axis, new_figure, parameter_label
 from ...observer import Observer
 from ...record.record import GrowingRecord, Record
 from ...texts import digits
 from ..case import Case
-from ..result import StudyResult
+from ..result import RangeResult
 from ..session import Session, Study
 from ..stability.dimensions import Variant, certified_in_all, compare_ranges, leading_class, own_variant, variants
 from ..stability.place import check_range, describe_fixed, fixed_conditions
@@ -94,7 +94,7 @@ def read_onsets(record: Record, variant: Variant, partly: bool = False) -> Found
     return FoundOnsets(variant, found, tuple(_points(record, variant)), *said, missed)
 
 
-class OnsetResult(StudyResult):
+class OnsetResult(RangeResult):
     """Onsets in ascending order of the parameter, and the scan that found them.
 
     Attributes
@@ -111,10 +111,6 @@ class OnsetResult(StudyResult):
 
     kind = "onset"
     missed = "Parts of the range were not reached: {} states failed"
-
-    @property
-    def parameter(self) -> str:
-        return self.case.onset.axis.parameter
 
     @cached_property
     def variants(self) -> dict[Variant, FoundOnsets]:
@@ -255,7 +251,7 @@ class OnsetResult(StudyResult):
         """Lines on the points of some classes under one flow model."""
         if not points:
             return [fixed, self._without_onset(parts)]
-        unit = self._row.shown_unit
+        unit = self.row.shown_unit
         head = (
             f"{self.parameter + (f', {unit}' if unit else ''):>16} {'+-':>9} {'Hz':>8}  "
             f"{'':<28}{'below, 1/s':>11}{'above, 1/s':>11}"
@@ -264,18 +260,13 @@ class OnsetResult(StudyResult):
         return [fixed, head, *(self._line(point) for point in points)]
 
     @property
-    def _row(self) -> Parameter:
-        """The parameter, with a pressure in the units of the case."""
-        return self.case.units.parameter(self.parameter)
-
-    @property
     def _own(self) -> str:
         """Class of the equilibria."""
         return self.own.variant.symmetry
 
     def _without_onset(self, parts: Sequence[FoundOnsets]) -> str:
         values, verdicts = parts[0].values.tolist(), parts[0].verdicts
-        scanned = f"from {self._row.span(*(values[:1] + values[-1:] or (math.nan, math.nan)))}"
+        scanned = f"from {self.row.span(*(values[:1] + values[-1:] or (math.nan, math.nan)))}"
         if not self.complete:
             return f"No onset has been located yet: the search ended early, after {len(values)} values {scanned}."
         invalid = [verdict.outcome for verdict in verdicts].count(NOT_VALID)
@@ -296,7 +287,7 @@ class OnsetResult(StudyResult):
         return f"No onset: the valve is {'unstable' if {False} in states else 'stable'} {scanned} in {which}."
 
     def _line(self, point: dict[str, Any]) -> str:
-        scale = self._row.scale
+        scale = self.row.scale
         becomes = "unstable above" if point["gains"] else "stable above"
         which = CRITICALITY.get(point["criticality"], point["criticality"])
         words = becomes + (f", {which}" if which else "") if point["edge"] else f"a further mode {becomes}"
@@ -373,15 +364,15 @@ def merge_points(
 _UNSTABLE = "#f6ddcf"
 
 
-def draw(result: StudyResult) -> Iterator[tuple[str, Callable[[], Figure]]]:
+def draw(result: RangeResult) -> Iterator[tuple[str, Callable[[], Figure]]]:
     """Figures of an onset result, each with its name."""
     if len(result.values):
         yield "onset", lambda: onset(result)
 
 
-def onset(result: StudyResult) -> Figure:
+def onset(result: RangeResult) -> Figure:
     """Growth rate and frequency of the leading modes, unstable ranges shaded, uncertain ones hatched, onsets marked."""
-    axis = result.case.onset.axis
+    axis = result.axis
     scale = PARAMETERS[axis.parameter].scale
     values = result.values / scale
     figure = new_figure(7.2, 5.8)
@@ -407,7 +398,7 @@ def onset(result: StudyResult) -> Figure:
     return figure
 
 
-def _shade(result: StudyResult, scale: float, *panels) -> None:
+def _shade(result: RangeResult, scale: float, *panels) -> None:
     """Unstable ranges in a tint; hatched where nothing is certified, and so nothing claimed."""
     unsure = {"facecolor": "#ececec", "edgecolor": "#9a9a9a", "hatch": "////"}
     for label, look in (("unstable", {"facecolor": _UNSTABLE}), ("uncertain", unsure)):
@@ -417,7 +408,7 @@ def _shade(result: StudyResult, scale: float, *panels) -> None:
                 axes.axvspan(a / scale, b / scale, lw=0, zorder=0, label=named, **look)
 
 
-def _draw_scan(result: StudyResult, values: np.ndarray, top, bottom) -> float:
+def _draw_scan(result: RangeResult, values: np.ndarray, top, bottom) -> float:
     """Curves of the scan; the growth rate down to which they are shown."""
     growth, frequency = result.growth_rates, result.frequencies
     low = _floor(growth)
@@ -469,7 +460,7 @@ def _jumps(frequency: np.ndarray) -> np.ndarray:
     return step > 0.25 * np.maximum(frequency, 1.0)
 
 
-def _title(result: StudyResult) -> str:
+def _title(result: RangeResult) -> str:
     return f"{result.header.name}, {describe_fixed(result.case, result.parameter)}"
 
 

@@ -37,7 +37,7 @@ from ...record.record import GrowingRecord, Record
 from ...record.table import Column, TableSpec
 from ...texts import digits
 from ..case import Case
-from ..result import StudyResult
+from ..result import RangeResult
 from ..session import Session, Study
 from ..stability.place import check_range, describe_fixed, fixed_conditions
 from ..stability.walk import StabilityWalk
@@ -431,7 +431,7 @@ def _respond(walk: StabilityWalk, place: Mu, value: float, rows, record: Growing
     record.append(POINTS, point | {f"{name}_rms": rms for name, rms in zip(OUTPUTS, found.rms)})
 
 
-class ResponseResult(StudyResult):
+class ResponseResult(RangeResult):
     """Response to the pressure at the inlet.
 
     Attributes
@@ -448,10 +448,6 @@ class ResponseResult(StudyResult):
 
     kind = "response"
     missed = "There is no response at {} of the states"
-
-    @property
-    def parameter(self) -> str:
-        return self.case.response.parameter
 
     @cached_property
     def points(self) -> list[dict[str, Any]]:
@@ -488,7 +484,7 @@ class ResponseResult(StudyResult):
 
     def lines(self) -> list[str]:
         units = self.case.units
-        row, unit, flow = units.parameter(self.parameter), units.name("flow"), units.factor("flow")
+        row, unit, flow = self.row, units.name("flow"), units.factor("flow")
         said = [f"At {describe_fixed(self.case, self.parameter)}; {self.noise}:"]
         head = f"{self.parameter:>14}{'damping, %':>12}{'at, Hz':>10}{'lip rms, um':>13}{'flow rms, ' + unit:>15}"
         said.append(f"{head}{'correlation, s':>16}")
@@ -524,7 +520,7 @@ class ResponseResult(StudyResult):
 _SHOWN = (("lip_displacement", 1e9, "Lip, um per kPa"), ("flow", 1e6, "Flow, L/s per kPa"))
 
 
-def draw(result: StudyResult) -> Iterator[tuple[str, Callable[[], Figure]]]:
+def draw(result: RangeResult) -> Iterator[tuple[str, Callable[[], Figure]]]:
     """Figures of a response, each with its name."""
     if result.points:
         yield "response", lambda: response(result)
@@ -532,11 +528,11 @@ def draw(result: StudyResult) -> Iterator[tuple[str, Callable[[], Figure]]]:
         yield "precursors", lambda: precursors(result)
 
 
-def _finish(figure: Figure, result: StudyResult, title: str) -> Figure:
+def _finish(figure: Figure, result: RangeResult, title: str) -> Figure:
     return headline(figure, title, describe_fixed(result.case, result.parameter), result.noise)
 
 
-def response(result: StudyResult) -> Figure:
+def response(result: RangeResult) -> Figure:
     """Amplitudes per pressure at the inlet and the phase of the lip, over frequency."""
     figure = new_figure(7.6, 6.4)
     axes = figure.subplots(3, 1, sharex=True)
@@ -554,7 +550,7 @@ def response(result: StudyResult) -> Figure:
     return _finish(figure, result, f"Response of {result.header.name} to the pressure at the inlet")
 
 
-def precursors(result: StudyResult) -> Figure:
+def precursors(result: RangeResult) -> Figure:
     """Root mean square of the lip under the noise, its correlation time, and the least damping over the range."""
     figure = new_figure(7.6, 6.4)
     axes = figure.subplots(3, 1, sharex=True)
@@ -567,8 +563,7 @@ def precursors(result: StudyResult) -> Figure:
     for panel, (name, scale, label, colour) in zip(axes, rows):
         panel.plot(x, [scale * point[name] for point in result.points], "o-", color=colour)
         panel.set_ylabel(label)
-    axis = result.case.response.axis
-    if axis is not None and axis.log:
+    if result.axis is not None and result.axis.log:
         axes[2].set_xscale("log")
     axes[2].set_xlabel(parameter_label(result.case, result.parameter))
     return _finish(figure, result, f"Towards the onset, {result.header.name}")

@@ -29,7 +29,7 @@ from ...drawing.style import (
     parameter_label,
 )
 from ...texts import digits
-from ..result import StudyResult
+from ..result import RangeResult
 
 #: Confidence below which a match is drawn as doubtful.
 DOUBTFUL = 0.5
@@ -41,14 +41,14 @@ _GROUNDS = (
 )
 
 
-def draw(result: StudyResult) -> Iterator[tuple[str, Callable[[], Figure]]]:
+def draw(result: RangeResult) -> Iterator[tuple[str, Callable[[], Figure]]]:
     """Figures of a sweep, each with its name."""
     if len(result.values) and result.branches:
         yield "sweep", lambda: curves(result)
         yield "root-locus", lambda: root_locus(result)
 
 
-def curves(result: StudyResult) -> Figure:
+def curves(result: RangeResult) -> Figure:
     """Growth rate, frequency and damping ratio of each branch; crossings of zero growth marked, spans with unstable
     modes shaded.
     """
@@ -101,7 +101,7 @@ def _draw_branch(panels, x: np.ndarray, branch: Any, look: dict) -> None:
         axes.plot(x[doubtful], values[doubtful], "x", color="black", ms=8, mew=1.6)
 
 
-def _mark_crossing(axes, crossing: Any, result: StudyResult, x: np.ndarray) -> None:
+def _mark_crossing(axes, crossing: Any, result: RangeResult, x: np.ndarray) -> None:
     """A crossing of zero growth and its numbers, beside it where there is room."""
     row = PARAMETERS[result.parameter]
     at = crossing.value / row.scale
@@ -113,7 +113,7 @@ def _mark_crossing(axes, crossing: Any, result: StudyResult, x: np.ndarray) -> N
     axes.annotate(f"≈ {row.amount(crossing.value, 3)}, {swing}", (at, 0.0), (7 * side, 7), **look)
 
 
-def surroundings_of(result: StudyResult) -> str:
+def surroundings_of(result: RangeResult) -> str:
     """Fixed parameters of a sweep, for titles."""
     case = result.case
     parts = []
@@ -134,7 +134,7 @@ def _share(at: float, x: np.ndarray, log: bool) -> float:
     return float((place(at) - place(x[0])) / (place(x[-1]) - place(x[0])))
 
 
-def _shade(axes, result: StudyResult, x: np.ndarray) -> None:
+def _shade(axes, result: RangeResult, x: np.ndarray) -> None:
     """Ground red where a mode is unstable, its edges at the crossings; hatched beside values without a mode."""
     place, crossings = np.log if result.axis.log else np.asarray, result.crossings()
     met = np.array([crossing.value for crossing in crossings]) / PARAMETERS[result.parameter].scale
@@ -150,7 +150,7 @@ def _shade(axes, result: StudyResult, x: np.ndarray) -> None:
         axes.axvspan(edges[first], edges[last + 1], zorder=0, **_GROUNDS[look])
 
 
-def root_locus(result: StudyResult) -> Figure:
+def root_locus(result: RangeResult) -> Figure:
     """Growth rate and frequency of each branch, coloured by the parameter; a ring where it begins, crossings of the
     axis marked.
     """
@@ -200,7 +200,7 @@ def root_locus(result: StudyResult) -> Figure:
     return figure
 
 
-def _mark_axis(axes, result: StudyResult) -> None:
+def _mark_axis(axes, result: RangeResult) -> None:
     row = PARAMETERS[result.parameter]
     look = {"textcoords": "offset points", "fontsize": 9, "color": UNSTABLE, "path_effects": HALO}
     for crossing in result.crossings():

@@ -16,7 +16,6 @@ from eigen.search import leading_modes
 from eigen.spectrum import SearchOptions, Spectrum
 from eigen.tracking import Branches, TrackOptions, track
 
-from ...case.axis import Axis
 from ...case.parameters import PARAMETERS, Mu
 from ...errors import CaseError, SolveError
 from ...fit.cards import outside_band
@@ -29,7 +28,7 @@ from ...record.states import SUMMARY
 from ...record.table import Column, Shown, TableSpec, printed_head, printed_row
 from ...texts import json_value
 from ..case import Case
-from ..result import StudyResult
+from ..result import RangeResult
 from ..session import Session, Study, describe_surroundings, print_rows, show_parameter
 from ..stability.dimensions import variants
 from ..stability.line import ParameterLine
@@ -338,7 +337,7 @@ class Crossing:
     to_unstable: bool  #: True where the branch becomes unstable as the parameter grows.
 
 
-class SweepResult(StudyResult):
+class SweepResult(RangeResult):
     """Modes tracked along one parameter.
 
     Attributes
@@ -370,14 +369,6 @@ class SweepResult(StudyResult):
         if not self._over:
             return next(reversed(self.record.latest("kept")), {}).get(name, [])
         return self.record.table_rows(next(spec for spec in tables_of(self.mesh) if spec.name == name))
-
-    @property
-    def axis(self) -> Axis:
-        return self.case.sweep.axis
-
-    @property
-    def parameter(self) -> str:
-        return self.axis.parameter
 
     @cached_property
     def samples(self) -> tuple[Sample, ...]:
@@ -479,7 +470,7 @@ class SweepResult(StudyResult):
 
     def lines(self) -> list[str]:
         crossings = [crossing_line(self, crossing) for crossing in self.crossings()]
-        row = self.case.units.parameter(self.parameter)
+        row = self.row
         unit, places = row.shown_unit, ", ".join(f"{check['value'] / row.scale:.4g}" for check in self.checks)
         word = "Certified" if self.certified else "Not certified"
         checked = (
@@ -534,10 +525,9 @@ def rows_of_sweep(result: SweepResult) -> list[str]:
 
 def crossing_line(result: SweepResult, crossing: Crossing) -> str:
     """One sentence on a crossing of zero growth."""
-    shown = result.case.units.parameter(result.parameter)
     becomes = "unstable" if crossing.to_unstable else "stable"
     how = f"at {crossing.frequency:.4g} Hz" if crossing.frequency > 0 else "without oscillation"
-    place = shown.amount(crossing.value, 4)
+    place = result.row.amount(crossing.value, 4)
     under = f" under {result.case.continuity}" if result.case.continuity else ""
     return f"Branch {crossing.branch} becomes {becomes} near {result.parameter} {place} {how}{under} (interpolated)."
 

@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 
 from ...case.parameters import PARAMETERS
 from ...drawing.style import ACCENT, COMPUTED, REST, headline, limits, log_axis, new_figure, parameter_label
-from ..result import StudyResult
+from ..result import RangeResult
 from ..stability.place import describe_fixed
 from ..stability.verdict import DIVERGES, FLUTTERS, NOT_VALID, OUTCOMES, STABLE
 
@@ -18,7 +18,7 @@ LEAST = 15
 _LOOKS = {STABLE: COMPUTED, FLUTTERS: ACCENT, DIVERGES: "black"}
 
 
-def draw(result: StudyResult) -> Iterator[tuple[str, Callable[[], Figure]]]:
+def draw(result: RangeResult) -> Iterator[tuple[str, Callable[[], Figure]]]:
     """Figures of an uncertainty, each with its name."""
     if not result.points:
         return
@@ -36,22 +36,21 @@ def _with_ratio(found: dict[str, np.ndarray]) -> np.ndarray:
     return (found["stage"] == 0) & np.isfinite(found["damping_ratio"])
 
 
-def _axis(axes, result: StudyResult) -> np.ndarray:
+def _axis(axes, result: RangeResult) -> np.ndarray:
     """Label the range, and its values in the units shown."""
-    axis = result.case.uncertainty.axis
     axes.set_xlabel(parameter_label(result.case, result.parameter))
     values = np.array([point["value"] for point in result.points]) / PARAMETERS[result.parameter].scale
-    if axis is not None and axis.log:
+    if result.axis is not None and result.axis.log:
         log_axis(axes.xaxis, *limits(values, log=True))
     return values
 
 
-def _finish(figure: Figure, result: StudyResult, title: str) -> Figure:
+def _finish(figure: Figure, result: RangeResult, title: str) -> Figure:
     fixed = describe_fixed(result.case, result.parameter, *(one.name for one in result.plan.inputs))
     return headline(figure, title, fixed, f"{result.points[0]['samples']} samples")
 
 
-def probability(result: StudyResult) -> Figure:
+def probability(result: RangeResult) -> Figure:
     """Probability of flutter, and of other outcomes than stable, over the range, with their intervals."""
     figure = new_figure()
     axes = figure.add_subplot()
@@ -70,7 +69,7 @@ def probability(result: StudyResult) -> Figure:
     return _finish(figure, result, f"Probability of flutter of {result.header.name}")
 
 
-def margin(result: StudyResult) -> Figure:
+def margin(result: RangeResult) -> Figure:
     """Least damping ratio: percentiles over the range, or its distribution at the one state."""
     figure = new_figure()
     axes = figure.add_subplot()
@@ -99,7 +98,7 @@ def margin(result: StudyResult) -> Figure:
     return _finish(figure, result, f"Margin of {result.header.name}")
 
 
-def what_decides(result: StudyResult) -> Figure:
+def what_decides(result: RangeResult) -> Figure:
     """Shares of the inputs in the variance of the margin, and the margin over the first of them."""
     point = result.deciding
     rows = [row for row in point["decides"] if row["share"] is not None][::-1]
@@ -126,7 +125,7 @@ def what_decides(result: StudyResult) -> Figure:
     return _finish(figure, result, f"What decides at {shown.amount(point['value'], 4)}")
 
 
-def tornado(result: StudyResult) -> Figure:
+def tornado(result: RangeResult) -> Figure:
     """Median of the least damping ratio over the samples in the lowest and in the highest fifth of each input, the
     input that moves it most on top.
     """

@@ -17,7 +17,7 @@ from ...record.table import Column, TableSpec
 from ...texts import digits, json_value
 from ..case import Case
 from ..inputs import CONFIDENCE, Plan, Probability, counted, parameter_of, quasi_random
-from ..result import StudyResult
+from ..result import RangeResult
 from ..session import Session, Study
 from ..stability.dimensions import flow_models
 from ..stability.neighbours import CHECKS, NEAR_SEED, TAKEN, Neighbours, find_neighbours
@@ -294,7 +294,7 @@ class _Sampling:
         subset(self._stages(), len(self.plan.inputs), asked.samples, asked.seed)
 
 
-class UncertaintyResult(StudyResult):
+class UncertaintyResult(RangeResult):
     """Probability of each outcome over a range, and what decides it.
 
     Attributes
@@ -330,10 +330,6 @@ class UncertaintyResult(StudyResult):
     @cached_property
     def plan(self) -> Plan:
         return Plan(self.case)
-
-    @property
-    def parameter(self) -> str:
-        return self.plan.parameter
 
     def _columns(self, table: str, columns: Sequence[Column]) -> dict[str, np.ndarray]:
         mine = self.record.column(table, _LAW.name) == self.plan.law
@@ -496,7 +492,7 @@ class UncertaintyResult(StudyResult):
         return f"Under {law} {same} of {count} samples have the outcome of {self.case.fluid.continuity}."
 
     def lines(self) -> list[str]:
-        row = self.case.units.parameter(self.parameter)
+        row = self.row
         fixed = describe_fixed(self.case, self.parameter, *(one.name for one in self.plan.inputs))
         place = f"{self.parameter}, {row.shown_unit}".rstrip(", ")
         head = f"{place:>16}{'flutters':>10}  {'95 % interval':<17}"
@@ -527,7 +523,7 @@ class UncertaintyResult(StudyResult):
         said, *others = ("-" if one is None else f"{one:.3g}" for one in chances)
         interval = "{:.2g} to {:.2g}".format(*point["interval"])
         spread = "-" if middle is None else "{} ({} to {})".format(*(digits(100 * x) for x in (middle, low, high)))
-        value = point["value"] / self.case.units.parameter(self.parameter).scale
+        value = point["value"] / self.row.scale
         counts = "".join(f"{one:>10}" for one in others) + f"{point['undecided']:10d}{point['samples']:9d}"
         return f"{value:16.6g}{said:>10}  {interval:<17}{counts}  {spread}"
 
