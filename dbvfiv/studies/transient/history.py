@@ -115,7 +115,7 @@ def _by_group(mesh: MeshData) -> tuple[int, ...] | None:
     return (len(mesh.relaxing),) if mesh.relaxing else None
 
 
-def _with(name: str) -> Callable[[MeshData], tuple[int, ...] | None]:
+def _number_where(name: str) -> Callable[[MeshData], tuple[int, ...] | None]:
     """Shape of a number that a run has where its mesh has any of a field, by the name of that."""
     return lambda mesh: () if len(getattr(mesh, name)) else None
 
@@ -191,7 +191,7 @@ def _of_fluid(name: str, words: str) -> Column:
 
 #: Energy of an elastic line, of the whole valve, there where the case has one.
 LINE = _where(
-    _with("line_places"),
+    _number_where("line_places"),
     (
         _of_fluid("line_kinetic_energy", "Kinetic energy of the fluid in the line"),
         _of_fluid("line_elastic_energy", "Energy of its compression and of the pipe's wall"),
@@ -203,7 +203,7 @@ LINE = _where(
 )
 #: Of a fluid that is compressed, of the whole valve, there where the case has one.
 GAS = _where(
-    _with("gas_unknowns"),
+    _number_where("gas_unknowns"),
     (
         _of_fluid("gas_energy", "Kinetic energy and energy of compression of the fluid in the valve"),
         _of_fluid("gas_supply", "Energy that it took in at the flange since the start, by enthalpy and velocity head"),
@@ -218,7 +218,7 @@ GAS = _where(
 _KEPT = "Energy that touching faces took and did not give back since the start, whole valve"
 #: Contact of the inner faces, there where the case has it.
 FACES = _where(
-    _with("face_nodes"),
+    _number_where("face_nodes"),
     (
         _whole("contact_loss", _KEPT, lambda s: s.books.contact_loss),
         Column("contact_force", "N", "Force of the walls", read=lambda s: s.model.mesh.part.walls * s.touch.total),
@@ -306,7 +306,7 @@ PROGRESS = (
         read=lambda p: [p.eigenvalue.real, p.eigenvalue.imag],
     ),
     Column("numerical_loss", "J", "Energy of the computed part that numerical damping took"),
-    Column("contact_loss", "J", _CONTACT, shape=_with("face_nodes")),
+    Column("contact_loss", "J", _CONTACT, shape=_number_where("face_nodes")),
 )
 
 
