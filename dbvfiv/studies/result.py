@@ -241,6 +241,6 @@ class RangeResult(StudyResult):
         return "pressure" if self.axis is None else self.axis.parameter
 
     @property
-    def row(self) -> Parameter:
+    def _row(self) -> Parameter:
         """The parameter, with a pressure in the units of the case."""
         return self.case.units.parameter(self.parameter)

@@ -430,7 +430,7 @@ def test_a_stable_cycle_is_said_to_be_so_in_the_class_of_the_model(monkeypatch):
     point = SimpleNamespace(value=6e3, amplitude=3e-3, frequency=8.0, lip_least=0.0, lip_largest=9e-3, stable=True)
     result = SimpleNamespace(case=case, parameter="pressure", points=[point], nearest=lambda _: point, failures=())
     vars(result).update(
-        onset=None, row=None, special_points=(), reason="ends", remarks=lambda: CycleResult.remarks(result)
+        onset=None, _row=None, special_points=(), reason="ends", remarks=lambda: CycleResult.remarks(result)
     )
     said, limit = parts.cycle_part(SimpleNamespace(case=case, get=lambda _: result)).sentences
     assert said.startswith("A stable limit cycle of 3 mm") and limit.startswith("Stable means: against perturbations")

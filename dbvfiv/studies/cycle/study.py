@@ -511,7 +511,7 @@ class CycleResult(RangeResult):
         return [f"At {describe_fixed(self.case, self.parameter)}:", *printed_head(columns), *rows, *self.remarks()]
 
     def remarks(self) -> list[str]:
-        row, said = self.row, []
+        row, said = self._row, []
         if self.onset:
             at = row.text(self.onset["value"])
             said.append(f"The branch starts at the onset at {at}, {self.onset['frequency']:.4g} Hz.")

@@ -251,7 +251,7 @@ class OnsetResult(RangeResult):
         """Lines on the points of some classes under one flow model."""
         if not points:
             return [fixed, self._without_onset(parts)]
-        unit = self.row.shown_unit
+        unit = self._row.shown_unit
         head = (
             f"{self.parameter + (f', {unit}' if unit else ''):>16} {'+-':>9} {'Hz':>8}  "
             f"{'':<28}{'below, 1/s':>11}{'above, 1/s':>11}"
@@ -266,7 +266,7 @@ class OnsetResult(RangeResult):
 
     def _without_onset(self, parts: Sequence[FoundOnsets]) -> str:
         values, verdicts = parts[0].values.tolist(), parts[0].verdicts
-        scanned = f"from {self.row.span(*(values[:1] + values[-1:] or (math.nan, math.nan)))}"
+        scanned = f"from {self._row.span(*(values[:1] + values[-1:] or (math.nan, math.nan)))}"
         if not self.complete:
             return f"No onset has been located yet: the search ended early, after {len(values)} values {scanned}."
         invalid = [verdict.outcome for verdict in verdicts].count(NOT_VALID)
@@ -287,7 +287,7 @@ class OnsetResult(RangeResult):
         return f"No onset: the valve is {'unstable' if {False} in states else 'stable'} {scanned} in {which}."
 
     def _line(self, point: dict[str, Any]) -> str:
-        scale = self.row.scale
+        scale = self._row.scale
         becomes = "unstable above" if point["gains"] else "stable above"
         which = CRITICALITY.get(point["criticality"], point["criticality"])
         words = becomes + (f", {which}" if which else "") if point["edge"] else f"a further mode {becomes}"

@@ -484,7 +484,7 @@ class ResponseResult(RangeResult):
 
     def lines(self) -> list[str]:
         units = self.case.units
-        row, unit, flow = self.row, units.name("flow"), units.factor("flow")
+        row, unit, flow = self._row, units.name("flow"), units.factor("flow")
         said = [f"At {describe_fixed(self.case, self.parameter)}; {self.noise}:"]
         head = f"{self.parameter:>14}{'damping, %':>12}{'at, Hz':>10}{'lip rms, um':>13}{'flow rms, ' + unit:>15}"
         said.append(f"{head}{'correlation, s':>16}")

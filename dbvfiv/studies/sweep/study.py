@@ -470,7 +470,7 @@ class SweepResult(RangeResult):
 
     def lines(self) -> list[str]:
         crossings = [crossing_line(self, crossing) for crossing in self.crossings()]
-        row = self.row
+        row = self._row
         unit, places = row.shown_unit, ", ".join(f"{check['value'] / row.scale:.4g}" for check in self.checks)
         word = "Certified" if self.certified else "Not certified"
         checked = (
@@ -527,7 +527,7 @@ def crossing_line(result: SweepResult, crossing: Crossing) -> str:
     """One sentence on a crossing of zero growth."""
     becomes = "unstable" if crossing.to_unstable else "stable"
     how = f"at {crossing.frequency:.4g} Hz" if crossing.frequency > 0 else "without oscillation"
-    place = result.row.amount(crossing.value, 4)
+    place = result.case.units.parameter(result.parameter).amount(crossing.value, 4)
     under = f" under {result.case.continuity}" if result.case.continuity else ""
     return f"Branch {crossing.branch} becomes {becomes} near {result.parameter} {place} {how}{under} (interpolated)."
 

@@ -492,7 +492,7 @@ class UncertaintyResult(RangeResult):
         return f"Under {law} {same} of {count} samples have the outcome of {self.case.fluid.continuity}."
 
     def lines(self) -> list[str]:
-        row = self.row
+        row = self._row
         fixed = describe_fixed(self.case, self.parameter, *(one.name for one in self.plan.inputs))
         place = f"{self.parameter}, {row.shown_unit}".rstrip(", ")
         head = f"{place:>16}{'flutters':>10}  {'95 % interval':<17}"
@@ -523,7 +523,7 @@ class UncertaintyResult(RangeResult):
         said, *others = ("-" if one is None else f"{one:.3g}" for one in chances)
         interval = "{:.2g} to {:.2g}".format(*point["interval"])
         spread = "-" if middle is None else "{} ({} to {})".format(*(digits(100 * x) for x in (middle, low, high)))
-        value = point["value"] / self.row.scale
+        value = point["value"] / self._row.scale
         counts = "".join(f"{one:>10}" for one in others) + f"{point['undecided']:10d}{point['samples']:9d}"
         return f"{value:16.6g}{said:>10}  {interval:<17}{counts}  {spread}"
 
