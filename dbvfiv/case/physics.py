@@ -118,6 +118,13 @@ class Fluid(Section):
         """Viscosity, Pa s; 0 without any."""
         return VISCOSITIES.get(self.viscosity, self.viscosity)
 
+    @property
+    def compressed(self) -> dict[str, float] | None:
+        """Speed of sound, m/s, and ratio of the heat capacities of a fluid that is compressed."""
+        if self.sound_speed is None:
+            return None
+        return {"sound_speed": self.sound_speed, "heat_capacity_ratio": self.heat_capacity_ratio}
+
 
 class Drive(Section):
     """The load."""

@@ -121,10 +121,15 @@ class GasChannel(AroundChannel):
 
     def enthalpy(self, sigma, parameters):
         """Integrals of dp/rho from the pressure around the jet, m2/s2; traceable."""
-        c = parameters["sound_speed"]
         liquid, boiling = self._boiling(sigma, parameters)
-        found = c * grown(liquid, (parameters["heat_capacity_ratio"] - 1.0) / c)
-        return found + c * VAPOUR**2 * boiling if self.boils else found
+        found = self.isentropic(liquid, parameters)
+        return found + parameters["sound_speed"] * VAPOUR**2 * boiling if self.boils else found
+
+    @staticmethod
+    def isentropic(sigma, parameters):
+        """Enthalpies, m2/s2, over that around the jet, of a fluid that does not boil; traceable."""
+        c = parameters["sound_speed"]
+        return c * grown(sigma, (parameters["heat_capacity_ratio"] - 1.0) / c)
 
     def _boiling(self, sigma, parameters):
         """sigma, m/s, down to where the fluid boils, and what is below that; traceable."""
@@ -133,14 +138,16 @@ class GasChannel(AroundChannel):
         limit = self.compression(self.vapour, parameters)
         return jnp.maximum(sigma, limit), jnp.minimum(sigma - limit, 0.0)
 
-    def compression(self, pressure, parameters):
+    @staticmethod
+    def compression(pressure, parameters):
         """sigma, m/s, of pressures over that around the jet, Pa; of those that no gas has, as of next to none;
         traceable.
         """
         c, ratio = parameters["sound_speed"], parameters["heat_capacity_ratio"]
         return c / ratio * jnp.log1p(jnp.maximum(ratio * pressure / (parameters["density"] * c * c), NOTHING - 1.0))
 
-    def outlet(self, speed, parameters):
+    @staticmethod
+    def outlet(speed, parameters):
         """sigma, m/s, at the outlet with a speed, m/s: zero up to that of sound, beyond such that it is that."""
         c = parameters["sound_speed"]
         over = jnp.log(jnp.maximum(speed / c, 1.0))

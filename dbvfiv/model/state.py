@@ -5,12 +5,15 @@ results (heads, head loss, loss and flow coefficients K, Kv, Cv).
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass
+from typing import NamedTuple
 
 import numpy as np
 
 from ..case.quantity import GRAVITY, WATER, head_of
 from ..errors import SolveError
+from ..flow.gas import GasChannel
 from ..geometry.valve_mesh import ValveMesh
 from ..shell.mesh import nodal_thickness
 from ..shell.shell import Shell
@@ -74,6 +77,8 @@ class SteadyState:
     rounding : float
         Relative residual that rounding alone explains.
     reason : str
+    compressed : mapping or None
+        Of a compressed fluid sound_speed, m/s, around the jet, and heat_capacity_ratio.
     """
 
     pressure: float
@@ -105,6 +110,7 @@ class SteadyState:
     residual: float
     rounding: float
     reason: str
+    compressed: Mapping[str, float] | None
 
     @property
     def is_sealed(self) -> bool:
@@ -117,25 +123,28 @@ class SteadyState:
         """
         return float(np.sqrt(self.mass_flow * self.volume_flow / density))
 
+    def static_head(self, pressure: float) -> float:
+        """Static head, m, of its fluid at a pressure, Pa, over that of the surroundings."""
+        around, density = self.outlet_pressure, self.mass_flow / self.volume_flow
+        return head_of(around, density) + _Flange.of(pressure - around, density, 0.0, self.compressed).head
+
     @property
     def hydraulics(self) -> Hydraulics | None:
         """Heads, loss and coefficients; None where nothing flows."""
         if not self.volume_flow > 0:
             return None
-        density = self.mass_flow / self.volume_flow
-        velocity = float(self.station_velocity[-1])
-        pressure = self.flange_pressure - self.level_pressure
         return Hydraulics.of(
-            pressure,
-            density,
+            self.flange_pressure - self.level_pressure,
+            self.mass_flow / self.volume_flow,
             self.volume_flow,
-            velocity,
+            float(self.station_velocity[-1]),
             self.line_loss,
             around=self.outlet_pressure,
             jet_velocity=self.outlet_velocity,
             recovered=self.recovered_pressure,
             velocity=self.downstream_velocity,
             tail_loss=self.tail_loss,
+            compressed=self.compressed,
         )
 
 
@@ -186,6 +195,7 @@ def describe_state(model: ValveModel, q: np.ndarray, pressure: float, **solution
         station_velocity=speeds,
         station_pressure=station_pressure,
         stops=model.touching(q),
+        compressed=model.case.fluid.compressed,
         **solution,
     )
 
@@ -285,6 +295,25 @@ class LipCentre:
         return np.where(self._unknowns >= 0, np.asarray(q)[np.maximum(self._unknowns, 0)], 0.0)
 
 
+class _Flange(NamedTuple):
+    """A fluid at the flange, against that around the jet."""
+
+    head: float  #: m; static.
+    density: float = 1.0  #: At the flange, over that around the jet.
+    jet: float = 1.0  #: In a jet that is faster than sound, over that around it.
+    kept: float = 0.0  #: m; static head of such a jet.
+
+    @classmethod
+    def of(cls, over: float, density: float, jet: float, compressed: Mapping[str, float] | None) -> _Flange:
+        """From the pressure over that around the jet, Pa, the density there, kg/m3, and the speed of the jet, m/s."""
+        if compressed is None:
+            return cls(head_of(over, density))
+        given = {"density": density, **compressed}
+        sigma = np.array([GasChannel.compression(over, given), GasChannel.outlet(jet, given)])
+        inside, kept = (float(head) / GRAVITY for head in GasChannel.isentropic(sigma, given))
+        return cls(inside, *map(float, np.exp(sigma / compressed["sound_speed"])), kept)
+
+
 #: Kv in m3/h at 1 bar over Cv in US gallons a minute at 1 psi (IEC 60534-1).
 CV_OVER_KV = 1.156
 
@@ -304,7 +333,8 @@ class Hydraulics:
     """
 
     flange_velocity: float  #: m/s.
-    #: m; total head at the flange, static and velocity head, of the fluid, over that of the surroundings.
+    #: m; total head at the flange, static and velocity head, of the fluid, over that of the surroundings. The static
+    #: head of a compressed fluid is its enthalpy over that around the jet.
     total_head: float
     #: m; total head that ends in the valve and its jet: from the flange to the fluid at rest around a free discharge,
     #: or to the downstream pipe where the jet has widened.
@@ -338,6 +368,7 @@ class Hydraulics:
         recovered: float = 0.0,
         velocity: float = 0.0,
         tail_loss: float = 0.0,
+        compressed: Mapping[str, float] | None = None,
     ) -> Hydraulics:
         """Hydraulics of a flow, by default of a free discharge into the surroundings, whose pressure is 0.
 
@@ -346,7 +377,9 @@ class Hydraulics:
         pressure : float, Pa
             Static, at the flange.
         density : float, kg/m3
+            Around the jet.
         volume_flow : float, m3/s
+            At that density.
         flange_velocity : float, m/s
         line_loss : float, m
         around : float, Pa
@@ -359,14 +392,20 @@ class Hydraulics:
             In that pipe; 0 without one.
         tail_loss : float, m
             Head lost in that pipe up to its far end.
+        compressed : mapping, optional
+            Of a compressed fluid sound_speed, m/s, around the jet, and heat_capacity_ratio.
         """
+        inside = _Flange.of(pressure - around, density, jet_velocity, compressed)
         velocity_head = flange_velocity**2 / (2 * GRAVITY)
-        total = head_of(pressure, density) + velocity_head
+        total = head_of(around, density) + inside.head + velocity_head
         flows = velocity_head > 0
         static = around + recovered
         loss = total - head_of(static, density) - velocity**2 / (2 * GRAVITY)
-        drop = pressure - static
-        kv = 3600 * volume_flow * math.sqrt(density / WATER * 1e5 / drop) if drop > 0 else math.nan
+        # water loses what the jet does, and flows through the flange as much as through the lips
+        flow = volume_flow / inside.jet
+        speeds = (flange_velocity * inside.density / inside.jet) ** 2 - (velocity / inside.jet) ** 2
+        drop = density * (GRAVITY * (loss - inside.kept) - 0.5 * speeds)
+        kv = 3600 * flow * math.sqrt(density / WATER * 1e5 / drop) if drop > 0 else math.nan
         return cls(
             flange_velocity=flange_velocity,
             total_head=total,

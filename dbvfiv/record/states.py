@@ -150,8 +150,8 @@ def read_layers(record: Record, table: str, row: int) -> LayerFields:
 
 def read_states(record: Record, table: str) -> list[SteadyState]:
     """States that a table of a record holds."""
-    rows = record.table_rows(TableSpec(table, STATE_COLUMNS))
-    return [SteadyState(q=record.mesh.restrict(row["nodal"]), **row) for row in rows]
+    rows, compressed = record.table_rows(TableSpec(table, STATE_COLUMNS)), record.header.case.fluid.compressed
+    return [SteadyState(q=record.mesh.restrict(row["nodal"]), compressed=compressed, **row) for row in rows]
 
 
 def restart_row(path: LoadSteps) -> dict[str, Any]:

@@ -116,7 +116,7 @@ def left_by_line(case: Case, state: Any, flow: np.ndarray) -> np.ndarray:
     found, own = state.hydraulics, 1e3 * state.volume_flow
     square, head = (flow / own) ** 2, np.full_like(flow, found.supply_head)
     if case.drive.at == "line":
-        head += (found.supply_head - head_of(state.pressure - case.level_pressure, case.fluid.density)) * (square - 1.0)
+        head += (found.supply_head - state.static_head(state.pressure - case.level_pressure)) * (square - 1.0)
     if (pump := pump_of(case)) is not None:
         given = np.array([float(pump.curve(q)) if pump.holds(q) else np.nan for q in 1e-3 * flow])
         head += given - float(pump.curve(1e-3 * own))
