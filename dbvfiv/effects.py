@@ -41,6 +41,7 @@ EFFECTS = {
     "of its power below": ("root mean squares without that share", "response.count"),
     "of its power above": ("root mean squares without that share", "response.max_frequency"),
     "turns round beside the onset": ("no cycles between the onset and the fold", "-"),
+    "is above transient.local_error": ("unknown", "transient.smallest_step"),
     "A state of a run does not hold": ("another motion from the first instant on", "-"),
     "case file that was asked for is left out": ("none on the result", "-"),
     "asks for all symmetry classes": ("none within the class of the model", "closure.symmetry"),

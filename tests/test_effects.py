@@ -96,6 +96,11 @@ MENDED = {
     "before a valve of": (oddities, ["upstream.length=3 m", "upstream.diameter=45 mm"], "300 mm"),
     "and its jet of": (oddities, ["fluid.density=1"], "343 m/s"),
     "a gas, of which": (oddities, ["fluid.density=1", "drive.pressure=1 m"], "1 mH2O"),
+    "is above transient.local_error": (
+        of_study("transient"),
+        ["transient.adaptive=true", "transient.duration=4 ms", "transient.step=1 ms", "transient.smallest_step=1"],
+        "0.001",
+    ),
     "held shut by its supports": (of_closed, ["closure.supports=held-lips"], "contact"),
     "of its power below": (of_spectrum, ["response.max_frequency=20 kHz", "response.count=16"], "400"),
     "of its power above": (of_spectrum, ["response.max_frequency=40 Hz"], "60 Hz"),

@@ -35,6 +35,8 @@ class FixedSteps:
         Steps of the present length since the last point of the nominal grid.
     """
 
+    coarse = 0  #: No local error is asked for.
+
     def __init__(self, stepper: Stepper, options: ControlOptions):
         self.stepper, self.options = stepper, options
         self.level = self.offset = self.successes = self.halvings = 0
@@ -73,12 +75,21 @@ class FixedSteps:
 
 
 class AdaptiveSteps:
-    """Steps that keep the local error near a target; a step is changed only where it pays for a new factorisation."""
+    """Steps that keep the local error near a target; a step is changed only where it pays for a new factorisation.
+
+    Attributes
+    ----------
+    coarse : int
+        Steps of the smallest length whose error is above the target all the same.
+    largest_error : float, m
+        Of those.
+    """
 
     def __init__(self, stepper: Stepper, options: ControlOptions):
         self.stepper, self.options = stepper, options
         self.h = options.step
-        self.halvings = 0
+        self.halvings = self.coarse = 0
+        self.largest_error = 0.0
 
     def advance(self, state: MotionState, end: float) -> StepResult:
         """One accepted step, not beyond `end`. Raises StepFailure if the smallest step failed too."""
@@ -96,10 +107,13 @@ class AdaptiveSteps:
             if np.isnan(result.error):
                 return result
             ratio = (self.options.error / max(result.error, 1e-30)) ** (1.0 / 3.0)
-            if ratio < 0.7 and 0.5 * h >= smallest:
-                self.h = max(smallest, h * max(0.3, 0.9 * ratio))
-                self.stepper.take_back()
-                continue
+            if ratio < 0.7:
+                if 0.5 * h >= smallest:
+                    self.h = max(smallest, h * max(0.3, 0.9 * ratio))
+                    self.stepper.take_back()
+                    continue
+                self.coarse += 1
+                self.largest_error = max(self.largest_error, result.error)
             if h == self.h and not 0.8 < ratio < 1.6:
                 self.h = min(self.options.step, max(smallest, self.h * min(2.0, 0.9 * ratio)))
             return result

@@ -188,6 +188,7 @@ def test_steps_are_not_halved_for_ever():
     for _ in range(6):
         state = control.advance(state, 1.0).state
     assert min(stepper.taken) == control.h == pytest.approx(1e-4)
+    assert control.coarse >= 5 and control.largest_error == pytest.approx(1.0)
 
 
 def test_adaptive_steps_follow_the_error(valve, open_state):

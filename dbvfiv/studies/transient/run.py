@@ -426,6 +426,13 @@ class Runner:
         said = beyond_model(self.history, self.case.vacuum_pressure, around) if self.model.flow.has_fluid else None
         if said:
             self.record.warn(said)
+        if coarse := self.control.coarse:
+            step = self.options.control.step * self.options.control.smallest
+            self.record.warn(
+                f"The local error of {coarse} of {progress.steps} steps is above transient.local_error, "
+                f"{1e3 * self.options.control.error:.3g} mm, up to {1e3 * self.control.largest_error:.3g} mm: "
+                f"transient.smallest_step allows none shorter than {step:.3g} s."
+            )
         return self
 
     def _fail(self, sentence: str) -> None:
