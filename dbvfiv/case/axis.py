@@ -176,14 +176,14 @@ Point = Annotated[
 
 _PRESSURE = PARAMETERS["pressure"]
 _ALLOWED = (
-    f"it must be a pressure greater than 0 kPa and at most {_PRESSURE.high / 1e3:g} kPa, such as '36 kPa', or a head "
+    f"it must be a pressure of at least 0 kPa and at most {_PRESSURE.high / 1e3:g} kPa, such as '36 kPa', or a head "
     "of the fluid, such as '2 m'"
 )
 
 
 def read_pressures(given: Iterable[Any], name: str, density: float | None = None) -> tuple[float, ...]:
     """Pressures in Pa from numbers and texts with units, heads of a fluid of that density, kg/m3, included. Raises
-    CaseError for anything that is not a pressure above zero and up to 10 MPa; `name` says in the sentence where it was
+    CaseError for anything that is not a pressure from 0 to 10 MPa; `name` says in the sentence where it was
     given.
     """
     found = []
@@ -192,7 +192,7 @@ def read_pressures(given: Iterable[Any], name: str, density: float | None = None
             pressure = _PRESSURE.quantity.parse(number_or_text(value), density)
         except ValueError as error:
             raise CaseError(f"{name} is given as {value!r}, {error}; {_ALLOWED}.") from None
-        if not 0 < pressure <= _PRESSURE.high:
+        if not 0 <= pressure <= _PRESSURE.high:
             raise CaseError(f"{name} is given as {value!r}; {_ALLOWED}.")
         found.append(pressure)
     if not found:

@@ -27,6 +27,8 @@ Viscosity = Annotated[
     ),
 ]
 
+#: A pressure that drives a flow, alone or beside the fluid's own weight.
+DrivePressure = Annotated[Pressure, Field(ge=0, le=PARAMETERS["pressure"].high)]
 #: A pressure that loads the valve: above zero, and within what the parameter may be.
 LoadPressure = Annotated[Pressure, Field(**PARAMETERS["pressure"].limits)]
 
@@ -134,12 +136,10 @@ class Drive(Section):
     kind: Literal["flow", "uniform"] = key(
         "flow", "Pressure from the flow through the valve, or one uniform pressure without flow."
     )
-    pressure: Pressure = key(
+    pressure: DrivePressure = key(
         18e3,
         "Static pressure at the flange over that of the surroundings (flow), or the pressure on the wall (uniform). "
         "With a line upstream it is the pressure at its far end: see drive.at. It works against downstream.pressure.",
-        ge=0,
-        le=PARAMETERS["pressure"].high,
     )
     head: Annotated[float, Quantity("m", "m")] | None = key(
         None,

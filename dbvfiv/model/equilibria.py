@@ -88,8 +88,10 @@ class LoadPath(LoadSteps):
     def _check_drive(self, target: float) -> None:
         """Refuse a pressure that does not drive the flow; with gravity a valve that holds still fluid hangs as well."""
         back, level = self.model.flow.back, self.model.flow.level
-        if not back or target > back or (target == back and self.model.weight is not None):
+        if target > back or (target == back and self.model.weight is not None):
             return
+        if not self.model.flow.has_fluid:
+            raise SolveError(f"{target:.6g} Pa is no load: nothing presses on the wall.")
         by_level = f", {level:.6g} Pa of it by the level of the lips," if level else ""
         raise SolveError(
             f"At {target:.6g} Pa nothing flows: the pressure downstream is {back:.6g} Pa{by_level} and the drive must "

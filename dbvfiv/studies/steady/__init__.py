@@ -17,7 +17,7 @@ from pydantic import StrictInt, ValidationInfo, field_validator
 from ...case.axis import parse_axis
 from ...case.measured import AREA, DISCHARGE, MEASURED_FILES, SHAPE, TAPS, find_measured
 from ...case.model import Case
-from ...case.physics import LoadPressure
+from ...case.physics import DrivePressure
 from ...case.quantity import Number, Quantity, head_of, number_or_text
 from ...case.section import Section, key
 from ...case.units import Units, factor_of
@@ -32,7 +32,7 @@ class Keys(Section):
 
     told_by_giving = ("pressures",)
 
-    pressures: tuple[LoadPressure, ...] = key(
+    pressures: tuple[DrivePressure, ...] = key(
         (2e3, 6e3, 12e3, 18e3, 24e3, 29e3, 36e3, 50e3),
         "Static inlet pressures of the head-discharge curve.",
         min_length=1,
