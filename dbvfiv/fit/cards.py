@@ -31,8 +31,8 @@ from dbvfiv.materials.shipped import published_rubber, rubber, shipped_loss, shi
 from dbvfiv.texts import listed, shortly
 
 if TYPE_CHECKING:
-    from dbvfiv.case import Case
     from dbvfiv.case.damping import Relaxing
+    from dbvfiv.case.model import Case
 
 
 #: Largest error of a fit that passes without a note.

@@ -31,7 +31,7 @@ from dbvfiv.case.axis import parse_stability_axis
 from dbvfiv.case.quantity import GRAVITY
 from dbvfiv.case.valve import Valve
 from dbvfiv.errors import CaseError
-from dbvfiv.geometry import key_point_table
+from dbvfiv.geometry.surface import key_point_table
 from dbvfiv.studies.case import Case, load_case
 from tests.app.server import COARSE
 

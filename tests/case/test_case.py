@@ -13,19 +13,20 @@ import numpy as np
 import pytest
 
 import dbvfiv
-from dbvfiv.case import Case as PhysicsCase
-from dbvfiv.case import CaseError, make_case, parse_axis
-from dbvfiv.case.axis import parse_point
+from dbvfiv.case.axis import parse_axis, parse_point
 from dbvfiv.case.describe import SYNONYMS, explain, page, walk
 from dbvfiv.case.key_points import read_key_points
+from dbvfiv.case.load import make_case
 from dbvfiv.case.materials import shear_modulus_of
 from dbvfiv.case.measured import read_measured
+from dbvfiv.case.model import Case as PhysicsCase
 from dbvfiv.case.model import change_case
 from dbvfiv.case.parameters import PARAMETERS
 from dbvfiv.case.quantity import Quantity
 from dbvfiv.case.tables import read_drive_table, read_pump_table
 from dbvfiv.case.valve import PRESETS
 from dbvfiv.case.write import case_toml
+from dbvfiv.errors import CaseError
 from dbvfiv.fit.curves import read_curves
 from dbvfiv.studies import KINDS
 from dbvfiv.studies.case import THESIS, Case, load_case, thesis_case

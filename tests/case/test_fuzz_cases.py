@@ -8,11 +8,11 @@ import re
 import numpy as np
 import pytest
 
-from dbvfiv.case import CaseError
 from dbvfiv.case.describe import walk
 from dbvfiv.case.parameters import PARAMETERS
 from dbvfiv.case.write import case_toml
-from dbvfiv.geometry import valve_mesh
+from dbvfiv.errors import CaseError
+from dbvfiv.geometry.valve_mesh import valve_mesh
 from dbvfiv.studies.case import Case, load_case
 
 KEYS = [info.key for info in walk(Case)]

@@ -5,10 +5,10 @@ import pickle
 import numpy as np
 import pytest
 
-from dbvfiv.case import CaseError
 from dbvfiv.case.axis import parse_stability_axis
 from dbvfiv.case.describe import allowed_words, walk
 from dbvfiv.case.parameters import DESIGN, PARAMETERS, SURROUNDINGS, SWEPT, SYSTEM_NAMES, Mu, listed
+from dbvfiv.errors import CaseError
 from dbvfiv.model.build import build_section
 from dbvfiv.studies.case import Case, load_case, thesis_case
 from dbvfiv.studies.session import KEYWORDS, Session, named_changes

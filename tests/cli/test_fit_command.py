@@ -11,7 +11,7 @@ from dbvfiv.fit.cards import law_from_card
 from dbvfiv.fit.curves import loading_tests, read_tests
 from dbvfiv.fit.report import toml_table
 from dbvfiv.fit.rubber import fit_rubber, form_of
-from dbvfiv.materials import published_rubber, rubber
+from dbvfiv.materials.shipped import published_rubber, rubber
 from dbvfiv.studies.case import load_case
 
 TRELOAR = str(Path(__file__).parents[1] / "fit" / "treloar.csv")

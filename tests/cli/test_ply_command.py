@@ -8,7 +8,7 @@ import pytest
 
 from dbvfiv.fit.cards import law_from_card
 from dbvfiv.fit.ply import StripTest
-from dbvfiv.materials import fibre_ply, ply_from_constituents
+from dbvfiv.materials.laws import fibre_ply, ply_from_constituents
 from dbvfiv.studies.case import load_case
 
 

@@ -10,12 +10,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from dbvfiv.case import CaseError
 from dbvfiv.case.damping import SHIPPED_LOSSES
 from dbvfiv.case.parameters import Mu
+from dbvfiv.errors import CaseError
 from dbvfiv.fit import damping_of, relaxation_from_case
 from dbvfiv.fit.cards import describe_damping, outside_band, rayleigh_constants, rayleigh_ratio, read_frequencies
-from dbvfiv.materials import MaterialError, shipped_loss, shipped_loss_names
+from dbvfiv.materials.laws import MaterialError
+from dbvfiv.materials.shipped import shipped_loss, shipped_loss_names
 from dbvfiv.model.build import build_section
 from dbvfiv.model.relaxing import WallRelaxation
 from dbvfiv.studies.case import Case, thesis_case

@@ -7,7 +7,9 @@ import pytest
 
 from dbvfiv.fit import TensionTest, fit_rubber, form_of, uniaxial_stress
 from dbvfiv.fit.curves import read_curves, read_tests
-from dbvfiv.materials import MaterialError, MooneyRivlin, published_rubber, stable_range
+from dbvfiv.materials.laws import MaterialError, MooneyRivlin
+from dbvfiv.materials.shipped import published_rubber
+from dbvfiv.materials.stability import stable_range
 
 
 def _test_of(law, largest, count=30, noise=0.0, seed=0):

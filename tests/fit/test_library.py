@@ -5,20 +5,21 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from dbvfiv.case import Case, CaseError, make_case
+from dbvfiv.case.load import make_case
 from dbvfiv.case.materials import KINDS
+from dbvfiv.case.model import Case
+from dbvfiv.errors import CaseError
 from dbvfiv.fit import law_from_case, uniaxial_stress
 from dbvfiv.fit.cards import CARD_KINDS
-from dbvfiv.materials import (
+from dbvfiv.materials.laws import (
     IsotropicElastic,
     MooneyRivlin,
     OrthotropicPly,
     SofteningRubber,
     fibre_ply,
     ply_from_constituents,
-    published_rubber,
-    rubber,
 )
+from dbvfiv.materials.shipped import published_rubber, rubber
 from dbvfiv.studies.case import thesis_case
 
 

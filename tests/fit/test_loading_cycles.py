@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from dbvfiv.fit import TensionTest, form_of
 from dbvfiv.fit.curves import describe_cycles, hysteresis_loss, loading_tests, read_tests
 from dbvfiv.fit.report import describe_fits
-from dbvfiv.materials import MaterialError
+from dbvfiv.materials.laws import MaterialError
 
 NEO = form_of("neo-hookean")
 

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from dbvfiv.fit import TensionTest
 from dbvfiv.fit.ply import StripTest, constituents_of, fit_ply, read_strip_test
-from dbvfiv.materials import MaterialError, OrthotropicPly, fibre_ply, ply_from_constituents
+from dbvfiv.materials.laws import MaterialError, OrthotropicPly, fibre_ply, ply_from_constituents
 
 APP_A = {
     "fibre_fraction": 0.45,

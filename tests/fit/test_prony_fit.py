@@ -8,8 +8,8 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from dbvfiv.fit import fit_constant, fit_moduli, fit_relaxation, fit_tan_delta
-from dbvfiv.materials import MaterialError, Prony
-from dbvfiv.materials.prony import relaxation_times
+from dbvfiv.materials.laws import MaterialError
+from dbvfiv.materials.prony import Prony, relaxation_times
 from dbvfiv.studies.case import thesis_case
 
 BAND = (1.0, 200.0)

@@ -18,8 +18,9 @@ from dbvfiv.fit import TensionTest, fit_rubber, form_of
 from dbvfiv.fit.curves import MODES, loading_tests, read_curves, read_tests
 from dbvfiv.fit.report import describe_fits, toml_table
 from dbvfiv.fit.rubber import LEAST_MARGIN, RAYS
-from dbvfiv.materials import MaterialError, published_rubber, rubber_names, strain_levels
 from dbvfiv.materials.energy import rubber_energy
+from dbvfiv.materials.laws import MaterialError
+from dbvfiv.materials.shipped import published_rubber, rubber_names, strain_levels
 from dbvfiv.materials.stability import hill_margin
 from dbvfiv.studies.case import load_case
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from dbvfiv.flow import RowAreas
-from dbvfiv.geometry import valve_mesh
+from dbvfiv.geometry.valve_mesh import valve_mesh
 from dbvfiv.model.symmetry import SYMMETRIES
 from dbvfiv.shell import DofMap
 from dbvfiv.studies.case import thesis_case

@@ -8,7 +8,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from dbvfiv.case.valve import LipSizes
-from dbvfiv.geometry import lip_section, surface_of, valve_mesh
+from dbvfiv.geometry.sections import lip_section
+from dbvfiv.geometry.surface import surface_of
+from dbvfiv.geometry.valve_mesh import valve_mesh
 from dbvfiv.studies.case import Case
 
 UNIFORM = {"valve.wall": "uniform", "valve.wall_thickness": 0.012}

@@ -8,8 +8,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from dbvfiv.case.model import Case
-from dbvfiv.geometry import surface_of, valve_mesh
 from dbvfiv.geometry.divisions import bend_of_lip, column_division, divide, kinks, row_division
+from dbvfiv.geometry.surface import surface_of
+from dbvfiv.geometry.valve_mesh import valve_mesh
 from dbvfiv.model import ValveModel
 from dbvfiv.model.equilibria import model_warnings
 

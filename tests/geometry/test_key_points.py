@@ -9,10 +9,11 @@ import numpy as np
 import pytest
 
 import dbvfiv
-from dbvfiv.case import CaseError
 from dbvfiv.case.key_points import KeyProfile, read_key_points
-from dbvfiv.geometry import key_point_table, surface_of, valve_mesh
+from dbvfiv.errors import CaseError
 from dbvfiv.geometry.sections import key_point_sections
+from dbvfiv.geometry.surface import key_point_table, surface_of
+from dbvfiv.geometry.valve_mesh import valve_mesh
 from dbvfiv.model import strain_level
 from dbvfiv.report.gather import second_mesh
 from dbvfiv.studies.case import Case, load_case, thesis_case

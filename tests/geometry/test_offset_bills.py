@@ -10,7 +10,8 @@ from dbvfiv.case.mesh import Mesh
 from dbvfiv.case.part import HALF, QUARTER, part_of
 from dbvfiv.case.valve import Valve
 from dbvfiv.errors import CaseError
-from dbvfiv.geometry import key_point_table, valve_mesh
+from dbvfiv.geometry.surface import key_point_table
+from dbvfiv.geometry.valve_mesh import valve_mesh
 
 WIDE = {"lip_half_width": 0.2}
 MESH = Mesh(around=6, along=10)

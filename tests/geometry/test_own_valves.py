@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from dbvfiv.case import CaseError
-from dbvfiv.geometry import valve_mesh
+from dbvfiv.errors import CaseError
+from dbvfiv.geometry.valve_mesh import valve_mesh
 from dbvfiv.studies.case import Case
 from dbvfiv.studies.stability.place import redesigned
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from dbvfiv.case import CaseError
-from dbvfiv.geometry import valve_mesh
+from dbvfiv.errors import CaseError
 from dbvfiv.geometry.divisions import grading
+from dbvfiv.geometry.valve_mesh import valve_mesh
 from dbvfiv.model import ValveModel
 from dbvfiv.model.build import build_shell
 from dbvfiv.model.sizes import ValveSizes

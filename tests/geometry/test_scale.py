@@ -2,7 +2,7 @@
 
 import pytest
 
-from dbvfiv.geometry import valve_mesh
+from dbvfiv.geometry.valve_mesh import valve_mesh
 from dbvfiv.studies.case import Case
 
 OWN = {"valve.lip_half_width": 0.15, "valve.cuff_length": 0.05, "valve.lip_rise": 0.004, "valve.flare_length": 0.04}

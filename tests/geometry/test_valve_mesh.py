@@ -9,9 +9,9 @@ import pytest
 
 from dbvfiv.case.model import Case
 from dbvfiv.errors import CaseError
-from dbvfiv.geometry import surface_of, valve_mesh
 from dbvfiv.geometry.divisions import grading
-from dbvfiv.geometry.valve_mesh import wall_deduction
+from dbvfiv.geometry.surface import surface_of
+from dbvfiv.geometry.valve_mesh import valve_mesh, wall_deduction
 from dbvfiv.model.build import build_shell
 
 VALVE = Case().valve

@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from dbvfiv.materials import MooneyRivlin, rubber
 from dbvfiv.materials.energy import MOONEY_RIVLIN
 from dbvfiv.materials.fatigue import (
     RUBBERS,
@@ -17,6 +16,8 @@ from dbvfiv.materials.fatigue import (
     plane_normals,
     shipped_growth,
 )
+from dbvfiv.materials.laws import MooneyRivlin
+from dbvfiv.materials.shipped import rubber
 from dbvfiv.shell.recovery import stress_at
 
 SOFT = MooneyRivlin.neo_hookean(1e6, 1300.0)

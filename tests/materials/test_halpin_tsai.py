@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from dbvfiv.materials import MaterialError, fibre_ply, halpin_tsai, ply_from_constituents
+from dbvfiv.materials.laws import MaterialError, fibre_ply, halpin_tsai, ply_from_constituents
 
 
 def test_limits_are_series_and_parallel_means():

@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 from dbvfiv.fit import TensionTest, fit_rubber, form_of, uniaxial_stress
-from dbvfiv.materials import MaterialError, published_rubber, rubber, rubber_names, strain_levels
+from dbvfiv.materials.laws import MaterialError
+from dbvfiv.materials.shipped import published_rubber, rubber, rubber_names, strain_levels
 from tests.pages import agrees
 
 DOCUMENT = Path(__file__).parents[2] / "docs/evidence/materials.md"

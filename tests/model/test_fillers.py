@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 import dbvfiv
-from dbvfiv.case import CaseError
 from dbvfiv.case.write import case_toml
+from dbvfiv.errors import CaseError
 from dbvfiv.model import ValveModel
 from dbvfiv.motion.equations import ValveMotion
 from dbvfiv.shell.recovery import layer_fields

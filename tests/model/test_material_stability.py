@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from dbvfiv.materials import stability_margin
+from dbvfiv.materials.stability import stability_margin
 from dbvfiv.model import ValveModel
 from dbvfiv.model.equilibria import LoadPath, SteadyOptions, state_warnings
 from dbvfiv.model.material_stability import material_stability

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import dbvfiv
-from dbvfiv.geometry import valve_mesh
+from dbvfiv.geometry.valve_mesh import valve_mesh
 from dbvfiv.model.outside import OutsideFluid
 from dbvfiv.motion.control import RunOptions
 from dbvfiv.motion.equations import KEPT_WITHIN, MovingOutside, OutsideCorrection, ValveMotion

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.linalg import expm
 
-from dbvfiv.materials import IsotropicElastic
+from dbvfiv.materials.laws import IsotropicElastic
 from dbvfiv.materials.prony import Prony
 from dbvfiv.motion.scheme import scheme
 from dbvfiv.motion.stepper import StepOptions, Stepper, consistent_state

@@ -13,7 +13,7 @@ import pytest
 import dbvfiv
 from dbvfiv.case.valve import Valve
 from dbvfiv.errors import CaseError
-from dbvfiv.geometry import key_point_table
+from dbvfiv.geometry.surface import key_point_table
 from dbvfiv.materials.shipped import published_rubber
 from dbvfiv.model.equilibria import LoadPath
 from dbvfiv.record.files import Attachment, Header, kind_of, read_header, refuse_foreign, write_header

@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from dbvfiv.geometry import valve_mesh
+from dbvfiv.geometry.valve_mesh import valve_mesh
 from dbvfiv.shell import Shell, ShellMesh
 from dbvfiv.studies.case import thesis_case
 from tests.shell.structures import grid, isotropic_section, mixed_section

@@ -10,7 +10,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.sparse.linalg import eigsh
 
-from dbvfiv.materials import IsotropicElastic, OrthotropicPly, published_rubber
+from dbvfiv.materials.laws import IsotropicElastic, OrthotropicPly
+from dbvfiv.materials.shipped import published_rubber
 from dbvfiv.shell import Layer, Section, Shell, ShellMesh
 from dbvfiv.shell.pressure import pressure_force, pressure_stiffness
 from eigen.factor import DirectFactor

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.sparse.linalg import spsolve
 
-from dbvfiv.materials import IsotropicElastic, MooneyRivlin, OrthotropicPly
+from dbvfiv.materials.laws import IsotropicElastic, MooneyRivlin, OrthotropicPly
 from dbvfiv.shell import Layer, Section, Shell, ShellMesh
 from dbvfiv.shell.recovery import layer_fields
 from tests.shell.structures import (

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from dbvfiv.materials import IsotropicElastic, MooneyRivlin, Ogden, OrthotropicPly, SofteningRubber, Yeoh
+from dbvfiv.materials.laws import IsotropicElastic, MooneyRivlin, Ogden, OrthotropicPly, SofteningRubber, Yeoh
 from dbvfiv.shell import Layer, Section, Shell, StepWall
 from dbvfiv.shell.assumed_strain import MITC4
 from tests.differences import difference

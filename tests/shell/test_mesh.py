@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from dbvfiv.materials import IsotropicElastic
+from dbvfiv.materials.laws import IsotropicElastic
 from dbvfiv.shell import DofMap, Layer, Section, Shell, ShellMesh
 from dbvfiv.shell.reference import reference_geometry, thickness_over_radius
 from tests.shell.structures import grid, isotropic_section, rectangle

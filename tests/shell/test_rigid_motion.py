@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from dbvfiv.materials import IsotropicElastic
+from dbvfiv.materials.laws import IsotropicElastic
 from dbvfiv.shell import Layer, Section, Shell, ShellMesh
 from dbvfiv.shell.mass import AVERAGED, MASSES
 from tests.shell.structures import random_state, rectangle, rigid_motion, rotation_about, rotations_to

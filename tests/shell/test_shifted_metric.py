@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from scipy.sparse.linalg import spsolve
 
-from dbvfiv.materials import IsotropicElastic
+from dbvfiv.materials.laws import IsotropicElastic
 from dbvfiv.materials.prony import Prony
 from dbvfiv.shell import Layer, Section, Shell, ShellMesh
 from dbvfiv.shell.reference import bounded_stretch

@@ -7,7 +7,7 @@ import pytest
 import scipy.linalg as la
 from scipy.special import jn_zeros
 
-from dbvfiv.materials import IsotropicElastic
+from dbvfiv.materials.laws import IsotropicElastic
 from dbvfiv.shell import Layer, Section, Shell, ShellMesh, Weight
 
 from .structures import isotropic_section, random_state, rectangle, rigid_motion, rotation_about, solve_path

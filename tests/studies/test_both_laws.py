@@ -7,7 +7,7 @@ import json
 import pytest
 
 import dbvfiv
-from dbvfiv.case import CaseError
+from dbvfiv.errors import CaseError
 from dbvfiv.studies.onset.study import disagreements
 from dbvfiv.studies.stability.dimensions import compare_ranges, compare_states
 from tests.small_valves import SMALL, load_small, settings

@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 
 import dbvfiv
-from dbvfiv.case import CaseError
 from dbvfiv.case.measured import DISCHARGE, read_measured
 from dbvfiv.case.quantity import GRAVITY
+from dbvfiv.errors import CaseError
 from dbvfiv.studies.case import thesis_case
 from dbvfiv.studies.measured import FLOW, MeasuredCurve
 from dbvfiv.studies.steady.figures import draw_together, left_by_line

@@ -6,10 +6,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import dbvfiv
-from dbvfiv.case import CaseError
 from dbvfiv.case.materials import Materials
 from dbvfiv.case.write import case_toml
-from dbvfiv.errors import SolveError
+from dbvfiv.errors import CaseError, SolveError
 from dbvfiv.model import strain_level
 from dbvfiv.model.material_stability import tension_of
 from dbvfiv.model.strain_level import settle_levels

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from dbvfiv.errors import CaseError
-from dbvfiv.materials import IsotropicElastic, MooneyRivlin
 from dbvfiv.materials.fatigue import SHAPE, UNIT, CrackGrowth, shipped_growth
+from dbvfiv.materials.laws import IsotropicElastic, MooneyRivlin
 from dbvfiv.shell import Layer, Section, Shell, ShellMesh
 from dbvfiv.shell.recovery import interlaminar_shear
 from dbvfiv.shell.section import Zones

@@ -7,8 +7,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from dbvfiv.case import CaseError
 from dbvfiv.case.quantity import GRAVITY
+from dbvfiv.errors import CaseError
 from dbvfiv.studies.stability.place import is_surrounding
 from tests.small_valves import FORMER, SMALL, load_small, settings
 from tests.studies.along import check_map, check_neutral, check_sensitivity, check_sweep, check_walk

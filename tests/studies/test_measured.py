@@ -10,8 +10,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import dbvfiv
-from dbvfiv.case import CaseError
 from dbvfiv.case.measured import AREA, DISCHARGE, SHAPE, TAPS, read_measured
+from dbvfiv.errors import CaseError
 from dbvfiv.record.vtkhdf import faces
 from dbvfiv.studies.case import Case, thesis_case
 from dbvfiv.studies.closure import study as closure

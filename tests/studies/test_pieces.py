@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import dbvfiv
-from dbvfiv.case import CaseError
+from dbvfiv.errors import CaseError
 from dbvfiv.studies.stability.derivatives import parameters_of
 from tests.small_valves import load_small
 from tests.studies.along import check_sweep

@@ -9,10 +9,9 @@ import pytest
 from scipy.interpolate import PchipInterpolator
 from scipy.optimize import brentq
 
-from dbvfiv.case import CaseError
 from dbvfiv.case.parameters import Mu
 from dbvfiv.case.quantity import GRAVITY
-from dbvfiv.errors import SolveError
+from dbvfiv.errors import CaseError, SolveError
 from dbvfiv.flow.law import FlowMotion
 from dbvfiv.flow.terms import pump
 from dbvfiv.model import ValveModel

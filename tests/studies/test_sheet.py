@@ -7,7 +7,7 @@ from types import SimpleNamespace
 import pytest
 
 import dbvfiv
-from dbvfiv.case import CaseError
+from dbvfiv.errors import CaseError
 from dbvfiv.studies.case import load_case
 from dbvfiv.studies.session import Session
 from dbvfiv.studies.steady import require_sheet, sheet_rows

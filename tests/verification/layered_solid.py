@@ -14,7 +14,7 @@ import jax.numpy as jnp
 import numpy as np
 import scipy.sparse as sp
 
-from dbvfiv.materials import MooneyRivlin
+from dbvfiv.materials.laws import MooneyRivlin
 from eigen.factor import DirectFactor
 
 BULK_RATIO = 1000.0  # bulk over shear modulus of rubber

@@ -12,7 +12,7 @@ import numpy as np
 
 from dbvfiv.case.parameters import Mu
 from dbvfiv.fit import fit_constant
-from dbvfiv.materials import Prony
+from dbvfiv.materials.prony import Prony
 from dbvfiv.model import LinearisedState, ValveModel, linearise
 from dbvfiv.model.equilibria import LoadPath
 from dbvfiv.model.relaxing import WallRelaxation

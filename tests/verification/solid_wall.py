@@ -17,9 +17,9 @@ import numpy as np
 import scipy.sparse as sp
 from scipy.sparse.linalg import eigsh
 
-from dbvfiv.geometry import surface_of
 from dbvfiv.geometry.divisions import grading
-from dbvfiv.materials import IsotropicElastic
+from dbvfiv.geometry.surface import surface_of
+from dbvfiv.materials.laws import IsotropicElastic
 from dbvfiv.model import ValveModel
 from dbvfiv.studies.case import thesis_case
 from tests.verification import layered_solid

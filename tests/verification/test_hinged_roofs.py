@@ -12,7 +12,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from dbvfiv.materials import OrthotropicPly
+from dbvfiv.materials.laws import OrthotropicPly
 from dbvfiv.shell import Layer, Section, Shell, ShellMesh
 from eigen.factor import DirectFactor
 from tests.shell.structures import grid, isotropic_section

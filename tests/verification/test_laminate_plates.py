@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from scipy.sparse.linalg import splu
 
-from dbvfiv.materials import OrthotropicPly
+from dbvfiv.materials.laws import OrthotropicPly
 from dbvfiv.shell import Layer, Section, Shell, ShellMesh
 from dbvfiv.shell.pressure import pressure_force
 from tests.shell.structures import lowest_frequencies, rectangle, richardson

@@ -9,7 +9,7 @@ import pytest
 import scipy.linalg
 
 from dbvfiv.case.parameters import Mu
-from dbvfiv.materials import IsotropicElastic
+from dbvfiv.materials.laws import IsotropicElastic
 from dbvfiv.materials.prony import Prony
 from dbvfiv.model import ValveModel, linearise
 from dbvfiv.model.build import build_section

@@ -16,8 +16,9 @@ from scipy.integrate import quad
 from scipy.optimize import brentq
 
 from dbvfiv.fit import uniaxial_stress
-from dbvfiv.materials import MooneyRivlin, published_rubber
 from dbvfiv.materials.energy import ENERGIES
+from dbvfiv.materials.laws import MooneyRivlin
+from dbvfiv.materials.shipped import published_rubber
 
 STRETCHES = np.array([0.6, 0.85, 0.99, 1.001, 1.05, 1.2, 1.6, 2.5])
 LAWS = {

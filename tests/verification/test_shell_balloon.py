@@ -7,7 +7,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from dbvfiv.materials import MooneyRivlin
+from dbvfiv.materials.laws import MooneyRivlin
 from dbvfiv.shell import Layer, Section, Shell, ShellMesh
 from dbvfiv.shell.mesh import nodal_directors, tangent_frames
 from tests.shell.structures import pressure_load, richardson, solve_path

@@ -12,10 +12,9 @@ import numpy as np
 import pytest
 from scipy.special import iv, ivp, kv, kvp
 
-from dbvfiv.flow.outside import BODY, ROOM, Panels, PotentialFlow, Surroundings
 from dbvfiv.flow.outside.influence import REFLECTIONS, influence
-from dbvfiv.flow.outside.panels import arc, end_face, extruded, pipe, ring_face, stretched, strip
-from dbvfiv.flow.outside.potential_flow import panel_strength
+from dbvfiv.flow.outside.panels import Panels, arc, end_face, extruded, pipe, ring_face, stretched, strip
+from dbvfiv.flow.outside.potential_flow import BODY, ROOM, PotentialFlow, Surroundings, panel_strength
 from tests.small_valves import make_valve
 
 

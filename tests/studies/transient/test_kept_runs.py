@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import dbvfiv
-from dbvfiv.case import CaseError
+from dbvfiv.errors import CaseError
 from dbvfiv.motion import stepper
 from dbvfiv.motion.control import ControlOptions, RunOptions
 from dbvfiv.motion.scheme import scheme

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from dbvfiv.case import CaseError
+from dbvfiv.errors import CaseError
 from dbvfiv.motion.equations import ValveMotion
 from dbvfiv.studies.session import load_result
 from dbvfiv.studies.transient.run import Runner

@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 
 import dbvfiv
-from dbvfiv.case import CaseError
-from dbvfiv.errors import SolveError
+from dbvfiv.errors import CaseError, SolveError
 from dbvfiv.motion.control import Drive
 from dbvfiv.motion.equations import ValveMotion
 from dbvfiv.motion.start import first_state, steady_positions
