@@ -12,7 +12,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from copy import copy
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from functools import partial
 from typing import Any, ClassVar, NamedTuple
 
@@ -49,34 +49,8 @@ class FlowParameter:
     value: float | None = None  #: What it is unless given; without it, it must be given.
 
 
-@dataclass(frozen=True)
-class FluidOperators:
-    """Linearised flow.
-
-    With a the area and u the inner disturbances,
-
-    p = (A0 + lambda A1 + lambda^2 A2) a + (B0 + lambda B1) u
-    0 = (R0 + lambda R1 + lambda^2 R2) a + (S0 + lambda S1) u
-    """
-
-    #: A0, A1 and A2: (m, m), Pa/m2, Pa s/m2, Pa s2/m2.
-    A0: np.ndarray
-    A1: np.ndarray
-    A2: np.ndarray
-    #: B0 and B1: (m, l).
-    B0: np.ndarray
-    B1: np.ndarray
-    #: R0, R1 and R2: (l, m).
-    R0: np.ndarray
-    R1: np.ndarray
-    R2: np.ndarray
-    #: S0 and S1: (l, l).
-    S0: np.ndarray
-    S1: np.ndarray
-
-    def parts(self) -> dict[str, np.ndarray]:
-        """The arrays by name."""
-        return {field.name: getattr(self, field.name) for field in fields(self)}
+#: Names of the parts of a linearised flow: by area, area rate, area acceleration, the law's unknowns and their rates.
+_OF_PRESSURES, _OF_BALANCES = ("A0", "A1", "A2", "B0", "B1"), ("R0", "R1", "R2", "S0", "S1")
 
 
 def above_floor(area, floor):
@@ -390,13 +364,18 @@ class FlowLaw(Traceable, ABC):
         pressure, residual = call_compiled("equations", self, self._shaped(motion), self.values(given))
         return np.array(pressure), np.array(residual)
 
-    def linearise(self, motion: FlowMotion, given: Mapping[str, float]) -> FluidOperators:
-        """Derivatives of pressures and equations at a motion."""
-        parts = _linearised(self, self._shaped(motion), self.values(given))
-        return FluidOperators(*(np.asarray(part) for part in parts))
+    def linearise(self, motion: FlowMotion, given: Mapping[str, float]) -> dict[str, np.ndarray]:
+        """Derivatives of pressures (m,), Pa, and balances (l,) at a motion, by name: with a the area and u the inner
+        disturbances
 
-    def linearise_still(self, area: np.ndarray, given: Mapping[str, float], inner=None) -> FluidOperators:
-        """Derivatives at a passage at rest, in steady flow unless the inner unknowns are given."""
+        p = (A0 + lambda A1 + lambda^2 A2) a + (B0 + lambda B1) u
+        0 = (R0 + lambda R1 + lambda^2 R2) a + (S0 + lambda S1) u
+        """
+        parts = _linearised(self, self._shaped(motion), self.values(given))
+        return {name: np.asarray(part) for name, part in zip((*_OF_PRESSURES, *_OF_BALANCES), parts)}
+
+    def linearise_still(self, area: np.ndarray, given: Mapping[str, float], inner=None) -> dict[str, np.ndarray]:
+        """Derivatives at a passage at rest, in steady flow unless the inner unknowns are given; see `linearise`."""
         inner = self.steady_inner(area, given) if inner is None else inner
         return self.linearise(FlowMotion.still(np.asarray(area), np.asarray(inner, float)), given)
 
@@ -426,7 +405,7 @@ def call_compiled(method: str, law, *given):
 
 @jax.jit
 def _linearised(law, motion, parameters):
-    """A0, A1, A2, B0, B1, R0, R1, R2, S0, S1 of `dbvfiv.flow.law.FluidOperators`."""
+    """Parts of `FlowLaw.linearise` in the order of their names."""
     pressure, residual = jax.jacfwd(lambda m: law.equations(m, parameters))(motion)
     return (*pressure, *residual)
 

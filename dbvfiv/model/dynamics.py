@@ -80,7 +80,7 @@ class LinearisedState:
         law = self._still_law(given.get("storage"))
         rest = law.with_velocity(law.steady_inner(self.area, given), 0.0)
         law = with_static_lift(law, self.area, rest, given)
-        found = law.shut(self.seal).linearise(FlowMotion.still(self.area, rest), given).parts()
+        found = law.shut(self.seal).linearise(FlowMotion.still(self.area, rest), given)
         parts = self.no_flow(self.model.flow.inner)
         parts["S0"] = np.eye(self.model.flow.inner)
         for name, values in found.items():
@@ -95,7 +95,7 @@ class LinearisedState:
     def fluid_parts(self, given: Mapping[str, float]) -> dict[str, np.ndarray]:
         """A0 to S1 of `eigen.CoupledPencil`: response of the unsteady fluid to `slope`."""
         self.check_pump()
-        return self.model.flow.linearise_still(self.area, given).parts()
+        return self.model.flow.linearise_still(self.area, given)
 
     def steady_parts(self) -> dict[str, np.ndarray]:
         """Matrix of the response of a fluid without inertia to `slope`."""
@@ -157,7 +157,7 @@ class LinearisedState:
     def flow_parts(self, mu: Mapping[str, float]) -> dict[str, np.ndarray]:
         """A0 to S1 of the flow alone at a parameter point; of a steady flow A0 is all."""
         if self.inner is not None:
-            return self.model.flow.linearise(FlowMotion.still(self.area, self.inner), mu).parts()
+            return self.model.flow.linearise(FlowMotion.still(self.area, self.inner), mu)
         given, moving = {**mu, "inlet": self.inlet}, self.model.flow.unsteady
         if self.seal is not None and moving:
             return self.shut_parts(given)

@@ -362,7 +362,7 @@ class PeriodicValve:
         model, rates = self.model(mu), motion.rates
         q, _ = self._split(motion.samples)
         passages, flow = self.passages(motion, mu), self._flow(mu)
-        slopes = [flow.linearise(passage, mu).parts() for passage in passages]
+        slopes = [flow.linearise(passage, mu) for passage in passages]
         parts = {name: np.array([one[name] for one in slopes]) for name in FLUID_PARTS}
         p = np.array([flow.evaluate(passage, mu)[0] for passage in passages])
         memory = self._memory(mu)

@@ -74,9 +74,9 @@ def test_a_pipe_adds_its_inertance_to_every_pressure():
     velocity = bare.steady_inner(area, given)
     ours = Channel(z, FLOOR, 1.0, terms=[Pipe(4.0, 0.0)]).linearise_still(area, given, velocity)
     theirs = bare.linearise_still(area, given, velocity)
-    assert ours.B1[1:] == pytest.approx(theirs.B1[1:] - 850.0 * 4.0)
-    assert ours.S1 == pytest.approx(theirs.S1 - 850.0 * 4.0)
-    assert ours.A2 == pytest.approx(theirs.A2) and ours.B0 == pytest.approx(theirs.B0)
+    assert ours["B1"][1:] == pytest.approx(theirs["B1"][1:] - 850.0 * 4.0)
+    assert ours["S1"] == pytest.approx(theirs["S1"] - 850.0 * 4.0)
+    assert ours["A2"] == pytest.approx(theirs["A2"]) and ours["B0"] == pytest.approx(theirs["B0"])
 
 
 def test_the_key_is_understood_and_makes_the_term():

@@ -64,12 +64,12 @@ def test_the_rigid_column_is_the_limit_of_a_fast_line(storage):
     given, s = {"inlet": SUPPLY, "density": DENSITY}, 20.0 + 250.0j
     column = Channel(z, FLOOR, storage, terms=[Line(7.0, 0.2, **keys)])
     rigid = column.linearise_still(area, given)
-    expected = np.array([rigid.S0 + s * rigid.S1, rigid.B0[5:6] + s * rigid.B1[5:6]]).ravel()
+    expected = np.array([rigid["S0"] + s * rigid["S1"], rigid["B0"][5:6] + s * rigid["B1"][5:6]]).ravel()
     gaps = []
     for speed in (1e4, 1e5, 1e6):
         law = behind(line_of(7.0, speed, **keys), storage)
         found = law.linearise_still(area, given)
-        S, B = found.S0 + s * found.S1, found.B0 + s * found.B1
+        S, B = found["S0"] + s * found["S1"], found["B0"] + s * found["B1"]
         own = la.solve(S[1:, 1:], -S[1:, :1])
         got = np.array([S[0, 0] + S[:1, 1:] @ own[:, 0], B[5, 0] + B[5:6, 1:] @ own[:, 0]]).ravel()
         gaps.append(np.abs(got / expected - 1).max())

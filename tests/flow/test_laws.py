@@ -92,7 +92,7 @@ def test_linearisation_of_any_law(law):
         np.array([1.7, 6e3, 2.1])[:l],
         np.array([4.0, 1e4, -2.0])[:l],
     )
-    found = law.linearise(motion, GIVEN).parts()
+    found = law.linearise(motion, GIVEN)
     directions = (area, 0.02 * np.ones(m), 0.5 * np.ones(m), np.abs(motion.inner), np.abs(motion.inner_rate))
     shapes = {"A": (m, m), "B": (m, l), "R": (l, m), "S": (l, l)}
     assert {name: part.shape for name, part in found.items()} == {name: shapes[name[0]] for name in found}

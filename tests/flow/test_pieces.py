@@ -53,8 +53,8 @@ def test_rigid_pieces_add_inertance_and_losses():
     law, inlet = Channel(z, FLOOR, terms=[term]), 4.0 * area[-1]
     own = np.sqrt(4 * inlet / np.pi)
     ratios = np.array([inlet / area_of(0.2), inlet / area_of(0.1), 1.0])
-    inertance = law.linearise_still(area, {"inlet": SUPPLY, "density": 1.0}).S1[0, 0]
-    bare = Channel(z, FLOOR).linearise_still(area, {"inlet": SUPPLY, "density": 1.0}).S1[0, 0]
+    inertance = law.linearise_still(area, {"inlet": SUPPLY, "density": 1.0})["S1"][0, 0]
+    bare = Channel(z, FLOOR).linearise_still(area, {"inlet": SUPPLY, "density": 1.0})["S1"][0, 0]
     assert bare - inertance == pytest.approx(np.array([3.0, 2.0, 1.0]) @ ratios, rel=1e-12)
     rough = (2 * np.log10(3.7 * own / 1e-4)) ** -2
     zeta = np.array([0.03 * 3.0 / 0.2 + 0.5, 1.0, rough / own])

@@ -73,8 +73,8 @@ def test_a_column_behind_is_one_in_front(storage):
     )
     bare = Channel(z, FLOOR, storage).linearise_still(area, given, inner)
     for name in ("B1", "S1", "A1", "R1", "A2", "R2"):
-        ours = getattr(behind, name) - getattr(still, name)
-        assert ours == pytest.approx(getattr(front, name) - getattr(bare, name), rel=1e-10, abs=1e-6)
+        ours = behind[name] - still[name]
+        assert ours == pytest.approx(front[name] - bare[name], rel=1e-10, abs=1e-6)
 
 
 @pytest.mark.parametrize("expansion", [None, 0.8])
@@ -89,8 +89,8 @@ def test_derivatives_against_differences(storage, velocity, expansion):
     )
     direction = FlowMotion(*(np.abs(x) * generator.standard_normal(x.shape) for x in motion))
     found = law.linearise(motion, given)
-    slope = sum(getattr(found, name) @ d for name, d in zip(("A0", "A1", "A2", "B0", "B1"), direction))
-    rest = sum(getattr(found, name) @ d for name, d in zip(("R0", "R1", "R2", "S0", "S1"), direction))
+    slope = sum(found[name] @ d for name, d in zip(("A0", "A1", "A2", "B0", "B1"), direction))
+    rest = sum(found[name] @ d for name, d in zip(("R0", "R1", "R2", "S0", "S1"), direction))
     step = 1e-5
     (high, up), (low, down) = (
         law.evaluate(FlowMotion(*(x + sign * step * d for x, d in zip(motion, direction))), given) for sign in (1, -1)

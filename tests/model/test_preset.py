@@ -273,8 +273,8 @@ def shut_channel(count: int):
 
     def added(**more) -> tuple[np.ndarray, np.ndarray]:
         found = law.linearise_still(area, given | more, np.zeros(1))
-        kept = np.linalg.solve(found.S1, np.hstack([found.R1, found.R2]))  # nothing passes the seal
-        return tuple(np.hstack([found.A1, found.A2]) - found.B1 @ kept), found.B0
+        kept = np.linalg.solve(found["S1"], np.hstack([found["R1"], found["R2"]]))  # nothing passes the seal
+        return tuple(np.hstack([found["A1"], found["A2"]]) - found["B1"] @ kept), found["B0"]
 
     (moved, ahead) = added()
     rate, acceleration = np.split(np.array(moved), 2, axis=1)

@@ -140,7 +140,7 @@ def test_modes_of_a_flow_without_inertia_have_its_unknowns():
     linear = SimpleNamespace(area=area, slope=slope, model=SimpleNamespace(flow=law))
     walk = SimpleNamespace(built=lambda _: linear, family=lambda _: SimpleNamespace(linear=linear))
     mode = SimpleNamespace(q=random.standard_normal(3) + 1j * random.standard_normal(3), u=np.zeros(0))
-    x, parts = StabilityWalk.unknowns(walk, place, mode), law.linearise_still(area, place.for_system()).parts()
+    x, parts = StabilityWalk.unknowns(walk, place, mode), law.linearise_still(area, place.for_system())
     pressures = parts["A0"] @ slope @ x[:3] + parts["B0"] @ x[3:]
     assert len(x) == 4 and np.allclose(x[:3], mode.q)
     assert np.allclose(pressures, law.steady_operator(area, 6e3)[1] @ slope @ mode.q, rtol=1e-9)

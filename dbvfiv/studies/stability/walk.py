@@ -461,7 +461,7 @@ class StabilityWalk:
         u = mode.u
         if not self.built(place).model.flow.unsteady:
             linear = self.family(place).linear
-            parts = linear.model.flow.linearise_still(linear.area, place.for_system()).parts()
+            parts = linear.model.flow.linearise_still(linear.area, place.for_system())
             u = -np.linalg.solve(parts["S0"], parts["R0"] @ (linear.slope @ mode.q))
         return np.concatenate([mode.q, u])
 

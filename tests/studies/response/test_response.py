@@ -73,7 +73,7 @@ def test_the_pressure_at_a_flange_without_a_line_is_that_which_drives(monkeypatc
     flow = Channel(z, 1e-5, 1.0, terms=[Tail(0.33, 10.0, 1.5)])
     monkeypatch.setattr(study, "LipCentre", lambda *_: None)
     transfer, empty = object.__new__(Transfer), np.zeros((0, 6))
-    parts = flow.linearise_still(area, {"inlet": 6e3, "density": 1000.0}).parts()
+    parts = flow.linearise_still(area, {"inlet": 6e3, "density": 1000.0})
     transfer.pencil = CoupledPencil(*np.zeros((3, 0, 0)), empty, empty.T, **parts)
     model = SimpleNamespace(flow=flow, tail=flow.terms[0], mesh=SimpleNamespace(part=QUARTER), shell=None)
     transfer.linear = SimpleNamespace(model=model, inlet=6e3, area=area)
