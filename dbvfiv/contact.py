@@ -285,16 +285,8 @@ class PlaneContact:
     @cached_property
     def _slots(self) -> np.ndarray:
         """(k, 3, 3) positions of the nodal blocks among the matrix values, -1 where constrained."""
-        dofs = self.shell.dofs
-        indptr, indices = dofs.pattern
-        number = sp.csr_matrix((np.arange(1, len(indices) + 1), indices, indptr), shape=(dofs.size, dofs.size))
         rows = np.repeat(self._unknowns[:, :, None], 3, axis=2)
-        columns = np.repeat(self._unknowns[:, None, :], 3, axis=1)
-        keep = (rows >= 0) & (columns >= 0)
-        slots = np.full(rows.shape, -1, np.int64)
-        if keep.any():
-            slots[keep] = np.asarray(number[rows[keep], columns[keep]]).ravel() - 1
-        return slots
+        return self.shell.dofs.slots_of(rows, rows.transpose(0, 2, 1))
 
 
 def _potential(axis, law, v, data):

@@ -180,16 +180,16 @@ class DofMap:
         """(ne, 20) numbers of the displacements and rotations of an element."""
         return self.index[self.quads].reshape(len(self.quads), -1)
 
-    def _entries(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Rows and columns of all entries of element matrices, and which of them are kept."""
+    def _entries(self) -> tuple[np.ndarray, np.ndarray]:
+        """Rows and columns (ne, 400) of all entries of element matrices."""
         e = self.element_index
-        rows, columns = np.repeat(e, e.shape[1], axis=1).ravel(), np.tile(e, (1, e.shape[1])).ravel()
-        return rows, columns, (rows >= 0) & (columns >= 0)
+        return np.repeat(e, e.shape[1], axis=1), np.tile(e, (1, e.shape[1]))
 
     @cached_property
     def pattern(self) -> tuple[np.ndarray, np.ndarray]:
         """Row pointers and column indices (int32) of the assembled matrices."""
-        rows, columns, keep = self._entries()
+        rows, columns = self._entries()
+        keep = (rows >= 0) & (columns >= 0)
         matrix = sp.csr_matrix((np.ones(keep.sum()), (rows[keep], columns[keep])), shape=(self.size, self.size))
         matrix.sort_indices()
         return matrix.indptr.astype(np.int32), matrix.indices.astype(np.int32)
@@ -197,12 +197,16 @@ class DofMap:
     @cached_property
     def slots(self) -> np.ndarray:
         """(ne, 400) position of each element matrix entry among the matrix values, -1 where constrained."""
+        return self.slots_of(*self._entries())
+
+    def slots_of(self, rows: np.ndarray, columns: np.ndarray) -> np.ndarray:
+        """Positions of entries among the matrix values, by the numbers of their unknowns; -1 where constrained."""
         indptr, indices = self.pattern
         number = sp.csr_matrix((np.arange(1, len(indices) + 1), indices, indptr), shape=(self.size, self.size))
-        rows, columns, keep = self._entries()
-        slots = np.full(rows.shape, -1, np.int32)
-        slots[keep] = np.asarray(number[rows[keep], columns[keep]]).ravel() - 1
-        return slots.reshape(len(self.quads), -1)
+        keep, slots = (rows >= 0) & (columns >= 0), np.full(rows.shape, -1, np.int32)
+        if keep.any():
+            slots[keep] = np.asarray(number[rows[keep], columns[keep]]).ravel() - 1
+        return slots
 
     def matrix(self, data: np.ndarray) -> sp.csr_matrix:
         """Sparse matrix on the common pattern with the given values; shares them."""
