@@ -41,10 +41,6 @@ def _density(default: Any) -> Any:
     return key(default, "Mass density.", gt=0, le=30000)
 
 
-def _poisson(description: str, default: Any = ...) -> Any:
-    return key(default, description, gt=-1, lt=0.5)
-
-
 class MooneyRivlin(Relaxing):
     """Incompressible W = c10 (I1 - 3) + c01 (I2 - 3) + c11 (I1 - 3)(I2 - 3)."""
 
@@ -164,7 +160,7 @@ class Isotropic(Relaxing):
 
     kind: Literal["isotropic"] = key(..., "Linear elastic, isotropic.")
     youngs_modulus: Modulus = key(..., "Young's modulus.", gt=0, le=1e13)
-    poisson_ratio: Number = _poisson("Poisson ratio.")
+    poisson_ratio: Number = key(..., "Poisson ratio.", gt=-1, lt=0.5)
     density: Density = _density(...)
 
 

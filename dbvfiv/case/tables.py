@@ -15,12 +15,12 @@ from .quantity import Quantity
 from .section import Described
 
 
-def read_text_file(path: Path, encoding: str | None = "utf-8-sig") -> str:
-    """Text of a file; in UTF-8, without the mark that some programs put in front, unless told otherwise. Raises
-    ValueError with a clause that completes "KEY is given as FILE, ...".
+def read_text_file(path: Path) -> str:
+    """Text of a file in UTF-8, without the mark that some programs put in front. Raises ValueError with a clause that
+    completes "KEY is given as FILE, ...".
     """
     try:
-        return Path(path).read_text(encoding=encoding)
+        return Path(path).read_text(encoding="utf-8-sig")
     except (FileNotFoundError, NotADirectoryError):
         raise ValueError("which does not exist") from None
     except UnicodeDecodeError:

@@ -190,9 +190,7 @@ def _remainder(motion, parameters, arrays):
     return jnp.concatenate([force.ravel()[arrays["free"]], rest])
 
 
-@jax.jit
-def _value(motion, parameters, arrays):
-    return _remainder(motion, parameters, arrays)
+_value = jax.jit(_remainder)
 
 
 @jax.jit

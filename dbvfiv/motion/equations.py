@@ -54,14 +54,12 @@ class MovingOutside:
     ----------
     renewed : float
         Energy that renewals have added since the start, J of the part.
-    renewals : int
-        How often the added mass changed.
     """
 
     def __init__(self, model: ValveModel, density: float, length: Callable[[np.ndarray], float]):
         self.model, self.density, self._length = model, density, length
         self.within = KEPT_WITHIN * model.case.valve.inlet_radius
-        self.renewed, self.renewals = 0.0, 0
+        self.renewed = 0.0
         self._place: np.ndarray | None = None
         self._mass: AddedMass | None = None
         self._known: list[tuple[np.ndarray, AddedMass]] = []
@@ -94,7 +92,6 @@ class MovingOutside:
     def _change(self, q, v):
         before = None if self._mass is None else self.energy(q, v)
         self._take(q)
-        self.renewals += 1
         if before is not None:
             self.renewed += self.energy(q, v) - before
 
