@@ -83,10 +83,6 @@ class AddedMass:
     def rank(self) -> int:
         return self.columns.shape[1]
 
-    def projected(self, basis: np.ndarray) -> AddedMass:
-        """On the span of columns (n, k)."""
-        return AddedMass(basis.T @ self.columns, self.slowness)
-
     def coupling(self, forces, slope) -> tuple[sp.csr_matrix, sp.csr_matrix]:
         """G (n, m + r) and J (m + r, n): the flow's own with the added mass behind them."""
         own = sp.csr_matrix(self.columns)
@@ -207,10 +203,6 @@ class OutsideFluid:
         fluxes = self.face.fluxes(self.shell.dofs.expand(q))
         count = len(self.shell.mesh.quads), self._opening
         return ShapeDerivative(self._flow(self.equilibria), self.panels(q), *count, fluxes @ left, fluxes @ right)
-
-    def operator(self, q: np.ndarray) -> tuple[sp.csr_matrix, Impedance]:
-        """E (ne, n), m2, and S (ne, ne), 1/m, at a state."""
-        return self.face.fluxes(self.shell.dofs.expand(q)), self.impedance(q)
 
     def resistance(self, q: np.ndarray, motions: np.ndarray, frozen: Panels | None = None) -> np.ndarray:
         """Forces (n, k) of a fluid of unit density on accelerations (n, k): the whole added mass times these."""

@@ -30,8 +30,8 @@ def valve(fluid="same", pressure=10e3, **outside) -> tuple[ValveModel, np.ndarra
 @cache
 def parts(**outside):
     model, q = valve(**outside)
-    fluxes, impedance = model.outside.operator(q)
-    return linearise(model, q, 10e3), fluxes, impedance.matrix()
+    fluxes = model.outside.face.fluxes(model.shell.dofs.expand(q))
+    return linearise(model, q, 10e3), fluxes, model.outside.impedance(q).matrix()
 
 
 def frequencies(state, added, count: int) -> np.ndarray:
