@@ -59,7 +59,7 @@ def modes():
     times = _times(
         {
             "added": lambda: wet.outside.added_mass(q, structure),
-            "operator": lambda: wet.outside.operator(q),
+            "operator": lambda: (wet.outside.face.fluxes(wet.nodal(q)), wet.outside.impedance(q)),
             **{f"pairs {name}": lambda m=model: pairs(m) for name, model in models.items()},
         }
     )
