@@ -104,6 +104,11 @@ class MeasuredCurve:
     computed: np.ndarray
 
     @property
+    def excess(self) -> np.ndarray:
+        """Computed less measured; NaN where there is nothing to compare."""
+        return self.computed - self.measured
+
+    @property
     def difference(self) -> np.ndarray:
         """Computed over measured less 1; NaN where there is nothing to compare."""
         return self.computed / np.where(self.measured > 0, self.measured, np.nan) - 1.0
