@@ -122,6 +122,7 @@ def onset_result(values, growth, certified=None):
     return SimpleNamespace(
         case=case,
         parameter="pressure",
+        axis=case.onset.axis,
         header=SimpleNamespace(name="valve"),
         values=np.array(values),
         growth_rates=rows,

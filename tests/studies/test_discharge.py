@@ -160,7 +160,8 @@ def test_line_and_valve_cross_at_the_operating_point():
     heads = left_by_line(pump, state, np.array([0.0, 30.0, own, 101.0]))
     assert heads[1] - heads[0] == pytest.approx(2.6 - 3.0 - share * numbers.line_loss, rel=1e-9)
     assert heads[2] == pytest.approx(numbers.total_head, rel=1e-9) and np.isnan(heads[3])
-    faster = SimpleNamespace(**vars(state) | {"hydraulics": replace(numbers, supply_head=numbers.supply_head + 0.5)})
+    more = {"hydraulics": replace(numbers, supply_head=numbers.supply_head + 0.5), "static_head": state.static_head}
+    faster = SimpleNamespace(**vars(state) | more)
     heads = left_by_line(found.case.replace({"drive.at": "line"}), faster, np.array([0.0, own]))
     assert heads == pytest.approx([numbers.supply_head, numbers.total_head + 0.5], rel=1e-9)
 
