@@ -186,9 +186,8 @@ class Case(Section):
                 "give it with the unsteady law alone",
             )
         self._check_compression()
-        inlet = 2 * (self.valve.inlet_radius - self.valve.flange_wall_deduction)
-        self.upstream.check_pipes(inlet)
-        self.downstream.check_pipe(inlet, self.valve.bill_reach)
+        self.upstream.check_pipes(self.valve.bore)
+        self.downstream.check_pipe(self.valve.bore, self.valve.bill_reach)
         self.outside.check_pipe(self.valve.outer_diameter)
         return self
 

@@ -514,6 +514,11 @@ class Valve(FollowingSection):
         return factor * profiles[-1].radius if profiles else self.flange_radius
 
     @property
+    def bore(self) -> float:
+        """Diameter in m of the passage at the inlet end."""
+        return 2.0 * (self.inlet_radius - self.flange_wall_deduction)
+
+    @property
     def bill_reach(self) -> float:
         """Distance in m from the axis that the outer face of the lip reaches at rest."""
         profiles, factor = readable_key_points(self.key_points), 1.0 if self._given is None else self.scale

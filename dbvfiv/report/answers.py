@@ -372,8 +372,7 @@ def trade(found: Gathered) -> list[tuple[str, str]]:
     state, steady = found.state(found.heads[-1]), found.get("steady")
     sizes = found.sizes
     bill = " x ".join(units.text_of("size", size, 4) for size in (sizes.bill_width, sizes.bill_height))
-    bore = 2 * (case.valve.inlet_radius - case.valve.flange_wall_deduction)
-    rows += [("bill, width x height", bill), ("bore", units.text_of("size", bore, 4))]
+    rows += [("bill, width x height", bill), ("bore", units.text_of("size", case.valve.bore, 4))]
     if steady is not None and steady.cracking is not None and steady.cracking.pressure is not None:
         over = " over that at rest" if case.rest_pressure else ""
         rows += [("cracking head", f"{units.pressure(steady.cracking.pressure, 3)}{over}")]

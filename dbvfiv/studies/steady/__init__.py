@@ -125,10 +125,9 @@ def command(
 
 def _scale(text: str, case: Case) -> float:
     """Factor valve.scale of a size that is given as a factor or as the bore of its flange."""
-    given, valve = number_or_text(text), case.valve.as_given
+    given = number_or_text(text)
     try:
-        bore = 2 * (valve.inlet_radius - valve.flange_wall_deduction)
-        scale = given if isinstance(given, float) else Quantity("m", "mm").parse(given) / bore
+        scale = given if isinstance(given, float) else Quantity("m", "mm").parse(given) / case.valve.as_given.bore
     except ValueError as error:
         raise CaseError(f"--scale is given as {text!r}, {error}; it must be a factor or a bore.") from None
     if not 1e-3 <= scale <= 1e3:
@@ -166,7 +165,7 @@ class SheetColumn:
 
 
 COLUMNS = (
-    SheetColumn("bore", "size", "mm", lambda s: 2 * _bore(s)),
+    SheetColumn("bore", "size", "mm", lambda s: s.results.case.valve.bore),
     SheetColumn("static head", "head", "m", lambda s: head_of(s.flange_pressure, s.results.case.fluid.density)),
     SheetColumn("static pressure", "pressure", "kPa", lambda s: s.flange_pressure),
     SheetColumn("flow", "flow", "L/s", lambda s: s.volume_flow),
@@ -180,11 +179,6 @@ COLUMNS = (
 )
 #: Column behind the bore, of a valve behind a line.
 FAR = SheetColumn("head at the far end", "head", "m", lambda s: s.head)
-
-
-def _bore(state: Any) -> float:
-    valve = state.results.case.valve
-    return valve.inlet_radius - valve.flange_wall_deduction
 
 
 def require_sheet(path: Path) -> None:
