@@ -183,8 +183,7 @@ _ALLOWED = (
 
 def read_pressures(given: Iterable[Any], name: str, density: float | None = None) -> tuple[float, ...]:
     """Pressures in Pa from numbers and texts with units, heads of a fluid of that density, kg/m3, included. Raises
-    CaseError for anything that is not a pressure from 0 to 10 MPa; `name` says in the sentence where it was
-    given.
+    CaseError for anything that is not a pressure from 0 to 10 MPa; `name` says in the sentence where it was given.
     """
     found = []
     for value in given:

@@ -20,6 +20,8 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
+from eigen.operator import FLUID_PARTS
+
 
 class FlowMotion(NamedTuple):
     """A passage in motion and the law's own unknowns."""
@@ -47,10 +49,6 @@ class FlowParameter:
     unit: str
     meaning: str
     value: float | None = None  #: What it is unless given; without it, it must be given.
-
-
-#: Names of the parts of a linearised flow: by area, area rate, area acceleration, the law's unknowns and their rates.
-_OF_PRESSURES, _OF_BALANCES = ("A0", "A1", "A2", "B0", "B1"), ("R0", "R1", "R2", "S0", "S1")
 
 
 def above_floor(area, floor):
@@ -372,7 +370,7 @@ class FlowLaw(Traceable, ABC):
         0 = (R0 + lambda R1 + lambda^2 R2) a + (S0 + lambda S1) u
         """
         parts = _linearised(self, self._shaped(motion), self.values(given))
-        return {name: np.asarray(part) for name, part in zip((*_OF_PRESSURES, *_OF_BALANCES), parts)}
+        return {name: np.asarray(part) for name, part in zip(FLUID_PARTS, parts)}
 
     def linearise_still(self, area: np.ndarray, given: Mapping[str, float], inner=None) -> dict[str, np.ndarray]:
         """Derivatives at a passage at rest, in steady flow unless the inner unknowns are given; see `linearise`."""
@@ -405,7 +403,7 @@ def call_compiled(method: str, law, *given):
 
 @jax.jit
 def _linearised(law, motion, parameters):
-    """Parts of `FlowLaw.linearise` in the order of their names."""
+    """Parts of `FlowLaw.linearise` in the order of `eigen.operator.FLUID_PARTS`."""
     pressure, residual = jax.jacfwd(lambda m: law.equations(m, parameters))(motion)
     return (*pressure, *residual)
 
