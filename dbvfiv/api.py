@@ -514,7 +514,6 @@ class Valve:
 
     def _ask(self, kind: str, keys: dict, given: dict, output: Output, observer: Observer | None, **choices) -> Any:
         """Result of a study with keys and named arguments put into its case; None stands for nothing given."""
-        self.model  # shared by what is asked of this valve
         session = self.session.prepared(kind, keys | named_changes(given, kind))
         return session.perform(kind, output, observer or bar(), **choices)
 

@@ -47,7 +47,7 @@ class SolveError(RuntimeError):
 
 
 class JumpError(SolveError):
-    """A bracket of growth rates of opposite sign across which the steady state jumps, so that no mode is neutral."""
+    """A bracket of growth rates of opposite sign across which they jump, so that no mode is neutral."""
 
 
 class NotValidError(SolveError):

@@ -120,7 +120,7 @@ def describe_surroundings(case: Case) -> dict[str, Any]:
     return {"density": case.fluid.density, "continuity": case.fluid.continuity} | known | outside | strained
 
 
-#: What a session builds of its case, and another with the same wall and load may have from it.
+#: What a session builds of its case, and another with the same wall and load has from it.
 _MODELS = ("described", "model", "mesh")
 
 
@@ -145,6 +145,8 @@ class Session:
         self.case, self.name, self.start = case, name, start
         #: Session that this one changes some keys of, and these: its strain levels are those of that session.
         self.origin: tuple[Session, dict[str, Any]] | None = None
+        #: Session with the same wall and load, of which this one has model and mesh.
+        self.same: Session | None = None
         #: How its strain levels were settled, which every study of it tells.
         self.settled: SettledLevels | None = None
         self._at_levels: Session | None = None
@@ -155,11 +157,13 @@ class Session:
 
     def __getstate__(self) -> dict[str, Any]:
         """Without the model, which is built again when it is asked for."""
-        return {name: value for name, value in vars(self).items() if name not in _MODELS}
+        return {name: value for name, value in vars(self).items() if name not in _MODELS} | {"same": None}
 
     @cached_property
     def model(self) -> ValveModel:
         """The coupled model of the case. Raises CaseError if the case gives no model."""
+        if self.same is not None:
+            return self.same.model
         if self.case.seeks_levels:
             return self.settle().model
         return self.at_cracking().model if self.case.valve.cracking_head else self.described
@@ -179,8 +183,11 @@ class Session:
         """The model before anything is solved: rubbers whose strain levels are sought have the lowest tested ones.
         Raises CaseError if the case gives no model, or asks for a pressure that no wall like it bears.
         """
-        free_memory()
-        model = attempt(lambda: ValveModel(self.case))
+        if self.same is None:
+            free_memory()
+            model = attempt(lambda: ValveModel(self.case))
+        else:
+            model = self.same.described
         self.require_borne(model)
         return model
 
@@ -204,7 +211,7 @@ class Session:
 
     @cached_property
     def mesh(self) -> MeshData:
-        return MeshData.of(self.described)
+        return MeshData.of(self.described) if self.same is None else self.same.mesh
 
     def replace(self, changes: Mapping[str, Any]) -> Session:
         """A session with some keys of its case changed, and its strain levels kept; the same one if none is.
@@ -218,9 +225,7 @@ class Session:
         if self.case.seeks_levels:
             session.origin = self, dict(changes)
         if {key.partition(".")[0] for key in changes} <= set(KINDS):
-            session.__dict__.update({name: self.__dict__[name] for name in _MODELS if name in self.__dict__})
-            if "described" in self.__dict__:
-                session.require_borne(self.described)
+            session.same = self.same or self
         return session
 
     def prepared(self, kind: str, changes: Mapping[str, Any]) -> Session:

@@ -312,7 +312,7 @@ def refine(series: Series, period: float, error: float = 0.0) -> tuple[float, fl
             change = np.dot(here - there, rate) / max(np.dot(rate, rate), 1e-300)
             change = float(np.clip(change, -0.02 * period, 0.02 * period))
             lag = min(lag + change, series.end - t[-1])
-            if abs(change) < 1e-13 * period:
+            if abs(change) < 1e-10 * period:  # far below what any record resolves
                 break
         if abs(lag / multiple - period) > 0.1 * period / multiple:
             break

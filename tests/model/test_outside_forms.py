@@ -45,7 +45,10 @@ def bend(one: np.ndarray, other: np.ndarray) -> np.ndarray:
     return sum(s * t * whole(s * one + t * other) for s in (1, -1) for t in (1, -1)) / 4
 
 
-ZERO = np.zeros(valve()[0].size)
+@pytest.fixture(scope="module")
+def still() -> np.ndarray:
+    """No motion at all, (n,)."""
+    return np.zeros(valve()[0].size)
 
 
 def test_the_motions_are_those_of_the_added_mass():
@@ -57,37 +60,37 @@ def test_the_motions_are_those_of_the_added_mass():
     assert found._here == pytest.approx(np.diag(slow), abs=1e-3 * slow[0])
 
 
-def test_accelerations_of_a_changed_shape():
+def test_accelerations_of_a_changed_shape(still):
     (_, u), (a, acceleration) = some(1), some(2)
-    found = forms()._motions.T @ forms().second((u, ZERO, ZERO), (ZERO, ZERO, acceleration))
+    found = forms()._motions.T @ forms().second((u, still, still), (still, still, acceleration))
     expected = slope(u) @ a
     assert found == pytest.approx(expected, abs=3e-3 * np.abs(expected).max())
 
 
-def test_the_power_of_the_resistance_is_the_growth_of_the_energy():
+def test_the_power_of_the_resistance_is_the_growth_of_the_energy(still):
     """v . [D M[v] v - grad (v' M v)/2] = v' D M[v] v / 2, and the force along another motion by Lagrange."""
     (v, motion), (w, other) = some(3), some(4)
-    force = 0.5 * forms().second((ZERO, motion, ZERO), (ZERO, motion, ZERO))
+    force = 0.5 * forms().second((still, motion, still), (still, motion, still))
     along, across = slope(motion), slope(other)
     size = np.abs(along @ v).max() * np.abs(v).max()
     assert motion @ force == pytest.approx(0.5 * v @ along @ v, abs=3e-3 * size)
     assert other @ force == pytest.approx(w @ along @ v - 0.5 * v @ across @ v, abs=3e-3 * size)
 
 
-def test_third_derivatives():
+def test_third_derivatives(still):
     (_, u), (_, r), (v, motion) = some(5), some(6), some(7)
-    found = forms()._motions.T @ forms().third((u, ZERO, ZERO), (r, ZERO, ZERO), (ZERO, ZERO, motion))
+    found = forms()._motions.T @ forms().third((u, still, still), (r, still, still), (still, still, motion))
     expected = bend(u, r) @ v
     assert found == pytest.approx(expected, abs=1e-2 * np.abs(expected).max())
-    force = forms().third((u, ZERO, ZERO), (ZERO, motion, ZERO), (ZERO, motion, ZERO))
+    force = forms().third((u, still, still), (still, motion, still), (still, motion, still))
     expected = v @ bend(u, motion) @ v
     assert motion @ force == pytest.approx(expected, rel=1e-2)
 
 
 @pytest.mark.slow
-def test_forms_are_symmetric_and_linear():
+def test_forms_are_symmetric_and_linear(still):
     rng = np.random.default_rng(8)
-    one, two, three = (tuple(rng.standard_normal((3, len(ZERO)))) for _ in range(3))
+    one, two, three = (tuple(rng.standard_normal((3, len(still)))) for _ in range(3))
     doubled = tuple(2.0 * x for x in two)
     pair, triple = forms().second(one, two), forms().third(one, two, three)
     assert forms().second(doubled, one) == pytest.approx(2 * pair, rel=1e-9, abs=1e-9 * np.abs(pair).max())

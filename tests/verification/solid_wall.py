@@ -8,7 +8,7 @@ only where half the wall is below the radius of the mid-surface.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cache, cached_property
 
 import felupe as fem
 import jax
@@ -211,7 +211,7 @@ class SolidWall:
             if share == 0.0:
                 continue
             index = (3 * nodes[..., None] + np.arange(3)).reshape(len(nodes), -1)
-            at = np.interp(self.points[nodes][..., 2] @ _SHAPE.T, z, pressure) * share
+            at = np.interp(self.points[nodes][..., 2] @ _serendipity()[0].T, z, pressure) * share
             here = jnp.asarray((self.points + u)[nodes])
             np.add.at(force, index, np.asarray(_push(here, at)).reshape(len(nodes), -1))
             slope = np.asarray(_push_slope(here, at)).reshape(len(nodes), 24, 24)
@@ -279,6 +279,7 @@ def _constants(layer) -> np.ndarray:
     return out
 
 
+@cache
 def _serendipity():
     """Shape functions (9, 8) and slopes (9, 8, 2) of the 8-node face at 3 x 3 Gauss points, and their weights."""
     g, w = np.polynomial.legendre.leggauss(3)
@@ -291,21 +292,16 @@ def _serendipity():
         m = jnp.where(edge[:, 0] == 0, 0.5 * (1 - a**2) * (1 + edge[:, 1] * b), 0.5 * (1 - b**2) * (1 + edge[:, 0] * a))
         return jnp.concatenate([jnp.asarray(c), m])
 
-    points = jnp.asarray([(a, b) for a in g for b in g])
-    return (
-        np.asarray(jax.vmap(functions)(points)),
-        np.asarray(jax.vmap(jax.jacfwd(functions))(points)),
-        np.outer(w, w).ravel(),
-    )
-
-
-_SHAPE, _SLOPE, _WEIGHT = _serendipity()
+    with jax.ensure_compile_time_eval():
+        points = jnp.asarray([(a, b) for a in g for b in g])
+        return jax.vmap(functions)(points), jax.vmap(jax.jacfwd(functions))(points), np.outer(w, w).ravel()
 
 
 def _push_one(x, pressure):
     """Forces (8, 3) of pressures (9,) on a face with nodes (8, 3); towards the outside of the valve."""
-    first, second = jnp.einsum("qa,ai->qi", _SLOPE[..., 0], x), jnp.einsum("qa,ai->qi", _SLOPE[..., 1], x)
-    return jnp.einsum("q,q,qa,qi->ai", _WEIGHT, pressure, _SHAPE, jnp.cross(first, second))
+    shape, slope, weight = _serendipity()
+    first, second = jnp.einsum("qa,ai->qi", slope[..., 0], x), jnp.einsum("qa,ai->qi", slope[..., 1], x)
+    return jnp.einsum("q,q,qa,qi->ai", weight, pressure, shape, jnp.cross(first, second))
 
 
 _push = jax.jit(jax.vmap(_push_one))

@@ -219,6 +219,6 @@ def _check_jump(growth: dict[float, float], low: float, high: float) -> None:
         return
     if abs(growth[above] - growth[below]) > STEEP * abs(growth[high] - growth[low]):
         raise JumpError(
-            f"The state jumps between {below:.6g} and {above:.6g}, where a growth rate goes from {growth[below]:.4g} "
-            f"to {growth[above]:.4g} 1/s: no mode is neutral there."
+            f"A growth rate jumps between {below:.6g} and {above:.6g}, from {growth[below]:.4g} to "
+            f"{growth[above]:.4g} 1/s: no mode is neutral there."
         )

@@ -1,10 +1,12 @@
 """Onsets of the valve on a coarse mesh."""
 
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pytest
 
+from dbvfiv.api import Valve
 from dbvfiv.case.parameters import Mu
 from dbvfiv.errors import CaseError, SolveError
 from dbvfiv.studies import session
@@ -220,12 +222,12 @@ def test_what_a_case_does_not_have_is_no_parameter(parameter, words, refused):
 )
 def test_refusal_precedes_the_search_for_levels(kind, keys, monkeypatch):
     monkeypatch.setattr(session, "settle_levels", None)
-    case = Case()
-    assert case.seeks_levels
-    with pytest.raises(
-        (CaseError, SolveError), match="no tail_length to|Without flow|differ in|no flow model to|at work|inertia"
-    ):
-        Session(case.replace(keys)).perform(kind)
+    assert Case().seeks_levels
+    said = "no tail_length to|Without flow|differ in|no flow model to|at work|inertia"
+    case = Case().replace(keys)
+    for ask in (partial(Session(case).perform, kind), getattr(Valve(case), kind)):
+        with pytest.raises((CaseError, SolveError), match=said):
+            ask()
 
 
 USUAL = {"strain": "strain=0.1:0.6:3", "angle": "angle=20:80:3"}

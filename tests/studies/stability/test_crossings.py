@@ -104,7 +104,7 @@ def test_missing_states_are_kept_as_sentences():
 def test_a_growth_rate_that_jumps_across_zero_is_no_onset(rate):
     scan = Scan(modes(rate))
     (crossing,) = scan.run(np.linspace(0, 3, 7))
-    with pytest.raises(JumpError, match="The state jumps between 1.* no mode is neutral there"):
+    with pytest.raises(JumpError, match="A growth rate jumps between 1.* no mode is neutral there"):
         locate(scan, crossing, 1e-12)
 
 
