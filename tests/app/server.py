@@ -92,7 +92,7 @@ class Tab:
         """Element by its name."""
         return self.driver.find_element("css selector", f'[data-at="{name}"]')
 
-    def wait(self, condition, seconds: float = 60.0):
+    def wait(self, condition, seconds: float = 180.0):
         """Wait until something holds, and return it."""
         end = time.monotonic() + seconds
         while time.monotonic() < end:
