@@ -86,9 +86,11 @@ class LoadPath(LoadSteps):
         )
 
     def _check_drive(self, target: float) -> None:
-        """Refuse a pressure that does not drive the flow; with gravity a valve that holds still fluid hangs as well."""
+        """Refuse a pressure that drives no flow, but that of a valve which hangs with still fluid in it, and the begin
+        of a curve of equilibria, at rest.
+        """
         back, level = self.model.flow.back, self.model.flow.level
-        if target > back or (target == back and self.model.weight is not None):
+        if target > back or (target == back and (self.model.weight is not None or self.follows_curve)):
             return
         if not self.model.flow.has_fluid:
             raise SolveError(f"{target:.6g} Pa is no load: nothing presses on the wall.")
