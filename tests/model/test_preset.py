@@ -110,6 +110,12 @@ def test_faces_press_evenly_at_rest_in_the_shape_that_is_drawn(model):
     assert beyond[model.mesh.centre_line[0]] > 5e-3  # the lips cross without contact
 
 
+def test_the_curve_of_equilibria_begins_sealed_at_rest(model, path):
+    rest = path.go_to(model.flow.back)
+    assert rest.is_sealed and rest.stops > 10
+    assert rest.q == pytest.approx(model.rest(), abs=1e-9)
+
+
 def test_faces_that_cross_at_rest_leave_nothing_open(model):
     model.rest()
     crossed = copy(model)
