@@ -120,7 +120,7 @@ def describe_surroundings(case: Case) -> dict[str, Any]:
     return {"density": case.fluid.density, "continuity": case.fluid.continuity} | known | outside | strained
 
 
-#: What a session builds of its case, and another with the same wall and load has from it.
+#: What a session builds of its case.
 _MODELS = ("described", "model", "mesh")
 
 
@@ -145,7 +145,7 @@ class Session:
         self.case, self.name, self.start = case, name, start
         #: Session that this one changes some keys of, and these: its strain levels are those of that session.
         self.origin: tuple[Session, dict[str, Any]] | None = None
-        #: Session with the same wall and load, of which this one has model and mesh.
+        #: Session with the same wall and load, of which this one has the model.
         self.same: Session | None = None
         #: How its strain levels were settled, which every study of it tells.
         self.settled: SettledLevels | None = None
@@ -211,7 +211,7 @@ class Session:
 
     @cached_property
     def mesh(self) -> MeshData:
-        return MeshData.of(self.described) if self.same is None else self.same.mesh
+        return MeshData.of(self.described)
 
     def replace(self, changes: Mapping[str, Any]) -> Session:
         """A session with some keys of its case changed, and its strain levels kept; the same one if none is.
